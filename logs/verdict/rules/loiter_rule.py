@@ -128,11 +128,11 @@ def merge_loiter_findings(
                     merged[k] = finding if finding.ok is not None else None
                 rule_findings = [entry for entry in rule_findings if entry[1].ok is not None]
             if len(rule_findings) > 1:
-                worst_index, worst = min(rule_findings, key=lambda entry: worst_first_key(entry[1]))
+                worst_index, worst_finding = min(rule_findings, key=lambda entry: worst_first_key(entry[1]))
                 for k, _ in rule_findings:
                     merged[k] = None
-                reason = f"{worst.reason}; the worst of the circle's {len(rule_findings)} legs"
-                merged[worst_index] = replace(worst, reason=reason)
+                reason = f"{worst_finding.reason}; the worst of the circle's {len(rule_findings)} legs"
+                merged[worst_index] = replace(worst_finding, reason=reason)
     return tuple(finding for finding in merged if finding is not None)
 
 
@@ -195,19 +195,18 @@ def _loiter_finding(
     open_texts = [fault.text for fault in faults if _may_pass(requirements, circle)]
     faults = [] if open_texts else faults
     facts = [*open_texts, f"{circle.laps:.2f} laps with a radius of {circle.radius:.0f} m"]
-    hazards_text, parameter_name = "", requirements.setup.autopilot.loiters.radius_name
+    hazards_text, parameter = "", requirements.setup.autopilot.loiters.radius_name
     if uses_parameter and faults and math.isfinite(min_radius):
         # If the parameter makes the loiter too tight, the autopilot flies it wider, as at the end of a return.
         bank = _held_bank(requirements, circle, min_radius, corner_findings)
         if bank <= requirements.limits.max_bank + BANK_TOLERANCE_RAD + 1e-9:
             facts.append(
-                f"flown wider, because {parameter_name} is less than the {min_radius:.0f} m that the bank limit"
-                " requires"
+                f"flown wider, because {parameter} is less than the {min_radius:.0f} m that the bank limit requires"
             )
             faults = []
             hazards_text = "" if aligned is not None else _hazards_text(requirements, circle, min_radius)
         else:
-            facts.append(f"{parameter_name}, held with {math.degrees(bank):.0f}° of bank")
+            facts.append(f"{parameter}, held with {math.degrees(bank):.0f}° of bank")
     faults += _corner_faults(requirements, aligned, circle, failed_corners, has_faults=bool(faults))
     radii = np.zeros(0) if aligned is None else _flown_radii(aligned, circle)
     mean_radius = float(radii.mean()) if radii.size else math.nan
