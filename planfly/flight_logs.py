@@ -15,6 +15,7 @@ CUT_SHORT = "the log ends before the flight does"
 def is_log(path: Path) -> bool:
     """Return True if a file is a flight log of planfly, by its first bytes or the suffix .mcap.
 
+    A folder is judged only by its suffix.
     Raises PlanflyError for a file that cannot be read.
     """
     if path.exists() and not path.is_file():

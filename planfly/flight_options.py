@@ -412,7 +412,11 @@ def apply_options(
 
 
 def _check_aircraft_options(scenario: Scenario, options: FlightOptions) -> None:
-    """Raise ArgumentError for an aircraft of the options that is unknown, and an airspeed at which it does not fly."""
+    """Raise ArgumentError for an aircraft of the options that is unknown, and an airspeed at which it does not fly.
+
+    A wrong value in the file of the aircraft raises FlightError.  An unknown aircraft of the scenario raises
+    nothing here.
+    """
     stated_aircraft, airspeed = flight_entries(options)["aircraft"], options.get("airspeed")
     name = str(stated_aircraft or scenario.flight.aircraft)
     try:

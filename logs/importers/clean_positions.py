@@ -68,7 +68,7 @@ def remove_clock_jumps(time: Floats, usual_step: float = 0.1) -> SteadyClock:
 def _find_clock_jump(late_rows: Ints, time: Floats, latest: Floats) -> int:
     """Return the row at which the clock goes back and stays back, or -1 if it never does.
 
-    The next `MIN_LATE_ROWS` rows, or all rows to the end, must be late.
+    The next `MIN_LATE_ROWS` rows, or all rows to the end, must be late.  A single late row at the end is not a jump.
 
     late_rows: rows whose time is late by more than `MAX_CLOCK_LAG_S`.
     latest: latest time up to each row, s.
@@ -175,7 +175,7 @@ def clean_positions(series: LogSeries, earlier_jumps: tuple[float, ...] = ()) ->
 def find_gaps(time: Floats) -> tuple[Gap, ...]:
     """Return the gaps between rows.
 
-    A gap is a pause longer than `MAX_STEP_S` and than `MAX_STEP_RATIO` median steps.
+    A gap is a pause longer than both `MAX_STEP_S` and `MAX_STEP_RATIO` median steps.  Fewer than two rows have no gap.
 
     time: increasing times of the rows, s, (n,).
     """
@@ -211,7 +211,10 @@ def _usable_rows(time: Floats, values: Floats) -> Flags:
 def _find_glitches(time: Floats, values: Floats) -> Flags:
     """Return a mask (n,): True for glitches.
 
-    A glitch is a row that no vehicle can reach from the row before, nor leave to the row after.
+    A glitch is a row that no vehicle can reach from the row before, nor leave to the row after.  Up to
+    `MAX_GLITCH_ROWS` rows in sequence may be glitches.  Fewer than five rows have none.
+
+    values: latitude and longitude (deg) and altitude (m), (n, 3).
     """
     is_glitch = np.zeros(time.size, bool)
     if time.size < 5:

@@ -257,7 +257,10 @@ class _Reader:
         return None
 
     def _position(self) -> LogSeries | None:
-        """Return the estimated positions, or else the positions of GPS with a 3-D fix."""
+        """Return the estimated positions, or else the positions of GPS with a 3-D fix.
+
+        Return None if the log has neither.  If the log does not state the fix, all positions of GPS are returned.
+        """
         estimate = self._first_table((("POS", ("Lat", "Lng", "Alt")), ("AHR2", ("Lat", "Lng", "Alt"))))
         if estimate is not None:
             return estimate
@@ -270,7 +273,10 @@ class _Reader:
         return LogSeries("GPS", position.time[has_fix], position.values[has_fix])
 
     def _velocity(self) -> LogSeries | None:
-        """Return the ground velocity to east, north and up, m/s, (n, 3), from the estimator or else from GPS."""
+        """Return the ground velocity to east, north and up, m/s, (n, 3), from the estimator or else from GPS.
+
+        Return None if the log has neither.
+        """
         for name in ("XKF1", "NKF1", "EKF1"):
             velocity = self._message_table(name, ("VE", "VN", "VD"))
             if velocity is not None and len(velocity.time):

@@ -60,6 +60,8 @@ def find_flight_spans(time: Floats, lat: Floats, lon: Floats) -> list[tuple[floa
     A flight is a period of at least `MIN_FLIGHT_TIME_S` with a median ground speed above `MIN_FLYING_SPEED_MPS`.  It
     may contain slower periods of up to `MAX_SLOW_TIME_S`.
 
+    The list is empty for fewer than three rows.
+
     time, lat, lon: times (s) and positions (deg), (n,).
 
     >>> time = np.arange(0.0, 200.0)
@@ -147,13 +149,14 @@ def _find_stretches(start: float, end: float, modes: Sequence[ModeChange], last:
 def _mission_at(stretch: MissionStretch, missions: Sequence[LoggedMission]) -> int:
     """Return the index of the mission that a stretch of a flight followed, or -1 if unknown.
 
-    It is the last mission at the start of the stretch, or else the first mission within the stretch.
+    It is the last mission logged up to a second after the start of the stretch, or else the first mission logged
+    later in the stretch.
     """
-    before = [k for k, logged in enumerate(missions) if logged.time <= stretch.start + 1.0]
-    if before:
-        return before[-1]
-    inside = [k for k, logged in enumerate(missions) if logged.time <= stretch.end]
-    return inside[0] if inside else -1
+    earlier_missions = [k for k, logged in enumerate(missions) if logged.time <= stretch.start + 1.0]
+    if earlier_missions:
+        return earlier_missions[-1]
+    later_missions = [k for k, logged in enumerate(missions) if logged.time <= stretch.end]
+    return later_missions[0] if later_missions else -1
 
 
 def choose_part(parts: Sequence[FlightPart]) -> int:
@@ -262,8 +265,8 @@ def make_flight(raw: RawLog, number: int | None = None) -> LoggedFlight:
         if not 1 <= number <= len(parts):
             raise LogError.of_argument("flight", number, f"the log has flights 1..{len(parts)}", file=raw.source)
         index = number - 1
-    others = tuple((part.start, part.along_mission) for k, part in enumerate(parts) if k != index)
-    return _extract_flight(raw, positions, parts[index], index + 1, len(parts), others)
+    other_flights = tuple((part.start, part.along_mission) for k, part in enumerate(parts) if k != index)
+    return _extract_flight(raw, positions, parts[index], index + 1, len(parts), other_flights)
 
 
 def _reason_without_flight(positions: CleanPositions) -> str:
@@ -344,13 +347,15 @@ def _interpolate_at(series: LogSeries | None, name: str, time: Floats, positions
     if series_time.size < 2:
         return interpolated
     max_gap = max(_MAX_INTERPOLATED_STEP_S, _MAX_INTERPOLATED_STEPS * float(np.median(np.diff(series_time))))
-    after = np.clip(np.searchsorted(series_time, time), 1, series_time.size - 1)
+    next_rows = np.clip(np.searchsorted(series_time, time), 1, series_time.size - 1)
     is_covered = (
-        (series_time[after] - series_time[after - 1] <= max_gap)
+        (series_time[next_rows] - series_time[next_rows - 1] <= max_gap)
         & (time >= series_time[0] - max_gap)
         & (time <= series_time[-1] + max_gap)
     )
-    is_exact = np.isclose(series_time[after], time, atol=1e-9) | np.isclose(series_time[after - 1], time, atol=1e-9)
+    is_exact = np.isclose(series_time[next_rows], time, atol=1e-9) | np.isclose(
+        series_time[next_rows - 1], time, atol=1e-9
+    )
     if name == "attitude":
         values = np.unwrap(values, axis=0)
     for k in range(width):
@@ -460,7 +465,8 @@ def make_track(flight: LoggedFlight, origin: GeoOrigin) -> Track:
     """Return the flight as a track on the map around ``origin``.
 
     Velocities that the log lacks are computed from the positions.  In a log without altitudes, the altitude of the
-    track is 0, and no rule judges it.
+    track is 0, and no rule judges it.  The energy counts from its first known value.  Columns that no log contains are
+    NaN, and all rows are on leg 0.
 
     >>> from logs.importers.raw_log import example_raw_log
     >>> from logs.importers.imported_flight import make_flight

@@ -168,7 +168,10 @@ class _DataflashMotionReader:
         return {name: value for name, value in values if math.isfinite(value)}
 
     def _home(self, velocity: Samples) -> tuple[float, float, float] | None:
-        """Return latitude (deg), longitude (deg) and altitude (m) of home, or of the first position at rest."""
+        """Return latitude (deg), longitude (deg) and altitude (m) of home, or of the first position at rest.
+
+        Return None if the log has neither.
+        """
         home = logged_home(self._index.messages("ORGN"))
         if home is not None:
             return home.lat_deg, home.lon_deg, home.alt

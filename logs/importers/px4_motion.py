@@ -110,7 +110,9 @@ def read_px4_motion(path: Path, digest: str) -> MotionLog:
             height=height,
             battery=NO_SAMPLES if battery is None else sort_samples(battery.time, battery.values),
             parameters={
-                name: parameters[own] * factor for own, (name, factor) in _PARAMETERS.items() if own in parameters
+                name: parameters[px4_name] * factor
+                for px4_name, (name, factor) in _PARAMETERS.items()
+                if px4_name in parameters
             },
             home=first_ground_position(place, velocity) if home is None else (home.lat_deg, home.lon_deg, home.alt),
             program_kind="px4",
@@ -282,7 +284,7 @@ def _check_flaperon(topics: Topics, parameters: Mapping[str, float], surface: in
 
 
 def _actuators(topics: Topics, topic: str, size: int) -> Samples:
-    """Return the outputs of a topic's actuators, (n, size), sorted by time.
+    """Return the outputs of a topic's actuators, (n, size), sorted by time; no rows if the log lacks the topic.
 
     NaN stands for an unused or stopped actuator.
     """

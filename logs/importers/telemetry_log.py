@@ -554,7 +554,10 @@ def _parse_item(message: Any, *, scaled: bool) -> MissionItem:
 
 
 def _px4_mission(logged: LoggedItemGroup, source: str, origin: str) -> LoggedMission | None:
-    """Make a mission of PX4 items, which are numbered from 0 and contain no home; None if it is too short."""
+    """Make a mission of PX4 items, which are numbered from 0 and contain no home.
+
+    Return None if the mission is complete but has fewer than two items.
+    """
     mission = Mission(None, px4_items(logged.items), source=f"{source}: {origin}")
     end = max(logged.total, mission.items[-1].seq)
     return without_gaps(LoggedMission(logged.time, mission, origin), logged.total, end)

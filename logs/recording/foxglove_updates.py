@@ -253,7 +253,10 @@ def track_cloud(time_ns: int, positions: Floats) -> bytes:
 
 
 def aircraft_cloud(time_ns: int) -> bytes:
-    """Encode the aircraft model as a point cloud in the aircraft's frame."""
+    """Encode the aircraft model as a point cloud in the aircraft's frame.
+
+    The points form a grid on each triangle of the model, with `_SIDE_INTERVALS` intervals on each side.
+    """
     first, second, third = (corner[:, None, :] for corner in np.moveaxis(model_corners().astype(np.float64), 1, 0))
     weights = [
         (i / _SIDE_INTERVALS, j / _SIDE_INTERVALS)

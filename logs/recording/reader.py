@@ -383,7 +383,10 @@ def _usable_rows(rows: StateRecords, waypoint_count: int) -> tuple[StateRecords,
 
 
 def _read_result(attachments: dict[str, bytes], row_count: int) -> tuple[str | None, str]:
-    """Return the recorded end of the flight, or None, and the fault of the record; "" without a fault."""
+    """Return the recorded end of the flight (None if it is unknown), and the fault of the record ("" if it has none).
+
+    row_count: number of rows in the log; the record has a fault if it states another number.
+    """
     if RESULT_FILE not in attachments:
         return None, "the recording stopped before the flight had ended"
     data = _parse_object(attachments[RESULT_FILE])

@@ -130,7 +130,10 @@ class Finding:
 
     @property
     def value(self) -> float | None:
-        """Value that was compared with the limit: the flown or the planned one, whichever matches the margin."""
+        """Value that was compared with the limit: the flown or the planned one, whichever matches the margin.
+
+        Without a limit or a margin, it is the flown value, or else the planned one; None if there is neither.
+        """
         if self.flown is None or self.planned is None or self.limit is None or self.margin is None:
             return self.planned if self.flown is None else self.flown
         errors = {value: abs(abs(value - self.limit) - abs(self.margin)) for value in (self.flown, self.planned)}

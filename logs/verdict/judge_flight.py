@@ -164,10 +164,14 @@ def _disagreements(
     level_outcomes, flight_outcomes = _worst_outcomes(level_findings), _worst_outcomes(flight_findings)
     flown_by_rule = {outcome.rule: outcome for outcome in flight_outcomes.values()}
     disagreements = []
-    for key, worst in level_outcomes.items():
-        flown = flight_outcomes.get(key) or flown_by_rule.get(FLOWN_COUNTERPARTS.get(worst.rule, ""))
-        if flown is not None and worst.ok != flown.ok:
-            disagreements.append(Disagreement(worst.rule, worst.place, level, bool(worst.ok), bool(flown.ok)))
+    for key, level_finding in level_outcomes.items():
+        flight_finding = flight_outcomes.get(key) or flown_by_rule.get(FLOWN_COUNTERPARTS.get(level_finding.rule, ""))
+        if flight_finding is not None and level_finding.ok != flight_finding.ok:
+            disagreements.append(
+                Disagreement(
+                    level_finding.rule, level_finding.place, level, bool(level_finding.ok), bool(flight_finding.ok)
+                )
+            )
     return tuple(disagreements)
 
 

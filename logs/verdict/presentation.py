@@ -92,7 +92,7 @@ class RuleFindings:
 
     @property
     def closest(self) -> Finding | None:
-        """The failed finding that is furthest beyond its limit, or else the finding closest to its limit."""
+        """The failed finding that is furthest beyond its limit, or else the finding closest to its limit, or None."""
         return closest_to_limit(self.findings)
 
     @property
@@ -208,11 +208,16 @@ class Presentation:
 
     @property
     def first_remedied(self) -> Finding | None:
-        """First failed finding with a remedy; a finding on ground contact comes before all others."""
-        worst = [rule.failed[0] for rule in self.failed_rules]
+        """First failed finding with a remedy; a finding on ground contact comes before all others.
+
+        None if no failed finding has a remedy.
+        """
+        worst_findings = [rule.failed[0] for rule in self.failed_rules]
         # A ground contact ended the flight; the sort keeps the order of the others.
-        worst.sort(key=lambda finding: finding.rule != "clearance" or finding.flown is None or finding.flown > 0.0)
-        return next((finding for finding in worst if self.remedy_text(finding)), None)
+        worst_findings.sort(
+            key=lambda finding: finding.rule != "clearance" or finding.flown is None or finding.flown > 0.0
+        )
+        return next((finding for finding in worst_findings if self.remedy_text(finding)), None)
 
     def findings_to_list(self, max_failed_and_undecided: int) -> list[tuple[int, Finding]]:
         """Return the findings to show in a short list, each with its index in `findings`.

@@ -165,7 +165,7 @@ def suggest_gentler_slope(
     """Suggest a gentler slope, a longer leg or another airspeed for one leg; the smallest relative change first.
 
     If the aircraft is not known well enough, suggest a flight that measures its climb or sink performance.  If its
-    climb performance is a guess, first suggest that the user state it.
+    climb performance is a guess, first suggest that the user state it.  Return () for a finding that is not on a leg.
     """
     leg = finding.place.index
     if leg is None:
@@ -217,7 +217,8 @@ def suggest_gentler_landing(
 ) -> tuple[Suggestion, ...]:
     """Suggest a waypoint that is lower, or further away, before a too steep landing, or to land from the other end.
 
-    If the aircraft is not known well enough, suggest a flight that measures its descent.
+    If the aircraft is not known well enough, suggest a flight that measures its descent.  Return () if the slope
+    passes, or if the limit allows no descent.
     """
     if finding.check == UNKNOWN_AIRCRAFT:
         return ((Change("no throttle", finding.place, None, MIN_EVIDENCE_FLIGHT_S, "s"),),)
@@ -266,7 +267,10 @@ def _gentler_arc(requirements: RouteRequirements, leg: int) -> tuple[Suggestion,
 def suggest_gentler_turn(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
-    """Suggest a gentler turn, longer legs or a lower airspeed; the smallest relative change first."""
+    """Suggest a gentler turn, longer legs or a lower airspeed; the smallest relative change first.
+
+    If the aircraft is not known well enough, suggest stating its bank limit.  Return () if the planned turn passes.
+    """
     corner = finding.place.index
     if corner is None:
         return ()
@@ -299,14 +303,18 @@ def suggest_stating_bank(
     """Suggest that the user state the aircraft's bank limit if it is a guess; return () otherwise."""
     if finding.check != UNKNOWN_AIRCRAFT:
         return ()
-    current, wanted = (math.degrees(bank) for bank in (requirements.setup.max_bank, requirements.possible_bank))
-    return ((Change("stated bank", finding.place, current, wanted, "deg"),),)
+    current, possible = (math.degrees(bank) for bank in (requirements.setup.max_bank, requirements.possible_bank))
+    return ((Change("stated bank", finding.place, current, possible, "deg"),),)
 
 
 def suggest_larger_loiter(
     requirements: RouteRequirements, aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
-    """Suggest the radius at which a loiter keeps the bank limit in this wind."""
+    """Suggest the radius at which a loiter keeps the bank limit in this wind.
+
+    If the aircraft is not known well enough, suggest stating its bank limit.  Return () for a place without a loiter,
+    or if the autopilot flies no sufficient radius.
+    """
     if finding.check == UNKNOWN_AIRCRAFT:
         return suggest_stating_bank(requirements, aligned, finding)
     item = next((item for item in requirements.setup.mission.items if item.seq == finding.place.item), None)
@@ -463,7 +471,7 @@ def _round_to_meter(length: float) -> float:
 def suggest_wider_berth(
     requirements: RouteRequirements, aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
-    """Suggest passing a missile at a greater distance, outside its sphere."""
+    """Suggest passing a missile at a greater distance, outside its sphere; return () for another place."""
     missile = finding.place.index
     if missile is None or finding.place.kind != "missile":
         return ()
@@ -577,9 +585,9 @@ _MIN_FOLLOWED_RELIEF_M = 20.0
 def _follow_ground(requirements: RouteRequirements, finding: Finding) -> Suggestion:
     """Return the changes with which the legs that are too low over varied ground follow it.
 
-    A leg's end keeps its height above ground, but gets at least the required one and the height by which a leg may be
-    off.  A leg that already follows the ground is not changed, nor is one that ends with a landing.  Return () if the
-    failed finding is not on one of the legs.
+    The end of a leg keeps its height above ground, but gets at least the required height plus
+    `HEIGHT_ERROR_LIMIT_M`.  A leg that already follows the ground is not changed, nor is one that ends with a landing.
+    Return () if none of the changed legs has the failed finding, or if the autopilot cannot follow terrain.
     """
     setup, leg, limit = requirements.setup, finding.place.index, finding.limit
     terrain = setup.scenario.terrain
@@ -587,26 +595,26 @@ def _follow_ground(requirements: RouteRequirements, finding: Finding) -> Suggest
         return ()
     landing_items = {item.seq for item in setup.mission.items if item.command in LANDINGS}
     changes = []
-    for other in range(requirements.legs):
-        start, end = requirements.points[other], requirements.points[other + 1]
-        count = 2 + int(float(requirements.runs[other]) / terrain.spacing)
+    for followed_leg in range(requirements.legs):
+        start, end = requirements.points[followed_leg], requirements.points[followed_leg + 1]
+        count = 2 + int(float(requirements.runs[followed_leg]) / terrain.spacing)
         places = start + np.linspace(0.0, 1.0, count)[:, None] * (end - start)
         ground = np.asarray(terrain.height(places[:, 0], places[:, 1]), dtype=np.float64)
-        follows = bool(np.isfinite(setup.route.points["above_ground"][other + 1]))
-        is_landing = int(setup.route.items[other + 1]) in landing_items
+        follows = bool(np.isfinite(setup.route.points["above_ground"][followed_leg + 1]))
+        is_landing = int(setup.route.items[followed_leg + 1]) in landing_items
         if follows or is_landing or not np.isfinite(ground).all() or np.ptp(ground) < _MIN_FOLLOWED_RELIEF_M:
             continue
         heights = places[:, 2] - ground
-        if other == leg or float(heights.min()) < limit:
+        if followed_leg == leg or float(heights.min()) < limit:
             height = _round_to_meter(max(float(heights[-1]), limit + HEIGHT_ERROR_LIMIT_M))
-            changes.append(Change("terrain height", requirements.leg(other), None, height, "m"))
+            changes.append(Change("terrain height", requirements.leg(followed_leg), None, height, "m"))
     return tuple(changes) if any(change.place.index == leg for change in changes) else ()
 
 
 def suggest_flying_lower(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
-    """Suggest flying a leg lower, below the maximum height above ground."""
+    """Suggest flying a leg lower, below the maximum height above ground; return () if it is not exceeded on a leg."""
     heights = [height for height in (finding.planned, finding.flown) if height is not None]
     if finding.place.kind != "leg" or finding.limit is None or not heights or not max(heights) > finding.limit:
         return ()
@@ -620,7 +628,7 @@ def suggest_better_launch(
     """Suggest a launch into the wind, or a faster throw or catapult.
 
     In a tailwind, suggest to launch against it, on a runway in the other direction.  A faster throw or catapult is one
-    that reaches the minimum airspeed of level flight.
+    that reaches the minimum airspeed of level flight.  Return () without a take-off.
     """
     ground = requirements.ground_phases
     take_off = None if ground is None else ground.procedures.take_off
@@ -637,8 +645,8 @@ def suggest_better_launch(
     course = math.atan2(-wind_east, -wind_north)
     if take_off.launch.method == "runway":
         course = take_off.course + math.pi
-    current, wanted = (float(round(math.degrees(angle)) % 360) for angle in (take_off.course, course))
-    return ((Change("launch course", finding.place, current, wanted, "deg"),), *suggestions)
+    current, suggested = (float(round(math.degrees(angle)) % 360) for angle in (take_off.course, course))
+    return ((Change("launch course", finding.place, current, suggested, "deg"),), *suggestions)
 
 
 def suggest_other_landing_course(
@@ -669,7 +677,7 @@ def _suggest_landing_against_wind(
 def suggest_staying_inside(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
-    """Suggest moving the path further inside the scenario's area; first, lower readings of its altitudes."""
+    """Suggest lower readings of the altitudes first, then a path inside the area; return () if it is not outside."""
     if finding.margin is None or not finding.margin < 0.0:
         return ()
     inset = _round_to_meter(-finding.margin + SUGGESTION_LENGTH_MARGIN_M)
@@ -682,7 +690,7 @@ def suggest_using_less_energy(
     """Suggest a shorter flight, or a battery or tank with more energy.
 
     Neither changes the charge at which a battery failsafe aborts the mission.  The trial of a shorter flight is flown
-    with a larger battery.
+    with a larger battery.  Return () if the energy is sufficient or unknown.
     """
     energy = finding.planned if finding.flown is None else finding.flown
     is_failsafe = finding.limit_source == "autopilot"

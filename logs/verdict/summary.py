@@ -115,8 +115,8 @@ def _first_briefs(briefs: Sequence[str], noun: str) -> list[str]:
     >>> _first_briefs(["a", "b", "c", "d", "e"], "item")
     ['a', 'b', 'c', 'd', '1 more item']
     """
-    others = len(briefs) - _MAX_NAMED_FINDINGS
-    return [*briefs[:_MAX_NAMED_FINDINGS], *([count_text(others, f"more {noun}")] if others > 0 else [])]
+    more_count = len(briefs) - _MAX_NAMED_FINDINGS
+    return [*briefs[:_MAX_NAMED_FINDINGS], *([count_text(more_count, f"more {noun}")] if more_count > 0 else [])]
 
 
 # Subjects of a sentence on an insufficiently known aircraft, with the places that are counted, by rule.
@@ -130,9 +130,12 @@ _PLACED_SUBJECTS = {
 
 
 def _unknown_aircraft_text(open_findings: Sequence[Finding]) -> str:
-    """Describe the findings that are open because the aircraft is not known well enough; "" if none is."""
-    slopes = [finding for finding in open_findings if finding.rule == "slope"]
-    if len(slopes) < len(open_findings):
+    """Describe the findings that are open because the aircraft is not known well enough; "" if none is.
+
+    The text names the legs if a few slopes are the only such findings, and otherwise counts the findings by rule.
+    """
+    slope_findings = [finding for finding in open_findings if finding.rule == "slope"]
+    if len(slope_findings) < len(open_findings):
         counts = {rule: sum(finding.rule == rule for finding in open_findings) for rule in _PLACED_SUBJECTS}
         subjects = [
             f"{noun}{'s' if count > 1 or rule == 'slope' else ''} {place_preposition} {count_text(count, place)}"
@@ -142,19 +145,21 @@ def _unknown_aircraft_text(open_findings: Sequence[Finding]) -> str:
             if count
         ]
         subjects += ["energy"] if sum(counts.values()) < len(open_findings) else []
-        is_singular = len(subjects) == 1 and not slopes and max(counts.values()) <= 1
+        is_singular = len(subjects) == 1 and not slope_findings and max(counts.values()) <= 1
         verb = "is" if is_singular else "are"
         subject_text = " and ".join(filter(None, [", ".join(subjects[:-1]), subjects[-1]]))
         return f"{subject_text} {verb} too close to the limit to judge, because the aircraft's limits are uncertain"
-    if not slopes:
+    if not slope_findings:
         return ""
-    if len(slopes) > _MAX_NAMED_FINDINGS:
+    if len(slope_findings) > _MAX_NAMED_FINDINGS:
         return (
-            f"slopes on {len(slopes)} legs are too close to the limit to judge, because the aircraft's"
+            f"slopes on {len(slope_findings)} legs are too close to the limit to judge, because the aircraft's"
             " limits are uncertain"
         )
-    place_names = [place_text(finding.place) + ("," if finding.place.to_item is not None else "") for finding in slopes]
-    noun, verb = ("slopes", "are") if len(slopes) > 1 else ("slope", "is")
+    place_names = [
+        place_text(finding.place) + ("," if finding.place.to_item is not None else "") for finding in slope_findings
+    ]
+    noun, verb = ("slopes", "are") if len(slope_findings) > 1 else ("slope", "is")
     return (
         f"{noun} on {' and '.join(place_names)} {verb} too close to the limit to judge,"
         " because the aircraft's limits are uncertain"
@@ -245,10 +250,10 @@ def _worst_error_notes(errors: Sequence[tuple[float, Place]], verb: str, referen
     if not notable:
         return []
     error, place = max(notable, key=lambda pair: abs(pair[0]))
-    others = f", and {len(notable) - 1} more by over {NOTABLE_HEIGHT_ERROR_M:.0f} m" if len(notable) > 1 else ""
+    more_text = f", and {len(notable) - 1} more by over {NOTABLE_HEIGHT_ERROR_M:.0f} m" if len(notable) > 1 else ""
     comma = "," if place.to_item is not None else ""
     side = "above" if error > 0.0 else "below"
-    return [f"{place_text(place)}{comma} {verb} {abs(error):.0f} m {side} {reference}{others}"]
+    return [f"{place_text(place)}{comma} {verb} {abs(error):.0f} m {side} {reference}{more_text}"]
 
 
 def _headline_findings(failed: list[Finding]) -> list[Finding]:
@@ -338,9 +343,9 @@ def unjudged_parts(findings: Sequence[Finding], setup: FlightSetup) -> list[tupl
         if not unjudged:
             continue
         places = [place_text(finding.place) for finding in unjudged if finding.place.kind in ("leg", "waypoint")]
-        rest = f" and {len(places) - _MAX_NAMED_FINDINGS} more" if len(places) > _MAX_NAMED_FINDINGS else ""
+        more_text = f" and {len(places) - _MAX_NAMED_FINDINGS} more" if len(places) > _MAX_NAMED_FINDINGS else ""
         is_part = len(places) == len(unjudged) < len(rule_findings)
-        place = f" on {'; '.join(places[:_MAX_NAMED_FINDINGS])}{rest}" if is_part else ""
+        place = f" on {'; '.join(places[:_MAX_NAMED_FINDINGS])}{more_text}" if is_part else ""
         parts.append((rule.name, f"{rule.title}{place} ({unjudged[0].reason})"))
     if reason := unjudged_return_text(setup):
         parts.append(("return", f"{RULE_WORDS['return'].title} ({reason})"))
@@ -406,10 +411,13 @@ def _misspelling_lines(parameters: ParameterSet) -> list[str]:
     known_names, stated_names = parameters.table.by_any_name, parameters.by_origin("file")
 
     def is_meant(name: str, known: str) -> bool:
-        """Return True if a name misspells a known name; short parts such as P and D are not compared."""
-        parts = set(name.split("_")) ^ set(known.split("_"))
+        """Return True if a name misspells a known name; short parts such as P and D are not compared.
+
+        Return False for a known name that the parameters also state.
+        """
+        differing_parts = set(name.split("_")) ^ set(known.split("_"))
         is_stated = known_names[known][0].name in stated_names
-        return not is_stated and is_one_edit(name, known) and min(map(len, parts)) > _LONGEST_SHORT_PART
+        return not is_stated and is_one_edit(name, known) and min(map(len, differing_parts)) > _LONGEST_SHORT_PART
 
     lines = []
     for name in parameters.unused:

@@ -562,7 +562,7 @@ def write_labels(axes: Any, panel: Panel) -> None:
 
 
 def write_label(placer: LabelPlacer, label: Label) -> None:
-    """Write one label in the style of its rank."""
+    """Write one label in the style of its rank; a name may be left out if there is no free place."""
     size, gap = theme.LABELS[label.rank]
     options: dict[str, Any] = {"size": size, "gap": gap if label.prefer != (0, 0) else 0.0, "prefer": label.prefer}
     options["color"] = theme.colour(label.role)

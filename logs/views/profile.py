@@ -189,7 +189,10 @@ def _altitude_limits(
 
 
 def ground_bands(scenario: Scenario, plane: PathPlane) -> list[Layer]:
-    """Return layers of the ground, of the required clearance above it, and of the height limit."""
+    """Return layers of the ground, of the required clearance above it, and of the height limit.
+
+    A limit that the scenario does not set has no layer.  Return [] without terrain.
+    """
     ground, along = plane.ground, plane.kilometres
     if ground is None:
         return []

@@ -192,12 +192,14 @@ def _chosen_autopilot(autopilot: str | None, params: str | Path | None) -> str:
 def _with_plan_notes(source: _SourceContent, autopilot: str, fence: FencePaths) -> _SourceContent:
     """Return a source with the autopilot of a .plan, and with notes on what the .plan cannot store.
 
+    The .plan has the autopilot that the user named, or else the source's autopilot, or else `DEFAULT_AUTOPILOT`.
+
     autopilot: name of the autopilot; "" if the user named none.
     fence: files of fences that the user named.
     """
     notes = list(source.notes)
-    own_autopilot = source.mission.autopilot if source.autopilot is None else source.autopilot.name
-    if not (autopilot or own_autopilot):
+    source_autopilot = source.mission.autopilot if source.autopilot is None else source.autopilot.name
+    if not (autopilot or source_autopilot):
         notes.append(
             f"{source.mission.source} names no autopilot: the .plan is for {TITLES[DEFAULT_AUTOPILOT]};"
             " --autopilot or --params names another"
@@ -210,7 +212,7 @@ def _with_plan_notes(source: _SourceContent, autopilot: str, fence: FencePaths) 
         and Path(file).suffix.lower() == ".plan"
         and (rally := read_mission(Path(file)).rally)
     ]
-    mission = replace(source.mission, autopilot=autopilot or own_autopilot or DEFAULT_AUTOPILOT)
+    mission = replace(source.mission, autopilot=autopilot or source_autopilot or DEFAULT_AUTOPILOT)
     return replace(source, mission=mission, notes=tuple(notes))
 
 
@@ -394,8 +396,8 @@ def _cruise_speed(source: _SourceContent) -> tuple[float, str]:
     It is the mission's cruise speed, or else the airspeed at which planfly flies the mission.  Without a scenario or a
     plan, this is the cruise airspeed of the default aircraft.
     """
-    if (stated := stated_cruise_speed(source.mission)) is not None:
-        return stated, "the mission's"
+    if (mission_speed := stated_cruise_speed(source.mission)) is not None:
+        return mission_speed, "the mission's"
     if source.airspeed is not None:
         return source.airspeed, f"from {source.aircraft}"
     aircraft = load_aircraft(FlightTable().aircraft)

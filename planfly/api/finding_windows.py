@@ -71,14 +71,14 @@ def window(
     """
     check_arguments(probability=probability, window_flights=options["flights"])
     step = _parse_step(every)
-    asked, first, last = (
+    departure, first, last = (
         None if text is None else _parse_time(name, text)
         for name, text in (("at", options["at"]), ("earliest", earliest), ("latest", latest))
     )
     if out is not None:
         check_output_folder(Path(out), overwrite)
     workers = make_workers(options["workers"], options["scheduler"], options["seed"])
-    first = first or asked
+    first = first or departure
     if first is None:
         allowed = "missing; state the first time of take-off, or `at` TIME"
         raise ArgumentError.of_argument("earliest", None, allowed, shown="")
@@ -89,7 +89,7 @@ def window(
     if (end - first) / step > MAX_DEPARTURES:
         raise ArgumentError.of_argument("every", every, f"expected at most {MAX_DEPARTURES} departures")
     zone = datetime.fromisoformat(options["at"] or earliest or "").tzinfo or UTC
-    goal = WindowGoal(departure_times(first, end, step, asked), asked, probability, options["flights"], zone)
+    goal = WindowGoal(departure_times(first, end, step, departure), departure, probability, options["flights"], zone)
     with stage("flying", f"flying {len(goal.departures)} departures") as advance:
         result = find_window(base, goal, workers, advance)
     question = {"from": earliest, "to": latest, "every": every, "probability": probability}

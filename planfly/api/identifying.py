@@ -227,12 +227,12 @@ def _check_stated_numbers(stated_numbers: dict[str, float], prior: Aircraft) -> 
 def _check_distinct(logs: Sequence[MotionLog]) -> None:
     """Raise LogError if two logs, including the check log, contain the same rows."""
     for number, log in enumerate(logs):
-        for other in logs[:number]:
-            overlap = min(log.span[1], other.span[1]) - max(log.span[0], other.span[0])
-            if log.sha256 == other.sha256 and overlap > 0.0:
+        for earlier_log in logs[:number]:
+            overlap = min(log.span[1], earlier_log.span[1]) - max(log.span[0], earlier_log.span[0])
+            if log.sha256 == earlier_log.sha256 and overlap > 0.0:
                 allowed = "name each log only once, and use another log to check the result"
                 raise LogError(
-                    f"{log.source}: the same bytes as {other.source}: {allowed}", file=log.source, allowed=allowed
+                    f"{log.source}: the same bytes as {earlier_log.source}: {allowed}", file=log.source, allowed=allowed
                 )
 
 
@@ -263,7 +263,10 @@ def records_and_outputs(
 
 
 def _unmixed_outputs(log: MotionLog, prior: Aircraft) -> dict[str, int]:
-    """Return the output number of each control that has its own servo output in the log."""
+    """Return the output number of each control that has its own servo output in the log.
+
+    Logs of PX4 and tables of columns have none: they contain the controls themselves, not servo outputs.
+    """
     if log.program_kind in ("px4", "columns"):
         return {}
     return {name: output.output for name, output in log_outputs(log, prior).items()}

@@ -85,7 +85,7 @@ class LinkResult:
 
     @property
     def worst_points(self) -> tuple[WorstPoint, ...]:
-        """Worst point of each outage, in order of time."""
+        """Worst point of each outage, in order of time; () if the link was not judged along a path."""
         if self.along is None:
             return ()
         points = []
@@ -103,13 +103,16 @@ class LinkResult:
         outages = () if self.along is None else self.along.outages
         return tuple(
             f"{period_text(outage)}: the signal is below the fade margin for {duration_text(outage.duration)}, by up to"
-            f" {-worst.margin:.1f} dB at {worst.lat_deg:.6f}, {worst.lon_deg:.6f}"
-            for outage, worst in zip(outages, self.worst_points, strict=True)
+            f" {-worst_point.margin:.1f} dB at {worst_point.lat_deg:.6f}, {worst_point.lon_deg:.6f}"
+            for outage, worst_point in zip(outages, self.worst_points, strict=True)
         )
 
     @property
     def return_lines(self) -> tuple[str, ...]:
-        """One line for each period of the outages whose returns have the same outcome, the worst first."""
+        """One line for each period of the outages whose returns have the same outcome, the worst first.
+
+        () if no returns were simulated.
+        """
         if self.returns is None:
             return ()
         return tuple(
@@ -150,22 +153,22 @@ def link(
     False
     """
     station = options["station"]
-    given = {name: value for name, value in options.items() if name in _ENTRIES}
-    check_arguments(**given)
+    link_options = {name: value for name, value in options.items() if name in _ENTRIES}
+    check_arguments(**link_options)
     lat, lon = (None, None) if station is None else parse_position("station", station)
     if out is not None:
         check_output_folder(Path(out), overwrite)
-    judged = judge(what, **select_log_and_mission_options(options))
-    if judged.setup.scenario.link is None:
-        missing = next((name for name in _NEEDED if given[name] is None), None)
+    judged_flight = judge(what, **select_log_and_mission_options(options))
+    if judged_flight.setup.scenario.link is None:
+        missing = next((name for name in _NEEDED if link_options[name] is None), None)
         if missing is not None:
             raise ArgumentError.of_argument(
                 missing, None, "missing; state it, or name a scenario with [link]", shown=""
             )
-    entries = {_ENTRIES[name]: value for name, value in given.items()}
-    scenario = with_link(judged.setup.scenario, **entries, lat_deg=lat, lon_deg=lon)
-    setup = judged.setup.in_scenario(with_ground_at_station(scenario, judged.setup.mission))
-    result = _judge_link(setup, judged.track)
+    entries = {_ENTRIES[name]: value for name, value in link_options.items()}
+    scenario = with_link(judged_flight.setup.scenario, **entries, lat_deg=lat, lon_deg=lon)
+    setup = judged_flight.setup.in_scenario(with_ground_at_station(scenario, judged_flight.setup.mission))
+    result = _judge_link(setup, judged_flight.track)
     return result if out is None else _with_pictures(result, Path(out), overwrite=overwrite)
 
 
@@ -206,6 +209,6 @@ def _judge_link(setup: FlightSetup, track: Track | None) -> LinkResult:
                 if setup.imported_log is None
                 else (requirements, align_track(requirements, track))
             )
-        judged = judge_link(requirements, aligned, link_of_scenario, fly_again=fly_return)
-    where = "" if judged.leg is None else place_text(judged.leg)
-    return LinkResult(setup, judged.finding, judged.along, judged.antenna, where, judged.returns)
+        judged_link = judge_link(requirements, aligned, link_of_scenario, fly_again=fly_return)
+    where = "" if judged_link.leg is None else place_text(judged_link.leg)
+    return LinkResult(setup, judged_link.finding, judged_link.along, judged_link.antenna, where, judged_link.returns)

@@ -178,8 +178,8 @@ def _predict_by_controls(motion: MotionLog, aircraft: Aircraft, start: float | N
         records, _ = records_and_outputs(motion, aircraft, MIN_CHECK_SECONDS)
     start = _judged_start(motion, aircraft, records, start)
     earlier = [part for record in records if len((part := record.between(-math.inf, start)).time) > 1]
-    judged = [part for record in records if len((part := record.between(start, math.inf)).time) > 1]
-    for parts, side in ((earlier, "before"), (judged, "from")):
+    judged_records = [part for record in records if len((part := record.between(start, math.inf)).time) > 1]
+    for parts, side in ((earlier, "before"), (judged_records, "from")):
         seconds = sum(part.seconds for part in parts)
         if seconds < MIN_CHECK_SECONDS:
             allowed = f"at least {MIN_CHECK_SECONDS:g} s of usable flight are needed before and after it"
@@ -188,14 +188,14 @@ def _predict_by_controls(motion: MotionLog, aircraft: Aircraft, start: float | N
     with stage("predicting") as advance:
         central = varied_model(aircraft, Variation())
         clocks = estimate_clocks(earlier, central)[-1]
-        prediction = BlindPrediction(earlier, judged, clocks, central)
+        prediction = BlindPrediction(earlier, judged_records, clocks, central)
         models = []
         for number, draw in enumerate(drawn_flights(aircraft), 1):
             models.append(varied_model(aircraft, draw.variation))
             advance(number, DRAWS, f"aircraft {number} of {DRAWS}")
         bands = prediction.bands(models)
     before, count = prediction.windows
-    end = float(judged[-1].time[-1])
+    end = float(judged_records[-1].time[-1])
     heading = (
         f"{motion.source} by the logged controls: {count_text(count, 'window')} of 2 s from {start:.1f} s to"
         f" {end:.1f} s, {DRAWS} flights each; their errors are drawn from"

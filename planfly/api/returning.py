@@ -120,7 +120,10 @@ class ReturnsResult:
 
     @property
     def program_lines(self) -> tuple[str, ...]:
-        """Lines that compare the worst returns flown by the ArduPlane program and by the simulated ArduPlane."""
+        """Lines that compare the worst returns flown by the ArduPlane program and by the simulated ArduPlane.
+
+        () if the program flew no returns.
+        """
         if self.by_program is None:
             return ()
         return (self.by_program.headline(), *self.by_program.lines(self.returns, self.setup.scenario))

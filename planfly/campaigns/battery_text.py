@@ -19,9 +19,9 @@ def answer_line(result: BatteryResult) -> str:
     where_text = "in the mission and in every return" if result.has_returns else "in the mission (without returns)"
     where_text += " that arrives" if any(row.blocked_returns for row in result.rows) else ""
     keeps_text = f"a reserve of {goal.reserve:.0%} {where_text} with probability {goal.probability:g}"
-    lost = sum(math.isinf(row.return_energy) for row in result.rows)
-    if math.isinf(result.capacity) and lost:
-        return f"no battery keeps {keeps_text}: in {lost} of {len(result.rows)} flights a return does not arrive"
+    lost_count = sum(math.isinf(row.return_energy) for row in result.rows)
+    if math.isinf(result.capacity) and lost_count:
+        return f"no battery keeps {keeps_text}: in {lost_count} of {len(result.rows)} flights a return does not arrive"
     if math.isinf(result.capacity):
         return (
             f"no battery keeps {keeps_text}: with {goal.specific_energy:g} Wh/kg its own mass needs too much of the"
@@ -51,7 +51,10 @@ def _unknown_reason(result: BatteryResult) -> str:
 
 
 def battery_lines(result: BatteryResult) -> list[str]:
-    """Return the lines below the answer: the aircraft's battery, what decides, and how it was found."""
+    """Return the lines below the answer: the aircraft's battery, what decides, and how it was found.
+
+    Return [] if no flight completed the mission.
+    """
     if not result.completed:
         return []
     lines, total = [_own_battery_line(result), *_mass_lines(result)], len(result.completed)
@@ -90,8 +93,10 @@ def leg_names(result: BatteryResult) -> list[str]:
 
 
 def decision_rows(result: BatteryResult) -> list[tuple[str, str, str]]:
-    """Return a row for each part of a flight that decides the battery: its flights and their share.
+    """Return a row (part, flights, share) for each part of a flight that decides the battery.
 
+    part: the end of the mission, or a return.
+    flights, share: number and percentage of the flights in which this part decides.
     The most frequent part comes first.
     """
     names, total = leg_names(result), len(result.completed)
@@ -132,7 +137,10 @@ def _own_battery_line(result: BatteryResult) -> str:
 
 
 def _mass_lines(result: BatteryResult) -> list[str]:
-    """Return a line on the mass of the aircraft with the found battery."""
+    """Return a line on the mass of the aircraft with the found battery; [] if no battery was found.
+
+    If the goal states no energy per mass, the line says that all capacities have the same mass.
+    """
     if result.goal.specific_energy is None:
         return ["the same mass is assumed for every capacity (--specific-energy states the battery's energy per mass)"]
     if not math.isfinite(result.capacity):

@@ -423,9 +423,9 @@ def _limits_in_wind(uav: Uav, scenario: Scenario, *, is_drawn: bool) -> Limits:
 
     is_drawn: True if the model of the flight's aircraft is drawn at random.
     """
-    old_limits = uav.limits
+    uav_limits = uav.limits
     # The performance of a drawn aircraft is known exactly: its standard deviations are 0.
-    exact_envelope = replace(old_limits.envelope, climb_sd=0.0, descent_sd=0.0, fastest_sd=0.0, power_sd=0.0)
-    envelope = exact_envelope if is_drawn else old_limits.envelope
-    limits = make_limits(scenario, envelope, old_limits.airspeed, max_turn_bank(scenario, uav.autopilot))
+    exact_envelope = replace(uav_limits.envelope, climb_sd=0.0, descent_sd=0.0, fastest_sd=0.0, power_sd=0.0)
+    envelope = exact_envelope if is_drawn else uav_limits.envelope
+    limits = make_limits(scenario, envelope, uav_limits.airspeed, max_turn_bank(scenario, uav.autopilot))
     return with_tracking_error(limits, uav.autopilot, scenario)

@@ -57,8 +57,8 @@ def deciding_rules(by_rule: Sequence[RuleFailures]) -> tuple[str, ...]:
     >>> deciding_rules(count_failures([*flights, *flights[1:]])), deciding_rules(count_failures(flights[:1]))
     (('clearance',), ('slope', 'turn'))
     """
-    most = max((failures.flights for failures in by_rule), default=0)
-    return tuple(failures.rule for failures in by_rule if failures.flights == most)
+    max_flights = max((failures.flights for failures in by_rule), default=0)
+    return tuple(failures.rule for failures in by_rule if failures.flights == max_flights)
 
 
 def failures_document(by_rule: Iterable[RuleFailures]) -> list[dict[str, Any]]:

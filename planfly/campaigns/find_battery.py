@@ -124,11 +124,11 @@ def fly_for_energy(
     variation = varied.off_nominal.variation
     variation = replace(variation, mass=variation.mass * mass_factor)
     flight = Flight(varied.setup, varied.uav.aircraft, variation, start_offset=varied.off_nominal.start_offset)
-    flown = fly_to_end(flight)
-    track = flown.track
-    outcome: Outcome = "flyable" if flown.ended == _COMPLETED else "not flyable"
-    row = EnergyRow(draw=draw, outcome=outcome, ended=flown.ended, battery_factor=draw.values["battery"])
-    if flown.ended != _COMPLETED or not len(track):
+    flown_mission = fly_to_end(flight)
+    track = flown_mission.track
+    outcome: Outcome = "flyable" if flown_mission.ended == _COMPLETED else "not flyable"
+    row = EnergyRow(draw=draw, outcome=outcome, ended=flown_mission.ended, battery_factor=draw.values["battery"])
+    if flown_mission.ended != _COMPLETED or not len(track):
         return row
     energy = track.energy.astype(np.float64)
     row = replace(
@@ -156,20 +156,22 @@ def _with_returns(row: EnergyRow, varied: VariedFlight, track: Track, interval: 
         make_return_world(varied.setup), flown_starts(varied.setup, track, interval), interval
     )
     kinds = Counter(ret.kind for ret in returns.each if math.isnan(ret.time_to_loiter))
-    lost = [ret for ret in returns.each if ret.kind == "lost"]
+    lost_returns = [ret for ret in returns.each if ret.kind == "lost"]
     arriving = [ret for ret in returns.each if math.isfinite(ret.time_to_loiter)]
     row = replace(
         row,
         unknown_returns=kinds["unknown"] + kinds["low"],
         blocked_returns=kinds["ground"] + kinds["threat"] + kinds["zone"],
     )
-    if not lost and not arriving:
+    if not lost_returns and not arriving:
         return row
-    worst = lost[0] if lost else max(arriving, key=lambda ret: ret.energy_used + ratio * ret.energy)
-    worst_row = min(len(track) - 1, int(np.searchsorted(track.time, worst.time)))
+    worst_return = (
+        lost_returns[0] if lost_returns else max(arriving, key=lambda ret: ret.energy_used + ratio * ret.energy)
+    )
+    worst_row = min(len(track) - 1, int(np.searchsorted(track.time, worst_return.time)))
     leg = int(varied.setup.route.leg_numbers_of(track.leg[worst_row : worst_row + 1])[0])
-    needed = math.inf if lost else worst.energy_used + ratio * worst.energy
-    return replace(row, return_energy=needed, return_time=worst.time, return_leg=leg)
+    needed = math.inf if lost_returns else worst_return.energy_used + ratio * worst_return.energy
+    return replace(row, return_energy=needed, return_time=worst_return.time, return_leg=leg)
 
 
 class CapacityRange(NamedTuple):
@@ -271,7 +273,7 @@ class BatteryResult:
 
     @property
     def leg_energies(self) -> Floats:
-        """Median energy of each leg over the flights, Wh, (legs,)."""
+        """Median energy of each leg over the flights that complete the mission, Wh, (legs,); (0,) if none does."""
         rows = [row.leg_energies for row in self.completed]
         if not rows:
             return np.zeros(0)
@@ -300,7 +302,7 @@ def find_battery(base: CampaignBase, goal: BatteryGoal, workers: Workers, advanc
         )
     own_capacity = base.uav.battery
     rows = fly_energy_campaign(base, goal, workers, 1.0, advance)
-    kept = sum(row.required_capacity(goal.reserve) <= own_capacity for row in rows)
+    kept_count = sum(row.required_capacity(goal.reserve) <= own_capacity for row in rows)
     capacity, interval = quantile_of_capacities(rows, goal)
     mass_factor = 1.0
     if goal.specific_energy is not None and math.isfinite(capacity):
@@ -324,7 +326,7 @@ def find_battery(base: CampaignBase, goal: BatteryGoal, workers: Workers, advanc
         interval=interval,
         own_capacity=own_capacity,
         is_guessed=envelope.battery_guessed and base.scenario.flight.battery_wh is None,
-        kept=kept,
+        kept=kept_count,
         rows=rows,
         mass_factor=mass_factor,
         mass=aircraft.mass,

@@ -126,14 +126,14 @@ def fly_for_excursions(
         flight = Flight(setup, varied.uav.aircraft, off_nominal.variation, start_offset=off_nominal.start_offset)
     except StartError as error:
         return ExcursionRow(draw=draw, outcome="not flyable", ended=str(error))
-    flown = fly_to_end(flight)
-    outcome: Outcome = "flyable" if flown.ended == _COMPLETED else "not flyable"
-    row = ExcursionRow(draw=draw, outcome=outcome, ended=flown.ended)
+    flown_mission = fly_to_end(flight)
+    outcome: Outcome = "flyable" if flown_mission.ended == _COMPLETED else "not flyable"
+    row = ExcursionRow(draw=draw, outcome=outcome, ended=flown_mission.ended)
     terrain = setup.scenario.terrain
-    if len(flown.track) < 2 or terrain is None:
+    if len(flown_mission.track) < 2 or terrain is None:
         return row
-    times, positions, velocities = _sampled_flight(flown.track)
-    paths = _return_paths(setup, flown.track, interval, glide=glide)
+    times, positions, velocities = _sampled_flight(flown_mission.track)
+    paths = _return_paths(setup, flown_mission.track, interval, glide=glide)
     uav = varied.uav.aircraft
     sampled = [(positions, velocities), *map(_sampled_return, paths.returns)]
     half_span = 0.5 * uav.wing_span
@@ -142,7 +142,7 @@ def fly_for_excursions(
     areas = [*shapely.buffer(lines, half_span), *paths.loiters, *areas_between(paths.returns), *turns]
     flown_area = shapely.union_all(areas)
     # In a forecast, the wind at the middle of the flight.
-    middle = 0.5 * float(flown.track.time[-1])
+    middle = 0.5 * float(flown_mission.track.time[-1])
 
     def wind_at(places: Floats) -> Floats:
         """Return the wind at places (n, 3) at the middle of the flight, m/s, (n, 2)."""
@@ -155,7 +155,7 @@ def fly_for_excursions(
     deviation = float(shapely.distance(shapely.points(positions[:, :2]), path).max())
     return replace(
         row,
-        duration=float(flown.track.time[-1]),
+        duration=float(flown_mission.track.time[-1]),
         deviation=deviation,
         turn_deviation=max([deviation, *(_reach(area, path) for area in turns)]),
         height=height,
@@ -176,8 +176,8 @@ def _sampled_flight(track: Track) -> tuple[Floats, Floats, Floats]:
     steps = np.floor(track.time[rows] / _SAMPLE_INTERVAL_S + 1e-9)
     is_kept = np.concatenate([[True], np.diff(steps) > 0.0])
     is_kept[-1] = True
-    kept = rows[is_kept]
-    return track.time[kept], track.position[kept], track.velocity[kept].astype(np.float64)
+    sampled_rows = rows[is_kept]
+    return track.time[sampled_rows], track.position[sampled_rows], track.velocity[sampled_rows].astype(np.float64)
 
 
 def _sampled_return(path: Floats) -> tuple[Floats, Floats]:
@@ -230,16 +230,16 @@ def _return_paths(setup: FlightSetup, track: Track, interval: float, *, glide: b
         gliding_targets = [gliding_world.target(row) for row in starts.rows]
         gliding = gliding_world.fly(starts, gliding_targets, store_paths=True, engine_out=True)
         glides = [
-            one
-            for one, result in zip(gliding.tracks, gliding.results, strict=True)
-            if len(one) > 1 and result["outcome"] == RETURN_GROUND_IMPACT
+            glide_path
+            for glide_path, result in zip(gliding.tracks, gliding.results, strict=True)
+            if len(glide_path) > 1 and result["outcome"] == RETURN_GROUND_IMPACT
         ]
     loiters = [shapely.Point(position).buffer(radius) for position in positions]
-    flown = [k for k, path in enumerate(paths) if len(path) > 1]
-    returns = [paths[k] for k in flown]
+    flown_indices = [k for k, path in enumerate(paths) if len(path) > 1]
+    returns = [paths[k] for k in flown_indices]
     radii = [0.0 if target.straight else radius for target in targets]
-    turns = [turn_of_return(paths[k], targets[k].position, radii[k]) for k in flown]
-    return _ReturnPaths(starts.time[flown], returns, turns, loiters, glides)
+    turns = [turn_of_return(paths[k], targets[k].position, radii[k]) for k in flown_indices]
+    return _ReturnPaths(starts.time[flown_indices], returns, turns, loiters, glides)
 
 
 def turn_of_return(path: Floats, target: Position, radius: float) -> Floats:
@@ -248,10 +248,10 @@ def turn_of_return(path: Floats, target: Position, radius: float) -> Floats:
     path: positions, m, (n, 3).
     radius: radius of the loiter around the target, m; a course that meets the loiter heads for the target, too.
     """
-    steps, ways = np.diff(path[:, :2], axis=0), np.array(target[:2]) - path[:-1, :2]
-    along = np.sum(steps * ways, axis=1)
-    across = np.abs(steps[:, 0] * ways[:, 1] - steps[:, 1] * ways[:, 0])
-    allowed = np.maximum(math.sin(_TURN_END_ANGLE_RAD) * np.linalg.norm(ways, axis=1), radius)
+    steps, to_target = np.diff(path[:, :2], axis=0), np.array(target[:2]) - path[:-1, :2]
+    along = np.sum(steps * to_target, axis=1)
+    across = np.abs(steps[:, 0] * to_target[:, 1] - steps[:, 1] * to_target[:, 0])
+    allowed = np.maximum(math.sin(_TURN_END_ANGLE_RAD) * np.linalg.norm(to_target, axis=1), radius)
     is_headed = (along > 0.0) & (across <= allowed * np.linalg.norm(steps, axis=1))
     return path[: int(np.argmax(is_headed)) + 1] if is_headed.any() else path
 
@@ -281,7 +281,7 @@ def turn_areas(
 def areas_between(paths: list[Floats]) -> list[BaseGeometry]:
     """Return the areas between successive returns; a return may begin at any time between their starts."""
     lines = [shapely.get_coordinates(shapely.LineString(path[:, :2]).simplify(_OUTLINE_TOLERANCE_M)) for path in paths]
-    rings = [np.concatenate([one, other[::-1]]) for one, other in itertools.pairwise(lines)]
+    rings = [np.concatenate([line, next_line[::-1]]) for line, next_line in itertools.pairwise(lines)]
     return [shapely.make_valid(shapely.Polygon(ring)) for ring in rings]
 
 
@@ -548,7 +548,7 @@ def make_volumes(
     geography = path.buffer(half_width)
     flown_area = shapely.union_all([geography, *shapely.from_wkb([row.flown for row in rows])])
     fallen_area = shapely.union_all(shapely.from_wkb([row.fallen for row in rows]))
-    flown = FlownVolumes(
+    flown_volumes = FlownVolumes(
         deviation=deviation,
         height=height,
         contingency_width=max(0.0, max(row.turn_deviation for row in rows) - half_width),
@@ -559,7 +559,7 @@ def make_volumes(
     speed = goal.speed or aircraft.airspeed_max
     formula = ContingencyFormula(speed, height)
     result = GroundRiskResult(
-        goal, base, rows, flown, formula, glide_ratio, speed, geography, volume=geography, footprint=geography
+        goal, base, rows, flown_volumes, formula, glide_ratio, speed, geography, volume=geography, footprint=geography
     )
     volume = shapely.union_all([flown_area, geography.buffer(result.contingency_width)])
     footprint = shapely.union_all([volume.buffer(result.buffer_width), fallen_area])

@@ -98,9 +98,9 @@ class Departure:
         """
         if not self.rows:
             return False
-        least = sum(row.outcome == "flyable" and not row.undecided for row in self.rows)
-        most = sum(row.outcome == "flyable" or row.undecided for row in self.rows)
-        return least / len(self.rows) >= probability or most / len(self.rows) < probability
+        min_flyable = sum(row.outcome == "flyable" and not row.undecided for row in self.rows)
+        max_flyable = sum(row.outcome == "flyable" or row.undecided for row in self.rows)
+        return min_flyable / len(self.rows) >= probability or max_flyable / len(self.rows) < probability
 
     @property
     def energy_left(self) -> float:
@@ -144,16 +144,16 @@ class WindowResult:
     @property
     def windows(self) -> tuple[tuple[datetime, datetime], ...]:
         """First and last departure of each run of open departures."""
-        found: list[tuple[datetime, datetime]] = []
+        open_windows: list[tuple[datetime, datetime]] = []
         was_open = False
         for departure in self.departures:
             opens = bool(self.is_open(departure))
             if opens and was_open:
-                found[-1] = found[-1][0], departure.time
+                open_windows[-1] = open_windows[-1][0], departure.time
             elif opens:
-                found.append((departure.time, departure.time))
+                open_windows.append((departure.time, departure.time))
             was_open = opens
-        return tuple(found)
+        return tuple(open_windows)
 
     @property
     def asked(self) -> Departure | None:
@@ -178,8 +178,8 @@ class WindowResult:
     @property
     def best(self) -> Departure | None:
         """Departure with the most flyable flights, the earliest in a tie; None if no departure was flown."""
-        flown = [departure for departure in self.departures if departure.rows]
-        return max(flown, key=lambda departure: departure.share, default=None)
+        flown_departures = [departure for departure in self.departures if departure.rows]
+        return max(flown_departures, key=lambda departure: departure.share, default=None)
 
 
 def departure_times(
@@ -218,13 +218,13 @@ def find_window(base: CampaignBase, goal: WindowGoal, workers: Workers, advance:
             for count, finished in enumerate(pool.fly(next_request), 1):
                 advance(count, total, f"{count} of {total} flights")
                 rows[finished.request.index] = finished.row
-    flown = iter(range(len(scenarios)))
+    scenario_numbers = iter(range(len(scenarios)))
     results = []
     for departure in departures:
         if not departure.scenarios:
             results.append(departure)
             continue
-        start = next(flown) * goal.flights
+        start = next(scenario_numbers) * goal.flights
         results.append(replace(departure, rows=tuple(rows[start + k] for k in range(goal.flights))))
     return WindowResult(goal, base, tuple(results))
 

@@ -216,12 +216,12 @@ class WindsResult:
         if no direction has a judged boundary, "not judged in full" if only some directions have one, and otherwise
         "judged".
         """
-        judged = self.judged
-        if self.fails_in_calm_air or (self.calm is not None and all(judged)):
+        are_judged = self.judged
+        if self.fails_in_calm_air or (self.calm is not None and all(are_judged)):
             return "not flyable"
-        if not any(judged):
+        if not any(are_judged):
             return "not judged"
-        return "judged" if all(judged) else "not judged in full"
+        return "judged" if all(are_judged) else "not judged in full"
 
     def __repr__(self) -> str:
         speeds = [

@@ -65,7 +65,10 @@ def find_marginal_passes(findings: Iterable[Finding], scenario: Scenario, track:
 
 
 def _distances_outside_spheres(scenario: Scenario, track: Track) -> list[tuple[Place, float]]:
-    """Return the minimum distance of the track from each missile's sphere, m, negative inside."""
+    """Return each missile's place, and the minimum distance of the track from its sphere, m, negative inside.
+
+    Radars have no entry.  Return [] for an external mission, or for a track of fewer than two rows.
+    """
     threats = scenario.threats
     if scenario.external or len(track) < 2:
         return []

@@ -169,7 +169,10 @@ class _ProgressReport:
         self._rate = FlightRate(stored_tally.flown)
 
     def _min_total_flights(self, tally: Tally) -> int:
-        """Return the minimum possible total number of flights."""
+        """Return the smallest number of flights with which the campaign can end.
+
+        It is the requested number, unless the campaign stops as soon as its answer is certain.
+        """
         return max(self._estimator.min_flights, tally.flown) if self._goal.stops else self._goal.flights
 
     def report(self, tally: Tally, is_last: bool = False) -> None:

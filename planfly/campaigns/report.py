@@ -139,7 +139,10 @@ def _draw_pictures(base: CampaignBase, summary: CampaignSummary, store: Store) -
 
 
 def _draw_tracks(base: CampaignBase, store: Store) -> list[tuple[Figure, str]]:
-    """Draw the clearance fan and the crossings of the flights that have a track."""
+    """Draw the clearance fan and the crossings of the flights that have a track; return each figure with its title.
+
+    Return [] if no flight has a track.  There is no clearance fan without terrain.
+    """
     setup = make_setup(base.scenario, base.uav, base.mission, base.seed, plan=base.plan, placed=base.placed)
     points = setup.route.positions
     clearances = [np.frombuffer(data, np.float32) for data in store.blobs("clearance", _MAX_DRAWN_FLIGHTS)]
@@ -551,7 +554,10 @@ def _lines_without_failures(winds: WindsResult) -> list[str]:
 
 
 def _calm_lines(winds: WindsResult) -> list[str]:
-    """Return lines about the rules that fail in calm air; [] if the mission is flyable in calm air."""
+    """Return lines about the rules that fail in calm air, or in the weakest wind flown.
+
+    Return [] if no flight fails there.
+    """
     calm = winds.calm
     if calm is None or not calm.failed_count:
         return []

@@ -13,19 +13,19 @@ TIME_FORMAT = "%Y-%m-%d %H:%M"
 
 def answer_line(result: WindowResult) -> str:
     """Return the answer in one line: the result for the requested departure, or the windows."""
-    goal, asked = result.goal, result.asked
+    goal, departure = result.goal, result.asked
     windows = ", ".join(_window_text(*window) for window in result.windows)
     open_text = f"open for take-off: {windows} UTC" if windows else "no take-off time is open"
-    if asked is None:
+    if departure is None:
         unknown_text = ", but not judged in full" if windows and result.is_go is None else ""
         return f"{open_text}{unknown_text}{_best_text(result)}"
-    subject = f"take-off at {asked.time:{TIME_FORMAT}} UTC"
-    if result.is_open(asked) is None:
-        return f"{subject}: not judged: {asked.not_judged}"
-    counts = f"{asked.flyable} of {len(asked.rows)} flights are flyable"
+    subject = f"take-off at {departure.time:{TIME_FORMAT}} UTC"
+    if result.is_open(departure) is None:
+        return f"{subject}: not judged: {departure.not_judged}"
+    counts = f"{departure.flyable} of {len(departure.rows)} flights are flyable"
     if result.is_go is None:
-        return f"{subject}: not judged in full: {counts}, {asked.undecided} are not judged in full; {open_text}"
-    if result.is_open(asked):
+        return f"{subject}: not judged in full: {counts}, {departure.undecided} are not judged in full; {open_text}"
+    if result.is_open(departure):
         return f"{subject}: go, {counts}; {open_text}"
     required_text = f"less than the required {100.0 * goal.probability:g} %"
     return f"{subject}: no go, {counts}, {required_text}; {open_text}{_best_text(result)}"

@@ -100,11 +100,11 @@ def _json_answer(source: str, result: "LinkResult", code: int) -> object:
         OutageEntry(
             first_s=round(outage.start, 2),
             last_s=round(outage.end, 2),
-            margin_db=round(worst.margin, 2),
-            lat_deg=round(worst.lat_deg, 7),
-            lon_deg=round(worst.lon_deg, 7),
+            margin_db=round(worst_point.margin, 2),
+            lat_deg=round(worst_point.lat_deg, 7),
+            lon_deg=round(worst_point.lon_deg, 7),
         )
-        for outage, worst in zip(outages, result.worst_points, strict=True)
+        for outage, worst_point in zip(outages, result.worst_points, strict=True)
     ]
     return LinkAnswer(
         exit_code=code,

@@ -87,8 +87,8 @@ def check_power(estimate: Estimate, records: Sequence[FlightRecord], base: BaseM
                 strict=True,
             )
         )
-        _, drawn = motor.thrust_and_current(estimate.airspeed[0] * airspeed, throttle, density, voltage)
-        ratio = float((voltage * current).mean() / (voltage * drawn).mean())
+        _, model_current = motor.thrust_and_current(estimate.airspeed[0] * airspeed, throttle, density, voltage)
+        ratio = float((voltage * current).mean() / (voltage * model_current).mean())
         if not 1.0 / _MAX_POWER_RATIO <= ratio <= _MAX_POWER_RATIO:
             shown = f"{current.mean():.3g} A on average, {ratio:.2g} times the current of the identified aircraft"
             raise LogError.at(source, "current", float(current.mean()), "check its unit and scale", shown=shown)

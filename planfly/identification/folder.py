@@ -269,12 +269,12 @@ def flown_parameters(log: MotionLog) -> dict[str, float]:
     old_names = {definition.old[0] for definition in DEFINITIONS.values() if definition.old is not None}
     current_names = {definition.name for definition in DEFINITIONS.values()}
     law_parameters, _ = ArduPilotParameters.of_log(log.parameters, log.source)
-    others = {
+    other_parameters = {
         name: value
         for name, value in log.parameters.items()
         if name.startswith(_FLIGHT_PREFIXES) and name not in old_names and name not in current_names
     }
-    flight_parameters = others | law_parameters.by_origin("file")
+    flight_parameters = other_parameters | law_parameters.by_origin("file")
     return {name: value for name, value in flight_parameters.items() if not name.startswith(_HARDWARE_PREFIXES)}
 
 

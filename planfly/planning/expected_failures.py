@@ -62,23 +62,26 @@ def _loose_limits_text(plan: Plan, uav: Uav) -> str:
 
 
 def _short_strip_text(plan: Plan) -> str:
-    """Explain why a strip is too short for the expected touchdowns; return "" if it is long enough."""
+    """Explain why a strip is too short for the expected touchdowns, and what would help.
+
+    Return "" if the strip is long enough, or if the plan does not land on a strip.
+    """
     strip, descent = (
         plan.scenario.landing,
         None if plan.procedures is None else plan.procedures.descent,
     )
     if strip is None or descent is None:
         return ""
-    room, turbulence = 0.5 * strip.length - TOUCHDOWN_ERROR_M, plan.scenario.wind.turbulence
+    max_touchdown_error, turbulence = 0.5 * strip.length - TOUCHDOWN_ERROR_M, plan.scenario.wind.turbulence
     height_sd = MAP_HEIGHT_SD_M if strip.height_sd is None else strip.height_sd
-    flown_sd = max(_TOUCHDOWN_SD_IN_CALM_AIR_M, _TOUCHDOWN_SD_IN_LIGHT_TURBULENCE_M * W20[turbulence] / W20["light"])
-    touchdown_sd = math.hypot(height_sd / descent.slope, flown_sd)
-    probability = math.erf(max(0.0, room) / (math.sqrt(2.0) * touchdown_sd))
+    flight_sd = max(_TOUCHDOWN_SD_IN_CALM_AIR_M, _TOUCHDOWN_SD_IN_LIGHT_TURBULENCE_M * W20[turbulence] / W20["light"])
+    touchdown_sd = math.hypot(height_sd / descent.slope, flight_sd)
+    probability = math.erf(max(0.0, max_touchdown_error) / (math.sqrt(2.0) * touchdown_sd))
     if probability >= HOLDING_PROBABILITY:
         return ""
     remedies = [f"use a strip of {_sufficient_strip_length(touchdown_sd):.0f} m"]
     if strip.height_sd is None:
-        surveyed_length = _sufficient_strip_length(flown_sd)
+        surveyed_length = _sufficient_strip_length(flight_sd)
         remedies.insert(
             0, f"survey its altitude and state [landing] height_sd_m (then {surveyed_length:.0f} m are enough)"
         )

@@ -401,7 +401,7 @@ def _max_height_shortfall(problem: Problem, parts: _Parts) -> Shortfall | None:
 
 
 def _missile_shortfall(problem: Problem, parts: _Parts) -> Shortfall | None:
-    """Return the deepest displacement by a gust into the sphere of a missile, or None."""
+    """Return the deepest displacement by a gust into the sphere of a missile; None if no gust reaches a sphere."""
     threats = problem.scenario.threats
     paths = _gust_paths(parts) if (threats.kill_radius > 0.0).any() else []
     closest_path = min(paths, key=lambda path: kill_distance(problem.certified, path), default=None)

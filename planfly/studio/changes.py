@@ -258,27 +258,29 @@ def _renumber(previous: FlightResults, current: FlightResults) -> _Results:
 
 def _state_changes(old_results: _Results, new_results: _Results) -> list[str]:
     """Return a line for each new failure, and then for each earlier failure that no longer occurs."""
-    worse, better = [], []
+    new_failures, ended_failures = [], []
     for (rule, key), result in new_results.items():
         old_result = old_results.get((rule, key))
         old_failure = old_result if old_result is not None and old_result.ok is False else None
         if result.ok is False and old_failure is None:
             not_before = old_result is not None and old_result.level == _NOT_REACHED
-            worse.append(_change_text(rule, result, old_result, f"fails now{', not flown before' * not_before}"))
+            new_failures.append(_change_text(rule, result, old_result, f"fails now{', not flown before' * not_before}"))
         elif result.ok is not False and old_failure is not None and result.level == _NOT_REACHED:
-            better.append(_change_text(rule, old_failure._replace(place=result.place), None, "not flown now"))
+            ended_failures.append(_change_text(rule, old_failure._replace(place=result.place), None, "not flown now"))
         elif result.ok is not False and old_failure is not None:
-            better.append(_change_text(rule, result, old_result, "now passes" if result.ok else "is not judged now"))
+            ended_failures.append(
+                _change_text(rule, result, old_result, "now passes" if result.ok else "is not judged now")
+            )
     current_keys = {key for _, key in new_results}
     for (rule, key), old_result in old_results.items():
         if old_result.ok is False and (rule, key) not in new_results:
             was_removed = key not in current_keys and key[0] in (*_ITEM_PLACE_KINDS, _REMOVED_PLACE)
-            better.append(
+            ended_failures.append(
                 f"the former {_change_text(rule, old_result, None, 'is gone')}"
                 if was_removed
                 else _change_text(rule, old_result, None, "now passes")
             )
-    return worse + better
+    return new_failures + ended_failures
 
 
 def _change_text(rule: str, result: PlaceResult, old_result: PlaceResult | None, state_text: str) -> str:

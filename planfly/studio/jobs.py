@@ -227,7 +227,8 @@ class Jobs:
     def handle_answer(self, worker: str, answer: Answer, session: Session) -> list[Json]:
         """Return the messages to send to the pages after an answer of a worker.
 
-        If another task has replaced the task, this is only the message that the task has stopped.
+        If another task has replaced the task, this is only the message that the task has stopped.  Progress gives at
+        most one message in `_REPORT_INTERVAL_S`.
         """
         task = self._active.get(worker)
         if task is None or task.number != answer.number:

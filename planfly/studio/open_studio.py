@@ -123,7 +123,8 @@ def _open_listener(port: int | None) -> socket.socket:
 def _open_page(address: str) -> Iterator[None]:
     """Open an address in the browser through a temporary file.
 
-    If the address were an argument, the list of processes would show its token.
+    If the address were an argument, the list of processes would show its token.  The file exists until the ``with``
+    block ends.
     """
     with temporary_folder("planfly-studio-") as folder:
         file = folder / "studio.html"

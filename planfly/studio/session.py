@@ -266,7 +266,8 @@ class Session:
     def _set_mission(self, mission: Mission, context: EditContext | None = None) -> None:
         """Judge a mission, make it the current mission, and discard planned paths.
 
-        An invalid mission changes nothing.
+        The revision number is increased, and that of the world if the editing context changes.  An invalid mission
+        raises PlanflyError, and changes nothing.
 
         context: the editing context to judge the mission with; None for the current context.
         """
@@ -335,7 +336,8 @@ class Session:
     def _insert_waypoint(self, message: Insert) -> tuple[Mission, str]:
         """Return the mission with a waypoint inserted, and a description of the edit.
 
-        The waypoint's altitude is the mean of the previous and next item's altitudes if both have the same frame.
+        The waypoint's altitude is the mean of the previous and next item's altitudes if both have the same frame, and
+        otherwise the previous item's altitude.
         """
         mission, place_indices = self.mission, edits.movable_indices(self.mission)
         previous_item = edits.movable_item(mission, message.after)

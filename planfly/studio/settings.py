@@ -111,12 +111,12 @@ def error_in_page_words(error: PlanflyError, settings: Settings, scenario_name: 
     text = str(error).removeprefix(f"{scenario_name}: ").removeprefix(": ")
     for key, pattern in _NAME_PATTERNS.items():
         text = re.sub(pattern, _LABELS[key], text)
-    asked = settings.model_dump(exclude_none=True)
-    asked |= asked.get("limits", {})
-    changed = [key for key in _LABELS if key in asked]
+    requested = settings.model_dump(exclude_none=True)
+    requested |= requested.get("limits", {})
+    changed = [key for key in _LABELS if key in requested]
     # An error at another place of the scenario is a consequence of the changed setting.
     if len(changed) == 1 and not any(label in text for label in _LABELS.values()):
-        value = "" if changed[0] == "parameter" else f": {asked[changed[0]]}:"
+        value = "" if changed[0] == "parameter" else f": {requested[changed[0]]}:"
         text = f"{_LABELS[changed[0]]}{value} {text}"
     return PlanflyError(re.sub(r"(?<=: )(-?\d+)\.0(?=: )", r"\1", text), field=error.field, value=error.value)
 

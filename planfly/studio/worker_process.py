@@ -138,7 +138,7 @@ class WorkerProcess:
             self._on_answer(Answer(dropped_task.number, "cancelled"))
 
     def close(self) -> None:
-        """End the process."""
+        """End the process and the thread that sends tasks."""
         with self._condition:
             self._is_closed = True
             self._cancel_timer()
@@ -152,7 +152,11 @@ class WorkerProcess:
             pipe.close()
 
     def _send_tasks(self) -> None:
-        """Send the newest task until the worker is closed."""
+        """Send each newest task to the process, until the worker is closed.
+
+        A newest task of None is sent, too: it cancels the task in progress.  A task starts a process if none is alive.
+        A task that cannot be sent is answered with the failure.
+        """
         while True:
             with self._condition:
                 self._condition.wait_for(lambda: self._is_closed or not self._is_newest_sent)
@@ -185,7 +189,11 @@ class WorkerProcess:
                         self._unanswered = [number for number in self._unanswered if number != task.number]
 
     def _fail_unsent(self, task: Task | None, reason: str) -> None:
-        """Answer a task that could not be sent to the process with a fault.  reason: line for the user."""
+        """Answer a task that could not be sent to the process with a fault; do nothing if the worker is closed.
+
+        task: None only cancels, and has no answer.
+        reason: line for the user.
+        """
         with self._condition:
             if task is None or self._is_closed:
                 return
@@ -309,7 +317,10 @@ def run_worker(pipe: Connection) -> None:
 
 
 def _receive_newest(pipe: Connection, task: Task | None) -> Task | None:
-    """Return the newest task in the pipe; answer the other tasks as cancelled."""
+    """Return the newest task in the pipe, or `task` if the pipe is empty; answer the other tasks as cancelled.
+
+    The newest task is None if the last message in the pipe only cancels.
+    """
     while pipe.poll():
         newer_task = pipe.recv()
         if task is not None:

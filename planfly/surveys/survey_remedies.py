@@ -532,7 +532,8 @@ class _Trials:
     def _find_turn_around_for_parameter(self, candidate: Candidate, current: float) -> SurveyRemedy | None:
         """Find the shortest turn-around distance that passes with the farthest value of a parameter.
 
-        After that, the search finds the passing value nearest to the current value, with this distance.
+        After that, the search finds the passing value nearest to the current value, with this distance.  Return None if
+        no turn-around distance passes even with the farthest value.
         """
         remedies = list[SurveyRemedy]()
         # Do not suggest values below the documented range.

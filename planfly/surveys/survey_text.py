@@ -63,7 +63,10 @@ def lines_headline(measures: list[LineMeasure | None]) -> str:
 
 
 def line_text(number: int, measure: LineMeasure | None) -> str:
-    """Describe the length of a photo line, its usable fraction, and the causes of the loss."""
+    """Describe the length of a photo line, its usable fraction, and the causes of the loss.
+
+    measure: measure of the line; None if it was not flown.
+    """
     if measure is None:
         return f"line {number:<3} not flown"
     text = f"line {number:<3} {measure.length:6.0f} m  "
@@ -122,7 +125,7 @@ def overlap_lines(measure: OverlapMeasure | None, *, is_flown: bool = True) -> t
 def overlap_faults(measure: OverlapMeasure | None) -> dict[str, str]:
     """Return a text on each overlap that is smaller than required, by `FRONT_OVERLAP` or `SIDE_OVERLAP`.
 
-    An unknown overlap passes.
+    An unknown overlap passes, and without a measure there are no faults.
 
     >>> overlap_faults(None)
     {}

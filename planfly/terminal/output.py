@@ -594,12 +594,14 @@ def write_usage_error_if_requested(
     for option in {"--json", "--junit"} & set(commands[command].long_options()):
         parser.add_argument(option)
     try:
-        args, others = parser.parse_known_args(arguments)
+        args, unknown_arguments = parser.parse_known_args(arguments)
     except (argparse.ArgumentError, SystemExit):
         return
     args.command = command
-    args.what = next((argument for argument in others if argument != command and not argument.startswith("-")), None)
-    for number, argument in enumerate(others):
+    args.what = next(
+        (argument for argument in unknown_arguments if argument != command and not argument.startswith("-")), None
+    )
+    for number, argument in enumerate(unknown_arguments):
         setattr(args, f"argument_{number}", argument.partition("=")[2] if argument.startswith("--") else argument)
     with contextlib.suppress(PlanflyError), redirect_output(args):
         write_error_if_requested(args, BAD_INPUT, message)
@@ -637,8 +639,12 @@ def _check_named_once(name: str, target: Path, args: argparse.Namespace) -> None
     for key, value in vars(args).items():
         if key in (name, "command"):
             continue
-        for other in value if isinstance(value, list) else [value]:
-            if isinstance(other, str) and other != STANDARD_OUTPUT and _is_same_path(target, Path(other)):
+        for other_name in value if isinstance(value, list) else [value]:
+            if (
+                isinstance(other_name, str)
+                and other_name != STANDARD_OUTPUT
+                and _is_same_path(target, Path(other_name))
+            ):
                 reason = f"is already named by another argument; name another file for --{name}"
                 raise PlanflyError(f"{target}: {reason}", file=target, field=f"--{name}")
 

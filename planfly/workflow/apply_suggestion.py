@@ -311,7 +311,7 @@ def _make_turn_gentler(edited: _EditedMission, change: Change, _finding: Finding
 def _change_altitude(edited: _EditedMission, change: Change, finding: Finding) -> None:
     """Raise or lower a waypoint, a leg, or the legs that violate a zone, by a step.
 
-    A waypoint between two legs moves by the larger of their steps.
+    A waypoint between two legs moves by the larger of their steps: it moves only by what earlier changes lack.
     """
     sign = 1.0 if change.what == "height" else -1.0
     if change.place.kind == "waypoint" and change.place.index is not None:

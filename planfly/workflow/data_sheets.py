@@ -114,9 +114,9 @@ def stated_parameters(file: Path) -> StatedParameters:
     values: dict[str, float] = {}
     texts: dict[str, str] = {}
     for name in (*_USED_PARAMETERS, "AIRSPEED_STALL"):
-        stated = _px4_value(entries, name) if autopilot == PX4 else _arduplane_value(entries, name)
-        if stated is not None and abs(stated[0] - stated[1]) > 1e-6 * max(1.0, abs(stated[1])):
-            values[name], texts[name] = stated[0], stated[2]
+        entry = _px4_value(entries, name) if autopilot == PX4 else _arduplane_value(entries, name)
+        if entry is not None and abs(entry[0] - entry[1]) > 1e-6 * max(1.0, abs(entry[1])):
+            values[name], texts[name] = entry[0], entry[2]
     refuse_unknown_parameters(file, autopilot, entries, values)
     return StatedParameters(values, texts)
 
@@ -486,12 +486,12 @@ def make_data_sheet_folder(
     that exists, and an aircraft that cannot be made to fly; ParameterError for a file that cannot be read; OSError.
     """
     target = check_new_folder(folder, overwrite=overwrite)
-    stated = StatedParameters({}, {}) if parameters is None else stated_parameters(parameters)
+    parameter_values = StatedParameters({}, {}) if parameters is None else stated_parameters(parameters)
     numbers = {field: getattr(sheet, field) / RANGES[field][4] for field in _SHEET_FIELDS.values()}
-    readme_lines = _parameter_lines(stated, overridden_texts(numbers, stated))
+    readme_lines = _parameter_lines(parameter_values, overridden_texts(numbers, parameter_values))
     # What the sheet states applies, in the autopilot's parameters, too.
     is_overridden = {name: bool(getattr(sheet, _SHEET_FIELDS[name])) for name in _SETTINGS}
-    file_parameters = {name: value for name, value in stated.values.items() if not is_overridden.get(name)}
+    file_parameters = {name: value for name, value in parameter_values.values.items() if not is_overridden.get(name)}
     if sized is None:
         sheet = with_parameters(sheet, file_parameters)
         _check_required_numbers(sheet)
@@ -773,12 +773,12 @@ def _trim_throttle_lines(file_parameters: Mapping[str, float], performance: Perf
     The throttle is that of level flight.
     """
     throttle = 100.0 * performance.level.throttle
-    stated = file_parameters.get("TRIM_THROTTLE")
-    if stated is None or round(throttle) == round(stated):
+    trim_throttle = file_parameters.get("TRIM_THROTTLE")
+    if trim_throttle is None or round(throttle) == round(trim_throttle):
         return []
     return [
-        f"`ardupilot.parm` keeps the file's TRIM_THROTTLE {stated:g}, although the model needs {throttle:.0f} % in"
-        " level flight."
+        f"`ardupilot.parm` keeps the file's TRIM_THROTTLE {trim_throttle:g}, although the model needs {throttle:.0f} %"
+        " in level flight."
     ]
 
 

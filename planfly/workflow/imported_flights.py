@@ -342,7 +342,7 @@ def _describe_mission_change(flight: LoggedFlight, mission: Mission, options: Lo
 def _vehicle_events(flight: LoggedFlight) -> tuple[LogEvent, ...]:
     """Return the vehicle's messages and mode changes of the flight and the 60 s before, in order of time.
 
-    Events before the first row get the time of the first row.
+    Events before the first row get the time of the first row.  A flight without rows has no events.
     """
     if not len(flight.time):
         return ()
@@ -456,7 +456,7 @@ def start_after_takeoff(setup: FlightSetup, track: Track) -> FlightSetup:
     first = next((item for item in mission.items if item.seq == route.items[0]), None)
     if imported_log is None or not imported_log.stretches or first is None or first.command not in TAKEOFFS:
         return setup
-    stretch, *others = imported_log.stretches
+    stretch, *later_stretches = imported_log.stretches
     is_inside = (track.time >= stretch.start) & (track.time <= stretch.end)
     rows = np.flatnonzero(is_inside & (track.position[:, 2] >= route.positions[0, 2]))
     if not rows.size:
@@ -475,7 +475,9 @@ def start_after_takeoff(setup: FlightSetup, track: Track) -> FlightSetup:
         route=route_through_stops(
             placed, setup.limits.airspeed, scenario.flight.fly_over, setup.limits, setup.autopilot.route_rules
         ),
-        imported_log=replace(imported_log, stretches=(replace(stretch, start=float(track.time[rows[0]])), *others)),
+        imported_log=replace(
+            imported_log, stretches=(replace(stretch, start=float(track.time[rows[0]])), *later_stretches)
+        ),
     )
 
 

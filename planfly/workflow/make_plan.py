@@ -130,6 +130,7 @@ def _add_ground_phases(plan: Plan, uav: Uav, old_plan: Plan | None = None, *, co
     in the local wind.
 
     old_plan: the plan being flown, or None.
+    continues: True if the mission continues beyond the destination, so that there is no final loiter.
     """
     plan = ensure_local_wind(with_departure_and_approach(plan, uav, old_plan), uav)
     if continues or not uav.autopilot.loiters.ends_in_circle:

@@ -59,7 +59,7 @@ _GROWTH_M = 2.0
 
 
 def finding_key(finding: Finding) -> tuple[str, str, int | None, str]:
-    """Return rule and place of a finding, which identify it in the verdicts before and after a change.
+    """Return what identifies a finding before and after a change: its rule, and the kind, index and name of its place.
 
     Item numbers are not part of the key, because a change may shift them.
     """
@@ -68,10 +68,10 @@ def finding_key(finding: Finding) -> tuple[str, str, int | None, str]:
 
 def _worst_findings(verdict: Verdict) -> dict[tuple[str, str, int | None, str], Finding]:
     """Return the worst finding of each rule at each place of a verdict."""
-    worst: dict[tuple[str, str, int | None, str], Finding] = {}
+    worst_by_key: dict[tuple[str, str, int | None, str], Finding] = {}
     for finding in sorted(verdict.findings, key=worst_first_key):
-        worst.setdefault(finding_key(finding), finding)
-    return worst
+        worst_by_key.setdefault(finding_key(finding), finding)
+    return worst_by_key
 
 
 def _is_undecided(finding: Finding) -> bool:
@@ -194,12 +194,12 @@ def tried_suggestions(passed_trials: Sequence[PassedTrial]) -> tuple[TriedSugges
 def _smallest_moves(trials: Sequence[PassedTrial]) -> tuple[Suggestion, ...]:
     """Return the trials' suggestions, the smallest moves first; if all are far moves, only one."""
     suggestions = sorted((trial.suggestion for trial in trials), key=_move_distance)
-    near = [
+    near_moves = [
         suggestion
         for suggestion in suggestions
         if all(math.hypot(move.east, move.north) < FAR_MOVE_DISTANCE_M for move in _item_moves(suggestion))
     ]
-    return tuple(near or suggestions[:1])
+    return tuple(near_moves or suggestions[:1])
 
 
 def _item_moves(suggestion: Suggestion) -> list[ItemMove]:
@@ -276,7 +276,10 @@ class SuggestionTrials:
         return passed_trials
 
     def _findings_to_try(self) -> list[Finding]:
-        """Return the failed findings to try, the worst of each rule first, the most urgent rules first."""
+        """Return the failed findings to try, the worst of each rule first, the most urgent rules first.
+
+        Only findings with suggestions are tried.  Return [] if the mission has too many legs or too many such findings.
+        """
         findings_by_rule = [
             [finding for finding in rule.failed if finding.suggestions]
             for rule in self.judged.verdict.present().failed_rules
@@ -440,10 +443,10 @@ def _merge_steps(suggestion: Suggestion, needed_steps: Suggestion) -> Suggestion
     steps = {(change.what, change.place.kind, change.place.index): change for change in suggestion}
     for change in needed_steps:
         key = change.what, change.place.kind, change.place.index
-        wanted = change.wanted
+        merged_step = change.wanted
         if key in steps:
-            wanted = steps[key].wanted + _GROWTH_FACTOR * change.wanted + _GROWTH_M
-        steps[key] = replace(change, wanted=float(round(wanted)))
+            merged_step = steps[key].wanted + _GROWTH_FACTOR * change.wanted + _GROWTH_M
+        steps[key] = replace(change, wanted=float(round(merged_step)))
     return tuple(steps.values())
 
 

@@ -158,7 +158,10 @@ def _tighten_turns(spec: Spec, scenario: Scenario, failed_findings: list[Finding
 
 
 def _raise_clearance(spec: Spec, scenario: Scenario, failed_findings: list[Finding]) -> list[Tightening]:
-    """Raise the minimum clearance in `spec` by the largest shortfall of the flight."""
+    """Raise the minimum clearance in `spec` by the largest shortfall of the flight; return this change in a list.
+
+    Return [] without a failed finding on the clearance; then `spec` is not changed.
+    """
     shortfalls = [
         -finding.margin for finding in failed_findings if finding.rule == "clearance" and finding.margin is not None
     ]

@@ -47,14 +47,14 @@ def find_clock_shift(
     """
     min_overlap = max(_MIN_OVERLAP_S, _MIN_OVERLAP_FRACTION * min(float(np.ptp(time)), float(np.ptp(other_time))))
     grid = np.arange(other_time[0], other_time[-1], _GRID_STEP_S)
-    other = np.interp(grid, other_time, other_values)
+    second_values = np.interp(grid, other_time, other_values)
     best = ClockShift(0.0, 0.0)
     for step, reach in ((_COARSE_STEP_S, max_shift), (_FINE_STEP_S, _COARSE_STEP_S)):
         for shift in (best.shift + np.arange(-reach, reach + 0.5 * step, step)).tolist():
             start, end = np.searchsorted(grid, (time[0] + shift, time[-1] + shift)).tolist()
             if (end - start) * _GRID_STEP_S >= min_overlap:
                 shifted_values = np.interp(grid[start:end] - shift, time, values)
-                correlation = _correlation(shifted_values, other[start:end])
+                correlation = _correlation(shifted_values, second_values[start:end])
                 best = max(best, ClockShift(shift, correlation), key=lambda clock_shift: clock_shift.correlation)
     return best
 

@@ -137,8 +137,8 @@ def _flying_grid(log: ColumnLog) -> Floats:
     if len(time) < 2:
         return np.zeros(0)
     grid = np.arange(time[0], time[-1], _STEP_S)
-    after = np.clip(np.searchsorted(time, grid, side="right"), 1, len(time) - 1)
-    is_recorded = time[after] - time[after - 1] < _MIN_GAP_S
+    next_rows = np.clip(np.searchsorted(time, grid, side="right"), 1, len(time) - 1)
+    is_recorded = time[next_rows] - time[next_rows - 1] < _MIN_GAP_S
     return np.asarray(grid[is_recorded & (np.interp(grid, time, values) > _FLYING_MPS)])
 
 

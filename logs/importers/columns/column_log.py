@@ -423,8 +423,8 @@ class ColumnLog:
         """Convert values of an entry to SI units, radians and the default frame."""
         factor = UNITS[QUANTITIES[quantity].dimension][entry.unit]
         frame_factor, frame_offset = to_default_frame(quantity, entry.frame)
-        stated = entry.sign * (entry.scale * raw + entry.offset)
-        return np.asarray(frame_factor * (factor * stated + UNIT_ZEROS.get(entry.unit, 0.0)) + frame_offset)
+        scaled = entry.sign * (entry.scale * raw + entry.offset)
+        return np.asarray(frame_factor * (factor * scaled + UNIT_ZEROS.get(entry.unit, 0.0)) + frame_offset)
 
     def _check_plausible(self, quantity: str, entry: ColumnTable, values: Floats) -> None:
         """Raise LogError for values outside the plausible range of a quantity.

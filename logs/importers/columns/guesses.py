@@ -239,20 +239,20 @@ def _name_parts(data: DataFile, column: str) -> tuple[str, str, str]:
 
     The unit is the one that the file or the name states; "" if neither states one.
     """
-    prefix, _, own = column.rpartition(".")
+    prefix, _, name = column.rpartition(".")
     unit = _SPELLINGS.get(data.units.get(column, "").strip().lower(), "")
-    match = _UNIT_SUFFIX.search(own)
+    match = _UNIT_SUFFIX.search(name)
     spelling = (match[1] or match[2] or "").strip().lower() if match else ""
     if match and spelling in _SPELLINGS and match.start() > 0:
-        return prefix, own[: match.start()], unit or _SPELLINGS[spelling]
-    return prefix, own, unit
+        return prefix, name[: match.start()], unit or _SPELLINGS[spelling]
+    return prefix, name, unit
 
 
 def _time_clocks(data: DataFile, file: str) -> Iterator[_Clock]:
     """Yield a clock for each column with increasing values and a name that stands for time."""
     for column, values in data.columns.items():
-        prefix, own, unit = _name_parts(data, column)
-        if {_plain_name(own), _plain_name(column.rpartition(".")[2])} & set(_TIMES) and (
+        prefix, name, unit = _name_parts(data, column)
+        if {_plain_name(name), _plain_name(column.rpartition(".")[2])} & set(_TIMES) and (
             unit := _time_unit(values, unit)
         ):
             factor = UNITS["time"][unit]
@@ -263,7 +263,7 @@ def _time_clocks(data: DataFile, file: str) -> Iterator[_Clock]:
 def _time_unit(values: Column, stated: str) -> str:
     """Return the unit in which a column has increasing times at usual intervals.
 
-    Return "" if the column has no such times.
+    The unit is "iso" for dates with times of day.  Return "" if the column has no such times.
 
     stated: unit from the column's name or the file, or "".
     """
@@ -285,9 +285,9 @@ def _candidate_entries(quantity: str, clocks: Sequence[_Clock], files: dict[str,
         for clock in clocks:
             data = files[clock.file]
             for column, values in data.columns.items():
-                prefix, own, unit = _name_parts(data, column)
+                prefix, column_name, unit = _name_parts(data, column)
                 has_clock = prefix == clock.prefix and len(values) == clock.length
-                if not has_clock or name not in (_plain_name(own), _plain_name(column.rpartition(".")[2])):
+                if not has_clock or name not in (_plain_name(column_name), _plain_name(column.rpartition(".")[2])):
                     continue
                 guess = _guess_entry(quantity, column, clock, values, unit)
                 if guess is not None:
@@ -372,14 +372,14 @@ def _table_text(guesses: Sequence[_Guess], alternatives: Sequence[_Guess], files
     """
     file, names = next(iter(files)), _clock_names(guesses)
     lines = [*_HEAD, f'file = "{file}"', 'program = ""']
-    main = next(clock for clock, name in names.items() if name == MAIN_CLOCK)
+    main_clock = next(clock for clock, name in names.items() if name == MAIN_CLOCK)
     for clock, name in names.items():
         lines += ["", f"[clocks.{name}]  # guess: {count_text(clock.length, 'row')}"]
         lines += [f'file = "{clock.file}"'] if clock.file != file else []
         lines += [f'column = "{clock.column}"', f'unit = "{clock.unit}"']
         partner = next((guess for guess in alternatives if guess.clock == clock), None)
         # Groups of one file with names of their own (GPS, IMU) share one clock.
-        is_separate = clock != main and (clock.file != main.file or clock.prefix == main.prefix)
+        is_separate = clock != main_clock and (clock.file != main_clock.file or clock.prefix == main_clock.prefix)
         if is_separate and partner is not None:
             pair = f'column = "{partner.column}", with = "{partner.quantity}"'
             lines.append(f"align = {{ {pair} }}  # guess: both vary together")
@@ -389,27 +389,31 @@ def _table_text(guesses: Sequence[_Guess], alternatives: Sequence[_Guess], files
     for guess in guesses:
         parts = [f'column = "{guess.column}"', *([f'unit = "{guess.unit}"'] if guess.unit else [])]
         parts += [f'frame = "{guess.frame}"'] if guess.frame else []
-        parts += [f'clock = "{names[guess.clock]}"'] if guess.clock != main else []
+        parts += [f'clock = "{names[guess.clock]}"'] if guess.clock != main_clock else []
         lines.append(f"{guess.quantity} = {{ {', '.join(parts)} }}  # guess{guess.reason}")
     return "\n".join([*lines, *_missing_lines(guesses), *_unused_lines(guesses, files)]) + "\n"
 
 
 def _missing_lines(guesses: Sequence[_Guess]) -> Iterator[str]:
     """Yield lines of remarks on the quantities that were not found."""
-    found = {guess.quantity for guess in guesses}
+    found_quantities = {guess.quantity for guess in guesses}
     substitutes = dict.fromkeys(ANGLES, QUATERNION[-1]) | {
         "elevator": "elevon_left",
-        "aileron": "aileron_left" if "aileron_left" in found else "elevon_left",
+        "aileron": "aileron_left" if "aileron_left" in found_quantities else "elevon_left",
     }
     yield ""
     for purpose, quantities in _NEEDED.items():
-        missing = [name for name in quantities if name not in found and substitutes.get(name) not in found]
+        missing = [
+            name
+            for name in quantities
+            if name not in found_quantities and substitutes.get(name) not in found_quantities
+        ]
         if missing:
             yield f"# Not found, and needed by planfly {purpose}: {', '.join(missing)}"
-    settled = found.union(*_NEEDED.values(), QUATERNION if found.issuperset(ANGLES) else ())
-    others = [name for name in QUANTITIES if name not in settled]
-    if others:
-        yield f"# Not found, and optional: {', '.join(others)}"
+    settled = found_quantities.union(*_NEEDED.values(), QUATERNION if found_quantities.issuperset(ANGLES) else ())
+    remaining_quantities = [name for name in QUANTITIES if name not in settled]
+    if remaining_quantities:
+        yield f"# Not found, and optional: {', '.join(remaining_quantities)}"
 
 
 def _unused_lines(guesses: Sequence[_Guess], files: dict[str, DataFile]) -> Iterator[str]:

@@ -145,8 +145,8 @@ def likelier_unit(quantity: str, unit: str, magnitude: float) -> str:
     ''
     """
     entry = QUANTITIES[quantity]
-    for other in UNITS[entry.dimension]:
-        value = magnitude * UNITS[entry.dimension][other] + UNIT_ZEROS.get(other, 0.0)
-        if other != unit and entry.low <= value <= entry.high:
-            return other
+    for candidate in UNITS[entry.dimension]:
+        value = magnitude * UNITS[entry.dimension][candidate] + UNIT_ZEROS.get(candidate, 0.0)
+        if candidate != unit and entry.low <= value <= entry.high:
+            return candidate
     return ""

@@ -199,17 +199,17 @@ def _distance_from_leg(point: list[float], start: list[float], end: list[float])
 
 def _gap_has_room(requirements: RouteRequirements, first: int, last: int) -> bool:
     """Return True if the route without the waypoints first..last has room for the turns at the gap."""
-    before, after = first - 1, last + 1
+    previous_corner, next_corner = first - 1, last + 1
     if not (
-        _turn_fits_alone(requirements, before - 1, before, after)
-        and _turn_fits_alone(requirements, before, after, after + 1)
+        _turn_fits_alone(requirements, previous_corner - 1, previous_corner, next_corner)
+        and _turn_fits_alone(requirements, previous_corner, next_corner, next_corner + 1)
     ):
         return False
     # Include the next turns on both sides, because they use part of the legs.
     start, end = max(0, first - 3), min(len(requirements.points), last + 4)
-    nearby_route = _reduced_route(requirements.setup.route, np.r_[start:first, after:end])
+    nearby_route = _reduced_route(requirements.setup.route, np.r_[start:first, next_corner:end])
     turns = turn_requirements(nearby_route, leg_performance(requirements.limits))
-    for new_corner, old_corner in ((before - start, before), (first - start, after)):
+    for new_corner, old_corner in ((previous_corner - start, previous_corner), (first - start, next_corner)):
         if not 0 < old_corner < requirements.legs:
             continue
         limit, _ = tighter_turn_limit(requirements, old_corner, float(turns.limit[new_corner]))

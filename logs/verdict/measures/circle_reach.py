@@ -52,8 +52,9 @@ def find_hazards(
 def end_loiter_hazards(requirements: RouteRequirements) -> tuple[float, list[str]] | None:
     """Return the reach (m) of the loiter after the last waypoint, and texts on the hazards within reach.
 
-    The reach is the aircraft's maximum distance from that waypoint.  Return None if the autopilot does not loiter at
-    the last waypoint, or if the mission does not end at a plain waypoint.
+    The reach is the aircraft's maximum distance from that waypoint; it is infinite if the wind is too strong for the
+    loiter.  Return None if the autopilot does not loiter at the last waypoint, or if the mission does not end at a
+    plain waypoint.
     """
     setup, rules = requirements.setup, requirements.setup.autopilot.loiters
     if not rules.ends_in_circle or not ends_at_plain_waypoint(setup.route, setup.mission):
@@ -72,7 +73,13 @@ def end_loiter_hazards(requirements: RouteRequirements) -> tuple[float, list[str
 def _ground_hazards(
     requirements: RouteRequirements, center: Floats, min_altitude: float, max_altitude: float, reach: float
 ) -> list[str]:
-    """Describe ground within reach that is unknown, too close below, or too far below for a height limit."""
+    """Describe ground within reach that is unknown, too close below, or too far below for a height limit.
+
+    Return [] without terrain.
+
+    center: center of the reach (east, north), m.  min_altitude, max_altitude: altitudes of the flight, m AMSL.
+    reach: maximum distance from the center, m.
+    """
     terrain, limits = requirements.setup.scenario.terrain, requirements.setup.scenario.limits
     if terrain is None:
         return []
@@ -100,7 +107,10 @@ def _ground_hazards(
 def _missile_hazards(
     requirements: RouteRequirements, center: Floats, min_altitude: float, max_altitude: float, reach: float
 ) -> list[str]:
-    """Describe the missiles whose sphere overlaps the disc of radius `reach` between the two altitudes."""
+    """Describe the missiles whose sphere overlaps the disc of radius `reach` between the two altitudes.
+
+    Return [] for an external mission, whose file contains no threats.
+    """
     scenario = requirements.setup.scenario
     if scenario.external:
         return []

@@ -47,6 +47,8 @@ def leg_energies(requirements: RouteRequirements) -> tuple[list[float], float]:
 def air_climb_angle(requirements: RouteRequirements, leg: int, speed: float, altitude: float) -> float:
     """Return the climb angle relative to the air on a leg in the mean wind, rad; negative in a descent.
 
+    The angle is found by iteration, because the ground speed depends on it.
+
     speed: true airspeed, m/s.
     altitude: altitude at which the wind is taken, m AMSL.
     """

@@ -56,7 +56,7 @@ def steepest_ground(requirements: RouteRequirements, leg: int, limit: float) -> 
     """Find where an aircraft limited to a climb slope (rad) falls furthest below a ground-following leg.
 
     The ground is sampled at steps of `GROUND_STEP_M`, as ArduPlane's terrain data.  Return None if every part of the
-    leg is within the limit.
+    leg is within the limit, or if the ground or the limit is unknown.
     """
     start = requirements.points[leg, :2]
     unit = requirements.leg_unit(leg)

@@ -161,7 +161,7 @@ def measure_line(
         line.photo,
         np.interp(step_middles, along[is_ahead][order], speeds) if speeds.size else np.zeros(len(step_middles)),
     )
-    photos, missed = _count_photos(line, is_taken, length, spacing)
+    photos, missed_photos = _count_photos(line, is_taken, length, spacing)
     return LineMeasure(
         length=length,
         usable=float(is_good.mean()),
@@ -171,7 +171,7 @@ def measure_line(
         max_lateral_offset=float(np.abs(rows.across[is_on_line]).max(initial=0.0)),
         max_height_error=float(max(height_errors, key=abs, default=math.nan if is_on_line.any() else 0.0)),
         photos=photos,
-        missed_photos=missed,
+        missed_photos=missed_photos,
         lateral_tolerance=lateral_tolerance(requirements, survey),
         min_height_tolerance=float(np.fmin.reduce(rows.height_tolerance, initial=math.inf)),
         lost_spans=_runs_of_set_steps(~is_kept, step),
@@ -275,6 +275,10 @@ def _line_steps(along: Floats, is_set: Flags, length: float) -> Flags:
 def _count_photos(line: PhotoLine, is_taken: Flags, length: float, spacing: Floats) -> tuple[int, int]:
     """Return the number of planned photos on a line, and the number of those that are not taken.
 
+    Both are 0 for a line without photos.
+
+    is_taken: True for each step of the line on which the camera takes photos, (n,).
+    length: length of the line, m.
     spacing: distance between photos that the camera can take on each step of the line, m.
     """
     if line.photo <= 0.0:
@@ -330,19 +334,22 @@ def _count_taken_photos(
 
 
 def _photo_rows(requirements: RouteRequirements, aligned: AlignedTrack, legs: range) -> NDArray[np.int64]:
-    """Return the row at which the camera takes each photo, (n,), while it stays switched as on any of some legs.
+    """Return the row of the track at which the camera takes each photo on some legs, (n,).
 
-    The camera takes the first photo where it is switched on.  Items that state no distance between photos add no
-    photos.
+    The photos of neighbouring legs with the same distance between photos are included, because the camera counts from
+    the place where it was switched on and took its first photo.  Items that state no distance add no photos, nor do
+    legs that the flight has not reached.
     """
     setup, track, photo_rows = requirements.setup, aligned.track, [np.empty(0, dtype=np.int64)]
     spacings = camera_spacing(setup.mission, setup.route)[:-1].tolist()
     for spacing, group in itertools.groupby(range(len(spacings)), spacings.__getitem__):
-        own_legs = list(group)
+        group_legs = list(group)
         # A distance of NaN is not positive.
-        if not spacing > 0.0 or not aligned.passed[own_legs[0]] or set(legs).isdisjoint(own_legs):
+        if not spacing > 0.0 or not aligned.passed[group_legs[0]] or set(legs).isdisjoint(group_legs):
             continue
-        rows = slice(*(_switch_row(requirements, aligned, waypoint) for waypoint in (own_legs[0], own_legs[-1] + 1)))
+        rows = slice(
+            *(_switch_row(requirements, aligned, waypoint) for waypoint in (group_legs[0], group_legs[-1] + 1))
+        )
         if rows.stop - rows.start < 2:
             continue
         lengths = np.hypot(*np.diff(track.position[rows, :2], axis=0).T)
@@ -484,7 +491,11 @@ def measure_overlap(
 def _line_strip(
     requirements: RouteRequirements, aligned: AlignedTrack | None, survey: Survey, line: PhotoLine
 ) -> _Strip | None:
-    """Return the strip of photos along a line, flown or planned; None if the line was not flown."""
+    """Return the strip of photos along a line, as flown, or as planned if ``aligned`` is None.
+
+    Return None if the line was not flown.  A point is usable if the ground below it is known and, on a flown line, if
+    the conditions of the photos are met there.
+    """
     if aligned is None:
         axis = LineAxis(requirements.points[line.first : line.last + 1])
         along = np.linspace(0.0, axis.length, max(2, math.ceil(axis.length / PHOTO_STEP_M) + 1))
@@ -497,15 +508,18 @@ def _line_strip(
     rows = _line_rows(requirements, aligned, survey, line)
     if rows is None:
         return None
-    is_kept = rows.is_ahead & np.all([met for name, met in rows.conditions.items() if name != "unknown"], axis=0)
-    meets_conditions = is_kept & rows.conditions["unknown"]
-    kept_fraction, usable_fraction = (
-        float(_line_steps(rows.along, is_met, rows.axis.length).mean()) for is_met in (is_kept, meets_conditions)
+    meets_known_conditions = rows.is_ahead & np.all(
+        [met for name, met in rows.conditions.items() if name != "unknown"], axis=0
+    )
+    meets_conditions = meets_known_conditions & rows.conditions["unknown"]
+    possible_fraction, usable_fraction = (
+        float(_line_steps(rows.along, is_met, rows.axis.length).mean())
+        for is_met in (meets_known_conditions, meets_conditions)
     )
     is_usable = meets_conditions & (rows.along >= 0.0) & (rows.along <= rows.axis.length)
     speeds = np.hypot(*aligned.track.velocity[rows.track_rows, :2].T)
     heights = heights_over_ground(requirements, rows.position)
-    unknown_fraction = kept_fraction - usable_fraction
+    unknown_fraction = possible_fraction - usable_fraction
     return _Strip(rows.position, heights, speeds, is_usable, usable_fraction, unknown_fraction)
 
 

@@ -18,15 +18,18 @@ _MAH_PER_AH = 1000.0
 
 
 def longest_return_time(requirements: RouteRequirements, failsafe: ReturnTimeFailsafe) -> float:
-    """Return an upper bound of the time of a return from anywhere on the mission, s; inf without a bound.
+    """Return an upper bound of the time of a return from anywhere on the mission, s.
 
-    The bound is the sum of three times: for the path from the farthest place to the farthest destination and through
-    the longest landing sequence, against the strongest wind; for the climb from the lowest place; and for the descent
-    to the lowest destination.
+    The bound is the sum of four times: the delay of the failsafe; the path from the farthest place to the farthest
+    destination and through the longest landing sequence, against the strongest wind; the climb from the lowest place;
+    and the descent to the lowest destination.  A failsafe that follows the mission adds the length of the mission to
+    the path.
+
+    Return inf if there is no destination, or if the wind is as fast as the aircraft.
     """
     setup = requirements.setup
-    flown = requirements if requirements.ground_phases is None else requirements.ground_phases.whole_route
-    places = flown.path.points
+    whole_requirements = requirements if requirements.ground_phases is None else requirements.ground_phases.whole_route
+    places = whole_requirements.path.points
     home_and_rally = return_points(setup.mission, setup.scenario.origin, setup.scenario.terrain)
     sequences = [
         [stop.position for stop in (start, *start.next_stops)] + ([start.landing] if start.landing else [])
@@ -37,15 +40,15 @@ def longest_return_time(requirements: RouteRequirements, failsafe: ReturnTimeFai
     if not home_and_rally or speed <= 0.0:
         return math.inf
     # A landing without a DO_LAND_START is the last place.
-    ends = np.array(
+    destinations = np.array(
         [*[end[:3] for end in home_and_rally], *[stop for stops in sequences for stop in stops], places[-1]]
     )
-    distance = float(np.hypot(*(places[:, None, :2] - ends[None, :, :2]).transpose(2, 0, 1)).max())
+    distance = float(np.hypot(*(places[:, None, :2] - destinations[None, :, :2]).transpose(2, 0, 1)).max())
     distance += max((_path_length(np.array(stops)) for stops in sequences), default=0.0)
     distance += _path_length(places) if failsafe.follows_mission else 0.0
-    transit_altitude = float(ends[:, 2].max()) + failsafe.altitude
+    transit_altitude = float(destinations[:, 2].max()) + failsafe.altitude
     climb = max(0.0, transit_altitude - float(places[:, 2].min()))
-    descent = max(transit_altitude, float(places[:, 2].max())) - float(ends[:, 2].min())
+    descent = max(transit_altitude, float(places[:, 2].max())) - float(destinations[:, 2].min())
     return distance / speed + climb / failsafe.climb_rate + descent / failsafe.sink_rate + failsafe.delay
 
 

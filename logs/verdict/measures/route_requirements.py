@@ -211,7 +211,10 @@ def turn_requirements(route: Route, performance: LegPerformance) -> TurnRequirem
 def turn_lengths(turn: float, radius: float, fly_over: bool) -> tuple[float, float]:
     """Return the lengths of leg (m) that a turn (rad) uses before and after its waypoint.
 
-    A fly-over uses only the leg after its waypoint.
+    A fly-over uses only the leg after its waypoint.  Both lengths are 0 without a turn, and infinite for a fly-by with
+    a turn larger than `U_TURN_RAD`.
+
+    radius: turn radius, m.  fly_over: True if the turn begins only at its waypoint.
     """
     if turn < 1e-9:
         return 0.0, 0.0
@@ -556,7 +559,11 @@ def judged_surveys(setup: FlightSetup) -> tuple[Survey, ...]:
 
 
 def _search_surveys(setup: FlightSetup) -> tuple[Survey, ...]:
-    """Find the surveys of a setup's mission that are judged by their photo lines."""
+    """Find the surveys of a setup's mission that are judged by their photo lines.
+
+    There are none in a flight of a plan, or if the scenario's limits state `surveys = "path"`.  With "lines" every
+    survey is judged; otherwise only surveys with a camera are.
+    """
     mode = setup.scenario.limits.surveys
     if setup.plan is not None or mode == "path":
         return ()

@@ -259,11 +259,16 @@ def _height_error(requirements: RouteRequirements, leg: int, position: Floats) -
 
 
 def _ground_following_error(requirements: RouteRequirements, leg: int, position: Floats) -> float | None:
-    """Return the largest error from a leg's height above ground, between its turns, m, with its sign."""
+    """Return the largest error from a leg's height above ground, between its turns, m, with its sign.
+
+    Return None without a row between the turns over known ground.
+
+    position: positions of the track, m, (n, 3).
+    """
     distance_along, _ = project_onto_leg(requirements, leg, position)
     span_start, span_end = straight_span(requirements, leg, 0.0)
-    inside = position[(distance_along >= span_start) & (distance_along <= span_end)]
-    errors = inside[:, 2] - demanded_altitudes(requirements, leg, inside)
+    straight_positions = position[(distance_along >= span_start) & (distance_along <= span_end)]
+    errors = straight_positions[:, 2] - demanded_altitudes(requirements, leg, straight_positions)
     errors = errors[np.isfinite(errors)]
     return float(errors[np.argmax(np.abs(errors))]) if errors.size else None
 
@@ -362,15 +367,15 @@ def measure_ability(requirements: RouteRequirements, aligned: AlignedTrack, leg:
     altitude = track.position[rows, 2][is_measured]
     top_altitude = float(altitude.max())
     excess_speed = np.sqrt((air_velocity[is_measured] ** 2).sum(axis=1)) - commanded_speed
-    fit = _fit_plane_at_origin(
+    rate_fit = _fit_plane_at_origin(
         climb_rate, excess_speed, 0.01 * (altitude - top_altitude), duration / ABILITY_SAMPLE_INTERVAL_S
     )
-    if fit is None:
+    if rate_fit is None:
         return None
     tailwind, crosswind = requirements.wind_on(leg).components_on_course(float(requirements.courses[leg]), top_altitude)
     slopes = [
         ground_slope(math.asin(min(1.0, max(-1.0, value / commanded_speed))), commanded_speed, tailwind, crosswind)
-        for value in (fit[0], fit[0] + fit[1])
+        for value in (rate_fit[0], rate_fit[0] + rate_fit[1])
     ]
     error = abs(slopes[1] - slopes[0])
     # The comparison with a NaN error is False, so the result is then None.

@@ -96,6 +96,8 @@ def _corner_overshoot(
 ) -> tuple[float | None, float]:
     """Return the overshoot at waypoint `k` (m) and the overrun (m), as in `CornerPass`.
 
+    The overshoot is None if the aircraft was already beyond the next leg at the start; only then is there an overrun.
+
     start, end: times of the closest approach to this waypoint and to the next waypoint, s.
     """
     leg_length = float(requirements.runs[k])
@@ -259,6 +261,11 @@ def _arc_overshoot(
     """Return the maximum distance outside the arc, and beyond its end outside the next leg, m; at least 0.
 
     Return None if the turn has no fly-by arc.
+
+    i: index of the waypoint.
+    position: positions of the track at the turn, m, (n, 3).
+    distance_along_before, distance_along: their distances along the leg before and along the leg after the waypoint, m.
+    lateral_offset: their offsets from the leg after the waypoint, m.
     """
     if requirements.setup.route.fly_over[i] or not math.isfinite(requirements.length_before[i]):
         return None

@@ -70,8 +70,8 @@ def circles_text(requirements: RouteRequirements, circles: Sequence[WaypointCirc
         f"{place_text(requirements.waypoint(circle.waypoint))} (height error {circle.height_error:+.0f} m)"
         for circle in circles[:_MAX_NAMED]
     ]
-    rest = f" and {len(circles) - _MAX_NAMED} more" if len(circles) > _MAX_NAMED else ""
+    more_text = f" and {len(circles) - _MAX_NAMED} more" if len(circles) > _MAX_NAMED else ""
     return (
-        f"{autopilot.title} circled at {', '.join(places)}{rest}: {autopilot.deviations.altitude_parameter} allows"
+        f"{autopilot.title} circled at {', '.join(places)}{more_text}: {autopilot.deviations.altitude_parameter} allows"
         f" {autopilot.loiters.altitude_tolerance:g} m"
     )

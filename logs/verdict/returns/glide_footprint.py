@@ -131,6 +131,8 @@ class _CellBlocks(NamedTuple):
 def cell_outlines(west: float, south: float, side: float, is_chosen: Flags) -> tuple[Part, ...]:
     """Join chosen square cells into areas, and return the areas' outlines with their holes.
 
+    Return () if no cell is chosen.
+
     west, south: south-western corner of the first cell, m.
     side: side of a cell, m.
     is_chosen: (n, e), rows from south to north.

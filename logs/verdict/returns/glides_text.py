@@ -133,7 +133,7 @@ def _own_return_text(glide: Glide, glides: Glides) -> str:
 
 
 def glide_notes(glides: Glides) -> list[str]:
-    """Return notes on the assumptions under which glides were flown."""
+    """Return notes on the assumptions under which glides were flown; [] if there are no glides."""
     if not glides.each:
         return []
     notes = [

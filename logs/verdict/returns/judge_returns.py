@@ -515,9 +515,11 @@ def _with_px4_airspeeds(parameters: ArduPilotParameters, own: Parameters | None)
     """
     if not isinstance(own, Px4Parameters):
         return parameters
-    stated = own.by_origin("file")
+    file_parameters = own.by_origin("file")
     names = {name: FROM_ARDUPILOT[name][0] for name in ("AIRSPEED_MIN", "AIRSPEED_CRUISE", "AIRSPEED_MAX")}
-    return parameters.changed(**{name: stated[px4_name] for name, px4_name in names.items() if px4_name in stated})
+    return parameters.changed(
+        **{name: file_parameters[px4_name] for name, px4_name in names.items() if px4_name in file_parameters}
+    )
 
 
 # Function that flies a return in JSBSim and returns the minimum height above ground and the minimum distance outside a
@@ -647,11 +649,11 @@ def simulate_judged_returns(
     abort_limits = (
         None if min_sphere_distances is None else (np.where(has_approach, -math.inf, min_heights), min_sphere_distances)
     )
-    flown = world.fly(starts, targets, store_paths=bool(world.airspace.zones), abort_limits=abort_limits)
-    results = flown.results
+    simulation = world.fly(starts, targets, store_paths=bool(world.airspace.zones), abort_limits=abort_limits)
+    results = simulation.results
     indices = np.flatnonzero((results["clearance"] < min_heights) & has_approach)
     if not indices.size:
-        return results, flown.tracks
+        return results, simulation.tracks
     short_targets = [
         targets[k]._replace(landing=landing._replace(next_stops=()))
         for k in indices.tolist()
@@ -664,7 +666,7 @@ def simulate_judged_returns(
         # A return that meets the ground keeps the place where it does.
         is_airborne = results["outcome"][indices] != RETURN_GROUND_IMPACT
         values[indices[is_airborne]] = short_results[name][is_airborne]
-    return results, flown.tracks
+    return results, simulation.tracks
 
 
 def required_heights(world: ReturnWorld, starts: ReturnStarts) -> Floats:
@@ -818,11 +820,11 @@ def _recheck_in_jsbsim(
     corrected_returns = list(returns)
     for is_doubtful, group in groupby(range(len(returns)), lambda k: limit_ratios[k] < 1.0):
         members = list(group)
-        flown = [k for k in members if k in offsets]
-        if not is_doubtful or not flown:
+        flown_members = [k for k in members if k in offsets]
+        if not is_doubtful or not flown_members:
             continue
         for k in members:
-            nearest = min(flown, key=lambda j: abs(j - k))
+            nearest = min(flown_members, key=lambda j: abs(j - k))
             corrected_returns[k] = _corrected_return(
                 world, returns[k], results[k], offsets[nearest], returns[nearest], is_flown=nearest == k
             )
@@ -897,7 +899,7 @@ def limit_ratio(ret: SimulatedReturn) -> float:
     """Return the distance of a return from its nearest limit, in units of the point mass's error.
 
     The limits are the ground, the required height and the kill spheres.  Below 1, the error of the point mass may
-    change the outcome.
+    change the outcome.  Return inf for an outcome that depends on no distance, or if all distances are unknown.
     """
     if ret.kind in ("zone", "unknown"):
         # These outcomes do not depend on a distance.

@@ -116,7 +116,10 @@ def _height_losses(setup: FlightSetup, time: Floats, position: Floats, start_tim
 
 
 def _low_and_slow_rows(setup: FlightSetup, track: Track, rows: NDArray[np.intp]) -> tuple[Flags, Flags]:
-    """Return two masks (n,): rows that are low in a take-off or landing, and rows too slow to fly."""
+    """Return two masks (n,): rows that are low in a take-off or landing, and those of them that are too slow to fly.
+
+    Without terrain, both masks contain all rows of the take-off and the landing.
+    """
     procedures, terrain = setup.ground_phases, setup.scenario.terrain
     is_ground_phase = ground_phase_rows(track, procedures)[rows]
     position = np.asarray(track.position[rows], dtype=np.float64)

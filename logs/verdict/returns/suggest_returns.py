@@ -81,10 +81,12 @@ class _ReturnLimits:
 
 
 def _return_limits(world: ReturnWorld, starts: ReturnStarts, margin: float = MARGIN) -> _ReturnLimits:
-    """Return the limits of the return from each start, with a margin, m.
+    """Return the required height above ground and distance from the spheres of the return from each start.
 
-    If the start itself is lower or closer to a sphere, the limit is the start's value instead, minus the height lost in
-    the turn.
+    A start that is itself lower, or closer to a sphere, has a weaker limit: the start's own value minus the height lost
+    in the turn.
+
+    margin: added to the required height, and required as the distance from the spheres, m.
     """
     rows = starts.rows
     sphere_distances = np.full(len(starts), math.inf)
@@ -178,6 +180,8 @@ class _ReturnTrial:
 
 def suggest_parameters(world: ReturnWorld, starts: ReturnStarts) -> list[Remedy]:
     """Suggest the lowest return height that clears the ground or is safe, or another change of parameters.
+
+    Return [] if the returns already keep all limits with the present parameters.
 
     Heights are tried one by one, because a higher return is not always safer: it may lead through a sphere.
     """
@@ -447,6 +451,9 @@ class _RallySearch:
 
     def find(self, searched_starts: NDArray[np.intp], point_set: list[int]) -> list[int]:
         """Find a set of candidates with as many good returns from the searched starts as possible.
+
+        The search adds the best candidate and swaps candidates, as long as this increases the number of good returns,
+        up to `_MAX_POINTS` candidates.
 
         point_set: initial set, as indices of candidates.
         """

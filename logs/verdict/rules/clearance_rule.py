@@ -140,7 +140,8 @@ def _home_above_ground_findings(requirements: RouteRequirements, leg_findings: l
     """Report a home above the ground as undecided if a leg would be too low with home on the ground.
 
     When an autopilot is armed, it sets home to its own position on the ground.  All heights above home are then lower
-    by the height of the mission's home above the ground.
+    by the height of the mission's home above the ground.  Return [] if no leg would be too low, or if the height of
+    home is unknown.
 
     leg_findings: findings on the legs with the mission's own home.
     """
@@ -280,17 +281,17 @@ def _first_airborne_segment(requirements: RouteRequirements, aligned: AlignedTra
     """Return the segment of the track from which the clearance of a leg is judged.
 
     It is normally the first segment of the leg.  In an imported log with a take-off, it is the segment at which the
-    climb-out from near home reaches `GROUND_LEG_CLEARANCE_M`.
+    climb-out reaches `GROUND_LEG_CLEARANCE_M`, provided that the aircraft stays near home up to there.
     """
     first, last = aligned.leg_segments(leg)
     home = _logged_takeoff_home(requirements)
     if home is None or leg > takeoff_item(requirements)[0]:
         return first
     is_airborne = aligned.clearance[first:last] >= GROUND_LEG_CLEARANCE_M
-    climbing = int(np.argmax(is_airborne)) if is_airborne.any() else 0
-    places = aligned.track.position[first : first + climbing, :2]
+    climb_rows = int(np.argmax(is_airborne)) if is_airborne.any() else 0
+    places = aligned.track.position[first : first + climb_rows, :2]
     is_near_home = np.hypot(places[:, 0] - home[0], places[:, 1] - home[1]) <= FIELD_RADIUS_M
-    return first + climbing if is_near_home.all() else first
+    return first + climb_rows if is_near_home.all() else first
 
 
 def _last_clear_waypoint(requirements: RouteRequirements, final_leg: int) -> int:

@@ -278,8 +278,12 @@ def _reachable_voltage_text(requirements: RouteRequirements, failsafe: BatteryFa
     """
     setup = requirements.setup
     if math.isfinite(failsafe.remaining_fraction):
-        left = 1.0 - energy_used / setup.battery
-        return f"{left:.0%} of the battery is left" if left < failsafe.remaining_fraction else ""
+        remaining_fraction = 1.0 - energy_used / setup.battery
+        return (
+            f"{remaining_fraction:.0%} of the battery is left"
+            if remaining_fraction < failsafe.remaining_fraction
+            else ""
+        )
     cells = 0 if setup.envelope.battery_guessed else round(setup.envelope.volts / NOMINAL_CELL_VOLTAGE_V)
     if not cells or failsafe.threshold / cells <= EMPTY_CELL_VOLTAGE_V + _VOLTAGE_ROUNDING_V:
         return ""

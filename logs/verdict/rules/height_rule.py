@@ -101,7 +101,10 @@ class _LegMaxima:
 
 
 def _max_heights(path: _Path, segments: NDArray[np.intp]) -> _LegMaxima | None:
-    """Return the maximum height above ground and the maximum altitude on segments; None without segments."""
+    """Return the maximum height above ground and the maximum altitude on segments; None without segments.
+
+    The height is NaN if the ground is unknown below all segments.
+    """
     if not segments.size:
         return None
     amsl = float(max(path.points[segments, 2].max(), path.points[segments + 1, 2].max()))

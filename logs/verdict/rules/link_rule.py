@@ -85,7 +85,7 @@ def judge_link(
         )
     path = whole_requirements.path
     planned = link_along_path(link, terrain, antenna, path.times, path.points)
-    track, judged = None, planned
+    track, judged_link = None, planned
     if not geometric:
         track = None if aligned is None else aligned.track if phases is None else phases.track
         if track is None:
@@ -93,22 +93,24 @@ def judge_link(
                 "link", FLIGHT, ok=None, reason="nothing was flown", planned=planned.longest_outage, unit="s"
             )
             return JudgedLink(unflown_finding)
-        judged = link_along_path(link, terrain, antenna, track.time, track.position)
+        judged_link = link_along_path(link, terrain, antenna, track.time, track.position)
     all_reactions = setup.autopilot.returns.after_link_loss(link.use)
     reactions = [reaction for reaction in all_reactions if reaction.action != "on"]
-    outages = _outages_until(judged.outages, _end_of_reactions(requirements, aligned if not geometric else None))
+    outages = _outages_until(judged_link.outages, _end_of_reactions(requirements, aligned if not geometric else None))
     is_noticed = any(outage.duration > reaction.delay for outage in outages for reaction in reactions)
     returns, reaction_text = None, ""
     if is_noticed:
         returns = _judge_reaction_returns(whole_requirements, track, outages, reactions, fly_again)
         reaction_text = _reaction_text(setup.autopilot.title, reactions, returns)
-    elif judged.outages and not reactions:
+    elif judged_link.outages and not reactions:
         setting_text = "".join(f" ({reaction.parameter} {reaction.value:g})" for reaction in all_reactions)
         reaction_text = f"; if the link is lost, {setup.autopilot.title} continues its mission{setting_text}"
-    leg = None if judged.worst < 0 else _worst_leg(requirements, aligned if not geometric else None, judged)
-    text = _link_text(judged, leg)
-    finding = _link_finding(link, (planned, judged), outages, reactions, (text, reaction_text), geometric=geometric)
-    return JudgedLink(finding, judged, antenna, leg, returns)
+    leg = None if judged_link.worst < 0 else _worst_leg(requirements, aligned if not geometric else None, judged_link)
+    text = _link_text(judged_link, leg)
+    finding = _link_finding(
+        link, (planned, judged_link), outages, reactions, (text, reaction_text), geometric=geometric
+    )
+    return JudgedLink(finding, judged_link, antenna, leg, returns)
 
 
 def _unknown_station_text(requirements: RouteRequirements, link: RadioLink) -> str:

@@ -128,11 +128,11 @@ def merge_loiter_findings(
                     merged[k] = finding if finding.ok is not None else None
                 rule_findings = [entry for entry in rule_findings if entry[1].ok is not None]
             if len(rule_findings) > 1:
-                worst_index, worst = min(rule_findings, key=lambda entry: worst_first_key(entry[1]))
+                worst_index, worst_finding = min(rule_findings, key=lambda entry: worst_first_key(entry[1]))
                 for k, _ in rule_findings:
                     merged[k] = None
-                reason = f"{worst.reason}; the worst of the circle's {len(rule_findings)} legs"
-                merged[worst_index] = replace(worst, reason=reason)
+                reason = f"{worst_finding.reason}; the worst of the circle's {len(rule_findings)} legs"
+                merged[worst_index] = replace(worst_finding, reason=reason)
     return tuple(finding for finding in merged if finding is not None)
 
 

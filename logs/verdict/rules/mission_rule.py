@@ -288,13 +288,13 @@ def _unsimulated_findings(setup: FlightSetup) -> Iterator[Finding]:
     settings = [(None, text) for text in texts]
     for seq, text in [*remarks, *settings]:
         # What can be done about it is not part of the headline.
-        brief, separator, rest = text.partition("; ")
+        brief, separator, explanation = text.partition("; ")
         yield make_finding(
             "mission",
             Place("mission", item=seq),
             ok=None,
             reason=text,
-            faults=[message(brief if seq is None else f"item {seq}: {brief}", separator + rest)],
+            faults=[message(brief if seq is None else f"item {seq}: {brief}", separator + explanation)],
             source="route",
             method="mission items",
             check=NOT_FLOWN,

@@ -56,8 +56,8 @@ def return_findings(
 ) -> list[Finding]:
     """Judge the destination of a planned RTL, and whether an imported flight completed its RTL.
 
-    Flights simulated by planfly are judged by `flown_return_findings`, because their track does not show how they
-    ended.
+    Flights simulated by planfly have no findings here: `flown_return_findings` judges them, because their track does
+    not show how they ended.
     """
     if geometric:
         required_findings = _requirement_findings(

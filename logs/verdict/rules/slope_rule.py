@@ -49,7 +49,10 @@ from world.wind import W20
 def slope_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge the slope of each leg; if ``geometric``, judge only the route, without a flight."""
+    """Judge the slope of each leg; if ``geometric``, judge only the route, without a flight.
+
+    Legs of a turn-around have no finding.
+    """
     findings, turnaround_legs = [], requirements.turnaround_legs()
     for leg in range(requirements.legs):
         if leg in turnaround_legs:
@@ -87,12 +90,12 @@ def _leg_finding(
     aircraft_facts = _aircraft_slope_facts(requirements, leg) if arc_faults or (faults and source == "aircraft") else []
     # A fault of the plan states the planned slope itself.
     facts = facts if faults or arc_faults else [f"slope {math.degrees(planned_slope):+.2f}°", *facts]
-    fit = measure.slope if measure is not None and ground is None else None
+    slope_fit = measure.slope if measure is not None and ground is None else None
     method = "route"
     if measure is not None:
         flown_faults, flown_facts = _flown_messages(requirements, leg, measure, limit)
         faults, facts = faults + flown_faults, facts + flown_facts
-        method = _fit_text(fit) if fit is not None else "not flown" if ground is None else "route"
+        method = _fit_text(slope_fit) if slope_fit is not None else "not flown" if ground is None else "route"
     # The arc at the leg's end may be steep only because the leg is.
     faults = faults + arc_faults
     uncertainty = "" if ground else _ability_text(requirements, leg, limit, source, has_failed=bool(faults))
@@ -103,7 +106,7 @@ def _leg_finding(
         facts.append("the leg was not flown to its end" if is_complete else "the flight did not reach its end")
         ok = False if faults else None
     # The plan decides if the leg fails by it, as the reason states.
-    deciding_fit = None if is_plan_steep else fit
+    deciding_fit = None if is_plan_steep else slope_fit
     return make_finding(
         "slope",
         requirements.leg(leg),
@@ -111,7 +114,7 @@ def _leg_finding(
         reason=finding_reason(faults, facts if measure is not None or not faults else ()),
         faults=faults,
         planned=math.degrees(planned_slope),
-        flown=None if fit is None else math.degrees(fit.value),
+        flown=None if slope_fit is None else math.degrees(slope_fit.value),
         limit=math.degrees(sign * limit),
         at_least=sign < 0.0,
         source=source,
@@ -215,8 +218,8 @@ def _steep_ground_message(requirements: RouteRequirements, leg: int, ground: _St
         f"leg {requirements.leg(leg).number} follows the ground up {math.degrees(ground.slope):.1f}°"
         f" for {_distance_text(ground.length)}"
     )
-    rest = f"; {limit_text}; the aircraft would fly up to {ground.excess:.0f} m too low over the ground"
-    return message(brief, rest, placed=True)
+    explanation = f"; {limit_text}; the aircraft would fly up to {ground.excess:.0f} m too low over the ground"
+    return message(brief, explanation, placed=True)
 
 
 def _uncertainty_text(requirements: RouteRequirements, leg: int) -> str:
@@ -461,15 +464,15 @@ def _flown_faults(
     faults = {}
     planned_slope = float(requirements.slopes[leg])
     sign = 1.0 if planned_slope >= 0.0 else -1.0
-    fit = measure.slope
-    if fit is not None:
-        flown_slope = math.degrees(fit.value)
-        if sign * fit.value > limit + fit.tolerance:
-            limit_deg, tolerance_deg = math.degrees(limit), math.degrees(fit.tolerance)
+    slope_fit = measure.slope
+    if slope_fit is not None:
+        flown_slope = math.degrees(slope_fit.value)
+        if sign * slope_fit.value > limit + slope_fit.tolerance:
+            limit_deg, tolerance_deg = math.degrees(limit), math.degrees(slope_fit.tolerance)
             limit_text = f"steeper than the limit of {limit_deg:.1f}° with its tolerance of {tolerance_deg:.1f}°"
             no_progress_text = _no_progress_text(requirements, leg) if limit == 0.0 else ""
             faults["slope"] = message(f"flown at {flown_slope:+.1f}°, {no_progress_text or limit_text}")
-        elif fit.is_fitted and abs(fit.value - planned_slope) > SLOPE_TOLERANCE_RAD + fit.tolerance:
+        elif slope_fit.is_fitted and abs(slope_fit.value - planned_slope) > SLOPE_TOLERANCE_RAD + slope_fit.tolerance:
             faults["slope"] = message(f"flown at {flown_slope:+.1f}° instead of {math.degrees(planned_slope):+.1f}°")
     if measure.height_error is not None and abs(measure.height_error) > _height_error_limit(measure):
         side = "above" if measure.height_error > 0.0 else "below"

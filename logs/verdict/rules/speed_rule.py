@@ -43,7 +43,10 @@ from world.wind import W20
 def speed_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Compare each leg's commanded airspeed with the envelope, and the flown airspeed with the command."""
+    """Compare each leg's commanded airspeed with the envelope, and the flown airspeed with the command.
+
+    If ``geometric``, findings on the autopilot's parameters come first.
+    """
     # The demanded route is computed at each access, which is too slow to repeat for each of thousands of legs.
     demanded_speeds = requirements.setup.demanded_route.leg_airspeeds
     findings = [

@@ -247,12 +247,12 @@ def _planned_finding(
     if ok is None:
         faults.append(_unknown_ground_message(requirements, unknown_fraction, length, name))
     if ok is False:
-        what, how = ("the turns at its ends leave", "straight")
+        cause, how = ("the turns at its ends leave", "straight")
         if off_altitude > turn_in:
-            what, how = ("the climb or descent before it leaves", "at its planned height above ground")
+            cause, how = ("the climb or descent before it leaves", "at its planned height above ground")
         faults.append(
             message(
-                f"{name}: {what} only {100.0 * straight_fraction:.0f} % of its {length:.0f} m {how}",
+                f"{name}: {cause} only {100.0 * straight_fraction:.0f} % of its {length:.0f} m {how}",
                 f" ({cut_in:.0f} m are lost at the start and {cut_out:.0f} m at the end)",
             )
         )

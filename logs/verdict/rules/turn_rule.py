@@ -234,7 +234,7 @@ def _flown_facts(requirements: RouteRequirements, i: int, measure: TurnMeasure) 
 
 
 def _measured_facts(measure: TurnMeasure | None) -> list[Fact]:
-    """Return the measurements of a flown turn as facts."""
+    """Return the measurements of a flown turn as facts; unknown values are left out, and None gives no facts."""
     if measure is None:
         return []
     bank = None if measure.held_bank is None else math.degrees(measure.held_bank)

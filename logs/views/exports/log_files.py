@@ -227,7 +227,7 @@ def _make_topics(log: FlightLog, rows: NDArray[np.int64]) -> list[_Topic]:
     stamp = np.rint(track.time[rows] * 1e6).astype(np.uint64)
     (east, north, up), (v_east, v_north, v_up) = track.position[rows].T, track.velocity[rows].T
     lat, lon = (np.asarray(values) for values in to_geo(origin, east, north))
-    ones, ground_altitude = np.ones(len(rows), dtype=bool), up[0] if len(rows) else 0.0
+    all_valid, ground_altitude = np.ones(len(rows), dtype=bool), up[0] if len(rows) else 0.0
     true_airspeed, height_above_ground = track.airspeed[rows].astype(np.float64), track.clearance[rows]
     calibrated_airspeed = true_airspeed * np.sqrt(np.maximum(1.0 - _DENSITY_LAPSE_PER_M * up, 0.0) ** _DENSITY_EXPONENT)
     wind, battery = track.wind[rows], _battery_values(log, rows)
@@ -262,12 +262,12 @@ def _make_topics(log: FlightLog, rows: NDArray[np.int64]) -> list[_Topic]:
             ref_lat=np.full(len(rows), origin.lat_deg),
             ref_lon=np.full(len(rows), origin.lon_deg),
             ref_timestamp=np.zeros(len(rows)),
-            xy_valid=ones,
-            z_valid=ones,
-            v_xy_valid=ones,
-            v_z_valid=ones,
-            xy_global=ones,
-            z_global=ones,
+            xy_valid=all_valid,
+            z_valid=all_valid,
+            v_xy_valid=all_valid,
+            v_z_valid=all_valid,
+            xy_global=all_valid,
+            z_global=all_valid,
             dist_bottom_valid=np.isfinite(height_above_ground),
         ),
         topic(
@@ -306,9 +306,9 @@ def _make_topics(log: FlightLog, rows: NDArray[np.int64]) -> list[_Topic]:
             "vehicle_status",
             _LONG_INTERVAL_S,
             [(name, "u1") for name in ("arming_state", "nav_state", "vehicle_type")],
-            arming_state=_ARMED * ones,
-            nav_state=_MISSION * ones,
-            vehicle_type=_FIXED_WING * ones,
+            arming_state=_ARMED * all_valid,
+            nav_state=_MISSION * all_valid,
+            vehicle_type=_FIXED_WING * all_valid,
         ),
     ]
     return [*topics, _mission_item_topic(log, rows)]

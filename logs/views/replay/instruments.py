@@ -60,12 +60,14 @@ class Instruments:
         log = self.log
         k = max(0, int(np.searchsorted(log.track.time, time, side="right")) - 1)
         size = _WIDE if columns >= _WIDE.columns else _NARROW
-        left, right = self._horizon_lines(k, size.horizon), self._readout_lines(k)
-        rows = max(len(left), len(right))
-        left += [" " * (size.horizon + 2)] * (rows - len(left))
-        right += [""] * (rows - len(right))
+        horizon_lines, readout_lines = self._horizon_lines(k, size.horizon), self._readout_lines(k)
+        rows = max(len(horizon_lines), len(readout_lines))
+        horizon_lines += [" " * (size.horizon + 2)] * (rows - len(horizon_lines))
+        readout_lines += [""] * (rows - len(readout_lines))
         lines = self._head_lines(k, columns)
-        lines += [f"{left_line}  {right_line}" for left_line, right_line in zip(left, right, strict=True)]
+        lines += [
+            f"{left_line}  {right_line}" for left_line, right_line in zip(horizon_lines, readout_lines, strict=True)
+        ]
         lines += [
             "",
             *self._control_lines(k, size.bar),

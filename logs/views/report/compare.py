@@ -256,7 +256,7 @@ def _wind_text(setup: FlightSetup) -> str:
 def difference_rows(comparison: Comparison) -> list[tuple[str, ...]]:
     """Return the table of differences as text.
 
-    A row has quantity, unit, both values, and the second value minus the first.
+    A row has quantity, unit, both values, and the second value minus the first.  The first row has both verdicts.
     """
     first_answer, second_answer = (verdict.answer for verdict in comparison.verdicts)
     rows: list[tuple[str, ...]] = [("verdict", "", first_answer, second_answer, "")]

@@ -277,7 +277,10 @@ def mission_notes(setup: FlightSetup) -> list[str]:
 
 
 def energy_facts(setup: FlightSetup, track: Track | None) -> Facts:
-    """Return facts on the energy drawn from the battery, except the amount that `flight_sentence` states."""
+    """Return facts on the energy drawn from the battery, except the amount that `flight_sentence` states.
+
+    Return [] without a track, or if its energy is unknown.
+    """
     if track is None or len(track) == 0:
         return []
     used_energy = float(track.energy[-1])
@@ -347,7 +350,10 @@ def passage_rows(setup: FlightSetup, track: Track | None) -> list[tuple[str, ...
 
 
 def saturation_rows(setup: FlightSetup, track: Track | None) -> list[tuple[str, ...]]:
-    """List each control with its limit, its largest command, and its time at the limit (s, %)."""
+    """List each control with its limit, its largest command, and its time at the limit (s, %).
+
+    Return [] for a track of fewer than two rows.  The cells of an unknown limit contain `NOTHING`.
+    """
     if track is None or len(track) < 2:
         return []
     durations = np.append(np.diff(track.time), 0.0)

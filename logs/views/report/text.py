@@ -81,7 +81,7 @@ def quantity(value: float | None, unit: str) -> str:
 
 
 def in_unit(value: float | None, unit: str) -> tuple[float | None, str]:
-    """Return a value and the name of its unit as shown, with radians as degrees."""
+    """Return a value and the name of its unit as shown, with radians as degrees; a value of None stays None."""
     if unit == "rad":
         return (None if value is None else math.degrees(value)), "°"
     return value, _UNITS.get(unit, unit)

@@ -404,13 +404,13 @@ def first_order_index(x: Floats, y: Floats) -> float:
     if count < MIN_FLIGHTS_FOR_INDEX or total <= 1e-12 * count or np.ptp(x) == 0.0:
         return 0.0
     parts = _split_into_groups(x, y)
-    between = sum(part.size * float(part.mean() - y.mean()) ** 2 for part in parts)
-    within = (total - between) / (count - len(parts))
-    return float(np.clip((between - (len(parts) - 1) * within) / total, 0.0, 1.0))
+    between_variance = sum(part.size * float(part.mean() - y.mean()) ** 2 for part in parts)
+    within_variance = (total - between_variance) / (count - len(parts))
+    return float(np.clip((between_variance - (len(parts) - 1) * within_variance) / total, 0.0, 1.0))
 
 
 def _split_into_groups(x: Floats, y: Floats) -> list[Floats]:
-    """Split y into groups of equal size by x."""
+    """Sort y by x, and split it into consecutive groups of equal size; return the groups."""
     groups = int(min(_MAX_GROUPS, max(4, round(2.0 * x.size ** (1.0 / 3.0)))))
     return np.array_split(y[np.argsort(x, kind="stable")], groups)
 

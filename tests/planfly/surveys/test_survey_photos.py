@@ -137,7 +137,7 @@ def test_higher_lines_are_tried_and_a_slow_camera_is_in_the_first_line(
     assert [(remedy.kind, remedy.value) for remedy in found] == [("height", 60.0)]
     length = found[0].length
     assert remedy_text(found[0], length) == (
-        "lines 60 m higher: flown, and all lines can be used; the path is as long as before"
+        "lines 60 m higher; all lines could be used in a trial flight, and the path is as long as before"
     )
     assert remedy_text(found[0], length + 100.0).endswith(f" km long instead of {length / 1000.0 + 0.1:.1f} km")
     assert slow_camera_text(slow).endswith("one every 1 s, or 39 m")
