@@ -304,11 +304,11 @@ class NamedFences:
             return mission
         warnings = mission.warnings
         if mission.fences and self.items:
-            own_fence = f"the mission's own fence of {count_text(len(mission.fences), 'item')}"
-            warnings = (*warnings, f"{own_fence} applies in addition to the named fence")
+            mission_fence_text = f"the mission's own fence of {count_text(len(mission.fences), 'item')}"
+            warnings = (*warnings, f"{mission_fence_text} applies in addition to the named fence")
         if mission.rally and self.rally:
-            own_count = count_text(len(mission.rally), "rally point")
-            warnings = (*warnings, f"the mission's own {own_count} may be used in addition to the named ones")
+            mission_rally_text = count_text(len(mission.rally), "rally point")
+            warnings = (*warnings, f"the mission's own {mission_rally_text} may be used in addition to the named ones")
         fences = number_items([*mission.fences, *self.items])
         rally = number_items([*mission.rally, *self.rally])
         return replace(mission, fences=fences, rally=rally, warnings=warnings)

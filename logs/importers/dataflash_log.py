@@ -297,7 +297,7 @@ class _Reader:
     def _airspeed(self) -> LogSeries | None:
         """Return the true airspeed, m/s, (n, 1); None if unknown.
 
-        It is converted from the equivalent airspeed that ArduPilot logs.
+        It is converted from the equivalent airspeed that ArduPilot logs: that of a sensor in use, or else that of CTUN.
         """
         sensor = self._messages("ARSP")
         airspeed = self._message_table("ARSP", ("Airspeed",))

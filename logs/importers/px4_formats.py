@@ -65,6 +65,8 @@ class MessageFormats:
     def _count(self, name: str, outer_names: frozenset[str]) -> int:
         """Return the number of fields of a format; 1 for a plain type.
 
+        The number is greater than `MAX_FIELDS` if the format has too many fields, or contains itself.
+
         outer_names: names of the formats in which the format is nested.
         """
         if name in _PLAIN or name not in self._formats:

@@ -352,7 +352,10 @@ def _title_lines(panel: Panel) -> list[str]:
 
 
 def _draw_marks(axes: Any, marks: Sequence[tuple[float, str]], *, has_leg_numbers: bool) -> None:
-    """Separate the legs by thin lines, and number them above the topmost panel if the numbers fit."""
+    """Separate the legs by thin lines, and number them above the topmost panel if the numbers fit.
+
+    marks: start of each leg on the x axis, and its text, such as "leg 3".
+    """
     for value, _ in marks[1:]:
         axes.axvline(value, color=theme.colour("rim"), linewidth=0.6, alpha=0.7, zorder=1)
     if not has_leg_numbers or not marks:

@@ -30,7 +30,8 @@ class _NamedPlan:
 def _named_plans(front: Front) -> list[_NamedPlan]:
     """Return the best plan in each objective.
 
-    A plan that is best in several objectives is named after the first of them.
+    A plan that is best in several objectives is named after the first of them.  An objective in which all plans are
+    equal names no plan, except the first objective, the length.
     """
     objectives = front.objectives()
     names = ("shortest", "least exposed", "highest above ground", f"least {front.fourth}")

@@ -246,7 +246,7 @@ def summarise_plans(plans: Sequence[SeededPlan]) -> list[TableRow]:
 
 
 def _table_row(group: list[SeededPlan]) -> TableRow:
-    """Summarise the plans of one problem and algorithm with all seeds."""
+    """Summarise the plans of one problem and algorithm with all seeds; lengths are None if no plan is safe."""
     lengths = [seeded_plan.objectives.length_ratio for seeded_plan in group if seeded_plan.safe]
     kills = _seed_values(group, lambda seeded_plan: seeded_plan.objectives.kill_exposure)
     return TableRow(

@@ -110,14 +110,14 @@ def autosave_text(
 
 
 def _steps_to_save(document: Document, history: History) -> list[tuple[Mission, str]]:
-    """Return the newest edits in effect, as many as are saved.
+    """Return the newest edits in effect, as many as are saved: each new mission with the text of its edit.
 
     Edits before the last saving of the document's file are left out, because the file contains their result.
     """
     steps = history.steps[: history.position]
-    saved = [k for k, (mission, _) in enumerate(history.steps) if mission is history.saved]
-    if document.path is not None and saved:
-        steps = steps[saved[-1] + 1 :] or steps[-1:]
+    saved_steps = [k for k, (mission, _) in enumerate(history.steps) if mission is history.saved]
+    if document.path is not None and saved_steps:
+        steps = steps[saved_steps[-1] + 1 :] or steps[-1:]
     item_counts = accumulate(len(mission.items) for mission, _ in reversed(steps))
     count = sum(total <= _MAX_SAVED_ITEMS for total in item_counts)
     return steps[-max(1, min(count, _MAX_SAVED_STEPS)) :]

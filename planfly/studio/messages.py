@@ -201,7 +201,8 @@ _ADAPTER: TypeAdapter[Message] = TypeAdapter(Annotated[Message, Field(discrimina
 def read_message(text: str | bytes) -> Message:
     """Parse a message from a page.
 
-    Raises ValueError for a message that is too long, and ValidationError, a ValueError, for an invalid message.
+    Raises ValueError for a message that is too long, and ValidationError, a ValueError, for an invalid message.  A
+    message that opens a file may have any length.
 
     >>> read_message('{"kind": "undo"}').kind
     'undo'

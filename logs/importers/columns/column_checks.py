@@ -273,7 +273,7 @@ def _velocity_triangle(log: ColumnLog, grid: Floats) -> _Triangle | None:
     """Return the wind triangle that fits ground velocity, heading and airspeed best, or None.
 
     The triangle is unknown without these quantities, and in a flight without turns, because only turns distinguish the
-    wind from an error of the airspeed.
+    wind from an error of the airspeed.  All velocities are complex numbers, as in `_Triangle`.
     """
     velocity = _ground_velocity(log, grid)
     if velocity is None or not log.has("airspeed", "yaw"):
@@ -281,12 +281,12 @@ def _velocity_triangle(log: ColumnLog, grid: Floats) -> _Triangle | None:
     direction = np.exp(1j * _mean_on_grid(log.series("yaw"), grid, wraps=True))
     if abs(direction.mean()) > _CLEAR_ALIGNMENT:
         return None
-    air = _mean_on_grid(log.series("airspeed"), grid) * direction
-    centred = air - air.mean()
-    if not centred.any():
+    air_velocity = _mean_on_grid(log.series("airspeed"), grid) * direction
+    air_deviation = air_velocity - air_velocity.mean()
+    if not air_deviation.any():
         return None
-    factor = float(np.real(np.vdot(centred, velocity)) / np.real(np.vdot(centred, centred)))
-    return _Triangle(velocity, factor, complex(velocity.mean() - factor * air.mean()))
+    factor = float(np.real(np.vdot(air_deviation, velocity)) / np.real(np.vdot(air_deviation, air_deviation)))
+    return _Triangle(velocity, factor, complex(velocity.mean() - factor * air_velocity.mean()))
 
 
 def _correlate(values: Floats, expected: Floats) -> float:

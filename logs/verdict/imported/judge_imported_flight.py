@@ -248,6 +248,8 @@ _UNNAMED_TEXT = "no aircraft was named: --aircraft names it"
 def judge_imported_flight(setup: FlightSetup, track: Track, *, log_complete: bool) -> Verdict:
     """Judge the stretches of an imported flight that followed its mission; the verdict has the level "flown".
 
+    Raises ValueError for a flight that was not imported.
+
     setup: flight setup with the source of the flight.
     log_complete: True if planfly's own log of the flight has its end.
     """

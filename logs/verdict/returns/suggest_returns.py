@@ -326,8 +326,10 @@ def _search_in_rounds(
 ) -> tuple[int, tuple[ReturnPoint, ...], NDArray[np.intp]]:
     """Search, simulate all starts, and repeat the search with the starts that remain unsafe.
 
+    A return is good if it keeps all limits.
+
     initial_count: number of first candidates that form the initial set.
-    Returns the number of good returns, the points, and the starts that remain unsafe.
+    Returns for the best round the number of good returns, the points, and the starts that remain unsafe.
     """
     best_result: tuple[int, tuple[ReturnPoint, ...], NDArray[np.intp]] = (-1, (), np.zeros(0, dtype=np.intp))
     for _ in range(_SEARCH_ROUNDS):
@@ -503,16 +505,20 @@ class _RallySearch:
         )
 
     def _count_good(self, searched_starts: NDArray[np.intp], point_set: list[int]) -> int:
-        """Return the number of good returns with these rally points, each to the point that the autopilot chooses."""
+        """Return the number of good returns with these rally points, each to the point that the autopilot chooses.
+
+        The autopilot chooses the nearest point.  It returns as without rally points if this point is too far away, or
+        farther than another destination.
+        """
         if not point_set:
             return int(self._is_good_from_home[searched_starts].sum())
         distances = self._distances[np.ix_(searched_starts, np.array(point_set))]
         nearest_indices = np.argmin(distances, axis=1)
         min_distances = distances[np.arange(len(searched_starts)), nearest_indices]
-        goes_home = min_distances > self._max_rally_distance
-        goes_home |= self._other_distances[searched_starts] <= min_distances
+        ignores_rally_points = min_distances > self._max_rally_distance
+        ignores_rally_points |= self._other_distances[searched_starts] <= min_distances
         is_good = np.where(
-            goes_home,
+            ignores_rally_points,
             self._is_good_from_home[searched_starts],
             self._is_good[searched_starts, np.array(point_set)[nearest_indices]],
         )

@@ -124,8 +124,8 @@ def _check_finding(check: str, remarks: list[_Remark], refuses: bool) -> Finding
 
     refuses: True if PX4 is to fly: items that it refuses then fail.
     """
-    verdict = False if refuses else None
-    sorted_remarks = [(verdict if ok == REFUSED else ok, item, reason) for ok, item, reason in remarks]
+    refusal_result = False if refuses else None
+    sorted_remarks = [(refusal_result if ok == REFUSED else ok, item, reason) for ok, item, reason in remarks]
     # A failure comes first, then PX4's refusals, then mere remarks.
     sorted_remarks.sort(key=lambda remark: {False: 0, None: 1, True: 2}[remark[0]])
     ok, item, reason = sorted_remarks[0] if sorted_remarks else (True, None, "no objections")

@@ -289,6 +289,8 @@ def without_path_following_findings(
 ) -> tuple[Finding, ...]:
     """Remove the findings on how well the RTL follows its drawn path.
 
+    If the finding on the RTL passes, also remove the unjudged findings on drawn legs that were not flown.
+
     findings: all findings, including the finding on the RTL itself.
     """
     first_leg = requirements.setup.route.rtl_start
@@ -313,8 +315,8 @@ def without_path_following_findings(
     ):
         return tuple(kept_findings)
     # Every part of the return is on some leg; a drawn leg without any part was not flown.
-    unflown = {requirements.leg(i) for i in legs if not aligned.has_flown(i)}
-    return tuple(finding for finding in kept_findings if finding.ok is not None or finding.place not in unflown)
+    unflown_places = {requirements.leg(i) for i in legs if not aligned.has_flown(i)}
+    return tuple(finding for finding in kept_findings if finding.ok is not None or finding.place not in unflown_places)
 
 
 def _suggest_end_loiter(

@@ -144,7 +144,12 @@ class Instruments:
         ]
 
     def _control_lines(self, k: int, bar_width: int) -> list[str]:
-        """Return one bar for each control, with its position (O) between its limits, and its command (|)."""
+        """Return one bar for each control, with its position (O) between its limits, and its command (|).
+
+        The bar of a control without a limit ends at 30°.
+
+        k: row of the track.  bar_width: number of characters.
+        """
         lines = []
         controls = self.log.track.controls[k].tolist()
         commands = self.log.track.commands[k].tolist()

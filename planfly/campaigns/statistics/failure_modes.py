@@ -263,7 +263,8 @@ def boundary_speed(modes: Sequence[FailureMode], draws: Floats, failing_fraction
 
     Returns `max_speed` if a smaller fraction is expected to fail at that wind.
 
-    draws: (m, d).
+    draws: the drawn quantities, (m, d).
+    failing_fraction: the fraction of the draws, 0 to 1.
     """
     mode_predictors = [
         (mode.link, make_regressors(WIND_ORIGIN_MPS, draws) @ mode.mean, float(mode.mean[1])) for mode in modes
