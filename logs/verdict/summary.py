@@ -365,9 +365,8 @@ def _airframe_or_autopilot_lines(
     parameters_note = "" if setup.autopilot.parameters is None else " with these parameters"
     # Other parameter values are always tried with the simulated control law, even if the autopilot's program flew.
     flew_program = setup.autopilot.program is not None
-    reason = (
-        "" if flew_program or not parameters_note else ": the flight fails with every parameter value that was tried"
-    )
+    no_value_text = ": no parameter value that was tried lets the flight pass with a margin for simulation errors"
+    reason = "" if flew_program or not parameters_note else no_value_text
     if deciding is not None:
         reason = f": {deciding_text(deciding)}{', by the simulated flight' if flew_program else ''}"
     return [f"The aircraft can fly this mission, but {setup.autopilot.title}{parameters_note} cannot{reason}"]

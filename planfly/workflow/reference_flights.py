@@ -47,7 +47,8 @@ def find_passing_parameter(
 
     Candidates for the kind of the failure, vertical or lateral, are tried first.  Pitch limits are tried before the
     other vertical candidates, and only if the flight reached them.  The farthest value of each candidate is flown
-    first; if it passes, bisection finds the nearest passing value.  The returned value was flown and passed.
+    first, and the value halfway if that fails; if one passes, bisection finds the nearest passing value.  The returned
+    value was flown and passed.
 
     >>> from flight.autopilots.arduplane.autopilot import ArduPlane
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
@@ -101,15 +102,17 @@ def _nearest_passing_value(
 ) -> float | None:
     """Return the passing value nearest to the current value, in steps to `farthest`.
 
-    Returns None if `farthest` fails.
+    The search begins at `farthest`; if this value fails, it begins halfway, because a parameter can also be changed too
+    much.  Returns None if both fail.
     """
     step_count = int(abs(farthest - current) / step + 1e-6)
     sign = 1.0 if farthest > current else -1.0
     values = [round(current + sign * k * step, 6) for k in range(1, step_count + 1)]
-    if not values or not passes(values[-1]):
-        return None
-    nearest_value = least_change(values[:-1], passes)
-    return values[-1] if nearest_value is None else nearest_value
+    for count in dict.fromkeys((step_count, step_count // 2)):
+        if count > 0 and passes(values[count - 1]):
+            nearest_value = least_change(values[: count - 1], passes)
+            return values[count - 1] if nearest_value is None else nearest_value
+    return None
 
 
 def _deviation_at_failure(failed_finding: Finding, findings: tuple[Finding, ...]) -> float | None:

@@ -31,6 +31,16 @@ def follows_ground(requirements: RouteRequirements, leg: int) -> bool:
     )
 
 
+def mean_ground_slope(requirements: RouteRequirements, leg: int) -> float:
+    """Return the mean slope of the ground under a leg that follows it, rad; NaN for another leg or unknown ground."""
+    terrain = requirements.setup.scenario.terrain
+    if terrain is None or not follows_ground(requirements, leg):
+        return math.nan
+    start, end = requirements.points[leg], requirements.points[leg + 1]
+    rise = float(terrain.height(end[0], end[1])) - float(terrain.height(start[0], start[1]))
+    return math.atan2(rise, math.hypot(end[0] - start[0], end[1] - start[1]))
+
+
 def demanded_altitudes(requirements: RouteRequirements, leg: int, positions: Floats) -> Floats:
     """Return the altitudes demanded at positions on a leg that follows the ground, m AMSL, (n,).
 

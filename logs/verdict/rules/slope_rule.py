@@ -20,7 +20,7 @@ from logs.verdict.findings import (
     message,
 )
 from logs.verdict.measures.acceptance import step_height
-from logs.verdict.measures.ground_following import follows_ground, steepest_ground
+from logs.verdict.measures.ground_following import follows_ground, mean_ground_slope, steepest_ground
 from logs.verdict.measures.route_requirements import RouteRequirements, SteepArc, slope_limit, steep_arc
 from logs.verdict.measures.slopes import LegFit, SlopeMeasure, measure_slope
 from logs.verdict.measures.track_alignment import AlignedTrack
@@ -158,13 +158,22 @@ def _planned_slope_messages(
 ) -> tuple[list[Message], list[str]]:
     """Return the faults and facts of a leg's planned slope.
 
-    If a leg that is too steep is only a negligible step in height, this is a fact, not a fault.
+    If a leg that is too steep is only a negligible step in height, this is a fact, not a fault.  The same holds for a
+    leg that follows ground which itself falls more steeply than the limit, unless the scenario sets the limit: the
+    aircraft is then only too high.
     """
     faults: list[Message] = []
     facts: list[str] = []
-    if abs(float(requirements.slopes[leg])) > limit + PLAN_TOLERANCE_RAD:
+    slope = float(requirements.slopes[leg])
+    if abs(slope) > limit + PLAN_TOLERANCE_RAD:
         step = step_height(requirements, leg)
-        if step is None:
+        ground_slope = mean_ground_slope(requirements, leg) if slope < 0.0 and source != "scenario" else math.nan
+        if ground_slope < -limit:
+            facts.append(
+                f"the ground falls at {math.degrees(-ground_slope):.1f}° on average, more steeply than the"
+                f" {math.degrees(limit):.1f}° that can be flown, so the aircraft gets too high, which is no failure"
+            )
+        elif step is None:
             faults.append(_steep_leg_message(requirements, leg, limit, source))
         else:
             facts.append(f"a step of {step:.1f} m, steeper than {math.degrees(limit):.1f}°, but negligible")

@@ -90,6 +90,14 @@ def test_the_nearest_value_that_passes_is_named(most: float, passing: float) -> 
     assert flights.count <= 5
 
 
+def test_a_parameter_whose_farthest_value_fails_is_tried_halfway() -> None:
+    """From 1.5 m/s in steps of 0.5: 6 m/s fails, 3.5 m/s passes, and so does 3 m/s."""
+    law = Px4(Px4Parameters.defaults("1.17")).with_parameters(FW_T_CLMB_R_SP=1.5)
+    found = find_passing_parameter(law, (LOW, HEIGHTS), lambda new: 2.9 < new.parameters["FW_T_CLMB_R_SP"] < 4.0)
+    assert found is not None
+    assert (found.name, found.current, found.passing) == ("FW_T_CLMB_R_SP", 1.5, 3.0)
+
+
 @pytest.mark.parametrize(
     ("law", "name", "values", "unit"),
     [

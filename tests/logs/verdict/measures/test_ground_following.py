@@ -92,6 +92,18 @@ def test_ground_that_is_too_steep_fails_the_leg_that_follows_it(step: float, ok:
         assert "the aircraft would fly up to 11 m too low over the ground" in item.reason
 
 
+@pytest.mark.parametrize(("start_height", "step", "ok"), [(100.0, -900.0, True), (1000.0, 0.0, False)])
+def test_a_steep_descent_fails_only_by_the_missions_own_heights(start_height: float, step: float, ok: bool) -> None:
+    """900 m in 3 km are 16.7 degrees, more than this aircraft descends: by falling ground, or onto level ground."""
+    setup = over_step(step)
+    points = setup.route.points["position"].copy()
+    points[:2, 2] = 400.0 + start_height
+    points[2:, 2] = 500.0 + step
+    finding = slope_of(replace(setup, route=setup.route.with_fields(position=points)))
+    assert (finding.ok, finding.planned) == (ok, pytest.approx(-16.7, abs=0.01))
+    assert ("the ground falls at 16.7° on average" in finding.reason) is ok
+
+
 @pytest.mark.parametrize(("share", "ok"), [(0.92, True), (0.87, False), (0.0, False)])
 def test_a_flight_decides_by_the_height_that_it_missed(share: float, ok: bool) -> None:
     """The straight line is 100 m below the demand where the step ends: 8 m of it are tolerated, 13 m are not."""
