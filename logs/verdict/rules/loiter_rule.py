@@ -182,8 +182,7 @@ def _loiter_finding(
     requirements: RouteRequirements, aligned: AlignedTrack | None, circle: LoiterCircle, corner_findings: list[Finding]
 ) -> Finding:
     """Judge one loiter by its radius and by the findings on its corners, which this finding replaces."""
-    corners = slice(circle.first, circle.last + 1)
-    is_known = bool(np.isfinite(requirements.turn_limit[corners]).all())
+    is_known = bool(np.isfinite(requirements.turn_limit[circle.first : circle.last + 1]).all())
     min_radius = _min_radius(requirements, circle) if is_known else math.nan
     corner_findings = [_unjudge_if_unreached_corner(aligned, finding) for finding in corner_findings]
     failed_corners = [finding for finding in corner_findings if finding.ok is False]
@@ -200,10 +199,7 @@ def _loiter_finding(
         # If the parameter makes the loiter too tight, the autopilot flies it wider, as at the end of a return.
         bank = _held_bank(requirements, circle, min_radius, corner_findings)
         if bank <= requirements.limits.max_bank + BANK_TOLERANCE_RAD + 1e-9:
-            facts.append(
-                f"flown wider, because {parameter_name} is less than the {min_radius:.0f} m that the bank limit"
-                " requires"
-            )
+            facts.append(f"flown wider, because the bank limit requires {min_radius:.0f} m, more than {parameter_name}")
             faults = []
             hazards_text = "" if aligned is not None else _hazards_text(requirements, circle, min_radius)
         else:

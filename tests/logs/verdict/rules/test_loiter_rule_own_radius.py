@@ -76,8 +76,8 @@ def test_in_open_country_a_circle_that_is_flown_wider_is_flyable() -> None:
     assert of(judge_geometry(loiter(TIME, OWN)), "loiter").margin is None
     (line,) = (line for line in verdict_lines(judge_geometry(loiter(TIME, OWN)), []) if line.startswith("  loiter"))
     assert "1 of 1 ok; waypoint 1 (item 2): " in line
-    assert "flown wider, because WP_LOITER_RAD is less than the " in line
-    assert line.endswith("flown wider")
+    assert "flown wider, because the bank limit requires " in line
+    assert line.endswith("more than WP_LOITER_RAD")
 
 
 def sphere(east: float, radius: float) -> dict[str, Any]:
