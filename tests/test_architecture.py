@@ -42,7 +42,6 @@ LONGER = {
     "logs/verdict/returns/glide_reach.py:_fill_altitudes_left": 78,
     "logs/verdict/rules/completion_rule.py:imported_completion_finding": 64,
     "logs/verdict/rules/climbout_approach_rule.py:approach_findings": 77,
-    "logs/verdict/rules/loiter_rule.py:_loiter_finding": 63,
     "logs/views/exports/log_files.py:_make_topics": 91,
     "logs/views/profile.py:profile_chart": 64,
     "planfly/api/drafting.py:new_scenario": 61,

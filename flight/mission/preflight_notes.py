@@ -110,9 +110,9 @@ def _note_misread_altitudes(mission: Mission, scenario: Scenario) -> Iterator[st
         if readings:
             numbers = [str(mission.items[reading.item_index].seq) for reading in readings]
             yield (
-                f"item{'s' if len(numbers) > 1 else ''} {', '.join(numbers)}: flown as {stated_as}:"
-                f" {_heights_text([reading.height for reading in readings])}; check the frame: read as {other}, they"
-                f" are {_heights_text([reading.other_height for reading in readings])}"
+                f"item{'s' if len(numbers) > 1 else ''} {', '.join(numbers)}: flown as {stated_as},"
+                f" {_heights_text([reading.height for reading in readings])}; read as {other}:"
+                f" {_heights_text([reading.other_height for reading in readings])}. Check the frame"
             )
 
 
@@ -140,14 +140,15 @@ def _note_rally_points(
         tolerance = RALLY_ALTITUDE_ERROR_M if rules.rally_height > 0.0 else 0.0
         if point.up <= ground - tolerance:
             yield (
-                f"{name} is {ground - point.up:.0f} m below the ground:"
-                f" {point.up:.0f} m AMSL, but the ground there is at {ground:.0f} m"
+                f"{name} is {ground - point.up:.0f} m below the ground"
+                f" ({point.up:.0f} m AMSL; the ground there is at {ground:.0f} m AMSL)"
             )
         distance = _distance_from_path(route.positions, (point.east, point.north))
         if 0.0 < rules.rally_limit < distance:
             limit = f"RALLY_LIMIT_KM {rules.rally_limit / 1000.0:g}"
             yield (
-                f"{name} is at least {distance / 1000.0:.1f} km from the mission, beyond {limit}: no RTL flies to it"
+                f"no RTL flies to {name}, because it is at least {distance / 1000.0:.1f} km from the mission,"
+                f" beyond {limit}"
             )
 
 
@@ -175,7 +176,7 @@ def _note_low_return(home_points: tuple[ReturnPoint, ...], scenario: Scenario, r
     ground_height = float(np.nanmax(ground, initial=-math.inf)) - home_points[0].up
     if ground_height >= rules.height:
         yield (
-            f"an RTL loiters {rules.height:.0f} m above home, but within {radius:.0f} m of home the ground rises to"
+            f"an RTL loiters {rules.height:.0f} m above home, but the ground within {radius:.0f} m of home rises to"
             f" {ground_height:.0f} m above home"
         )
 
@@ -190,12 +191,12 @@ def _note_autoland(
     """
     start_numbers = [item.seq for item in mission.items if item.command == Command.DO_LAND_START]
     if start_numbers and parameters.get("RTL_AUTOLAND") == 0.0:
-        yield f"item {start_numbers[0]}: DO_LAND_START with RTL_AUTOLAND 0: ArduPlane does not arm"
+        yield f"item {start_numbers[0]}: ArduPlane does not arm with DO_LAND_START and RTL_AUTOLAND 0"
     elif start_numbers and scenario.landing is None and "RTL_AUTOLAND" in assumed_parameters:
         value = assumed_parameters["RTL_AUTOLAND"]
         yield (
-            f"item {start_numbers[0]}: DO_LAND_START: RTL_AUTOLAND {value:g} is assumed, because ArduPlane does not arm"
-            " with its default 0"
+            f"item {start_numbers[0]}: RTL_AUTOLAND {value:g} is assumed for DO_LAND_START, because ArduPlane does not"
+            " arm with the default 0"
         )
 
 

@@ -175,12 +175,12 @@ def _aircraft_line(conditions: Conditions) -> str:
         f" ({_AIRSPEED_SOURCE_TEXTS[conditions.airspeed_source]})"
     )
     if not conditions.aircraft:
-        return f"Aircraft: not named, so none of its limits are judged (--aircraft names yours); {speed}"
+        return f"Aircraft: not named, so none of its limits are judged (name yours with --aircraft); {speed}"
     mass = "" if conditions.mass_kg is None else f", {conditions.mass_kg:.3g} kg"
     line = f"Aircraft: {conditions.aircraft}{mass}, {speed}"
     if conditions.aircraft_named:
         return line
-    return f"{line}; no aircraft was named, so this is the default (--aircraft names yours)"
+    return f"{line}; no aircraft was named, so this is the default (name yours with --aircraft)"
 
 
 def _world_line(conditions: Conditions) -> str:

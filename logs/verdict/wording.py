@@ -104,7 +104,7 @@ def change_text(change: Change) -> str:
     """Phrase one change as an instruction.
 
     >>> change_text(Change("length", Place("leg", 1), 300.0, 400.0, "m"))
-    'make leg 1 400 m long instead of 300 m'
+    'lengthen leg 1 from 300 m to 400 m'
     >>> change_text(Change("airspeed", Place("leg", 2), 36.0, 18.1, "m/s", most=31.5))
     'command an airspeed of 18.1 to 31.5 m/s on leg 2'
     >>> change_text(Change("north", Place("exclusion", 0, name="town"), None, 40.0, "m"))
@@ -123,7 +123,7 @@ def change_text(change: Change) -> str:
     place_name, requested_value = place_text_within(change.place), change.wanted
     match change.what:
         case "length":
-            return f"make {_length_text(change)}"
+            return f"lengthen {_length_text(change)}"
         case "terrain height":
             return _terrain_height_text((change,))
         case "rise":
@@ -196,7 +196,7 @@ def _other_change_text(change: Change) -> str:
             return "state the climb of the aircraft at full throttle: planfly aircraft --new ... --climb DEGREES"
         case "stated bank":
             return (
-                f"state the aircraft's bank limit, because its {change.current:.0f}° are a guess: planfly aircraft"
+                f"state the aircraft's bank limit, because its {change.current:.0f}° is a guess: planfly aircraft"
                 " --new ... --bank DEGREES"
             )
     return f"use a {change.what} {requested_value:.2f} times as large"
@@ -215,16 +215,16 @@ def _rise_text(change: Change) -> str:
     verb = "climb" if math.copysign(1.0, change.wanted) > 0.0 else "descend"
     if change.current is None:
         return f"{verb} {abs(change.wanted):.0f} m on {place_text(change.place)}"
-    return (
-        f"{verb} {abs(change.wanted):.0f} m on {place_text_within(change.place)} instead of {abs(change.current):.0f} m"
-    )
+    return f"{verb} {abs(change.wanted):.0f} m instead of {abs(change.current):.0f} m on {place_text(change.place)}"
 
 
 def _length_text(change: Change) -> str:
     """Name a leg, its new length, and its present length."""
     current = change.current or 0.0
-    comparison = " (now it is vertical)" if current < MIN_LEG_LENGTH_M else f" instead of {current:.0f} m"
-    return f"{place_text_within(change.place)} {change.wanted:.0f} m long{comparison}"
+    place_name = place_text_within(change.place)
+    if current < MIN_LEG_LENGTH_M:
+        return f"{place_name} to {change.wanted:.0f} m (it is vertical)"
+    return f"{place_name} from {current:.0f} m to {change.wanted:.0f} m"
 
 
 def _terrain_height_text(suggestion: Suggestion) -> str:
@@ -246,22 +246,22 @@ def suggestion_text(suggestion: Suggestion) -> str:
 
     >>> longer = [Change("length", Place("leg", k), 150.0, 260.0, "m") for k in (1, 2)]
     >>> suggestion_text(tuple(longer))
-    'make leg 1 260 m long instead of 150 m and leg 2 260 m long instead of 150 m'
+    'lengthen leg 1 from 150 m to 260 m and leg 2 from 150 m to 260 m'
     >>> moves = (ItemMove(3, 0.0, 412.0, 0.0),)
     >>> suggestion_text((Change("north", Place("exclusion", 0, name="town"), None, 40.0, "m", moves=moves),))
-    'with a move of 412 m, pass town 40 m further north (move item 3 by 412 m north)'
+    'pass town 40 m further north, with a move of 412 m (move item 3 by 412 m north)'
     """
     if all(change.what == "terrain height" for change in suggestion):
         text = _terrain_height_text(suggestion)
     elif all(change.what == "length" for change in suggestion):
-        text = "make " + " and ".join(map(_length_text, suggestion))
+        text = "lengthen " + " and ".join(map(_length_text, suggestion))
     else:
         text = " and ".join(map(change_text, suggestion))
     moves = [move for change in suggestion for move in change.moves]
     remaining = [finding for change in suggestion for finding in change.remaining]
     distance = max((math.hypot(move.east, move.north) for move in moves), default=0.0)
     if distance >= FAR_MOVE_DISTANCE_M:
-        text = f"with a move of {distance:.0f} m, {text}"
+        text = f"{text}, with a move of {distance:.0f} m"
     notes = [f"move {moves_text(moves)}"] if moves else []
     notes += [
         f"later in the flight {state}: {', '.join(texts)}"
@@ -357,7 +357,7 @@ def suggestions_text(suggestions: tuple[Suggestion, ...]) -> str:
 
     >>> slower = Change("airspeed", Place("leg", 1), 25.0, 20.5, "m/s")
     >>> suggestions_text(((Change("length", Place("leg", 1), 300.0, 400.0, "m"),), (slower,)))
-    'make leg 1 400 m long instead of 300 m, or fly leg 1 at 20.5 m/s instead of 25 m/s'
+    'lengthen leg 1 from 300 m to 400 m, or fly leg 1 at 20.5 m/s instead of 25 m/s'
     """
     return ", or ".join(map(suggestion_text, suggestions))
 

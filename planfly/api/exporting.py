@@ -202,7 +202,7 @@ def _with_plan_notes(source: _SourceContent, autopilot: str, fence: FencePaths) 
     if not (autopilot or source_autopilot):
         notes.append(
             f"{source.mission.source} names no autopilot: the .plan is for {TITLES[DEFAULT_AUTOPILOT]};"
-            " --autopilot or --params names another"
+            " name another with --autopilot or --params"
         )
     fence_files = [fence] if isinstance(fence, str | Path) else fence
     notes += [
@@ -401,7 +401,7 @@ def _cruise_speed(source: _SourceContent) -> tuple[float, str]:
     if source.airspeed is not None:
         return source.airspeed, f"from {source.aircraft}"
     aircraft = load_aircraft(FlightTable().aircraft)
-    return aircraft.airspeed, f"from the default aircraft {aircraft.name}; --aircraft names yours"
+    return aircraft.airspeed, f"from the default aircraft {aircraft.name}; name yours with --aircraft"
 
 
 def judging_parameters_text(

@@ -180,7 +180,7 @@ class ReturnsResult:
                 "--params names its parameter file"
             )
         if self.setup.scenario.terrain is None:
-            notes.append("no terrain was given: --terrain names an elevation file")
+            notes.append("no terrain was given; name an elevation file with --terrain")
         if self.setup.scenario.external:
             notes.append("the mission was given without a scenario: threats are unknown")
         if not self.returns.flown:

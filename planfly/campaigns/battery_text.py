@@ -21,11 +21,12 @@ def answer_line(result: BatteryResult) -> str:
     keeps_text = f"a reserve of {goal.reserve:.0%} {where_text} with probability {goal.probability:g}"
     lost_count = sum(math.isinf(row.return_energy) for row in result.rows)
     if math.isinf(result.capacity) and lost_count:
-        return f"no battery keeps {keeps_text}: in {lost_count} of {len(result.rows)} flights a return does not arrive"
+        flights_text = f"{lost_count} of {len(result.rows)} flights"
+        return f"no battery keeps {keeps_text}, because a return does not arrive in {flights_text}"
     if math.isinf(result.capacity):
         return (
-            f"no battery keeps {keeps_text}: with {goal.specific_energy:g} Wh/kg its own mass needs too much of the"
-            f" energy that it adds (the aircraft would weigh {result.mass * result.mass_factor:.3g} kg)"
+            f"no battery keeps {keeps_text}: with {goal.specific_energy:g} Wh/kg, carrying its mass takes too much of"
+            f" the energy that it adds (the aircraft would weigh {result.mass * result.mass_factor:.3g} kg)"
         )
     if math.isnan(result.capacity):
         return f"not judged: {_unknown_reason(result)}"
@@ -43,11 +44,11 @@ def _unknown_reason(result: BatteryResult) -> str:
     count, completed = len(result.rows), len(result.completed)
     endings = [row.ended for row in result.rows if row.ended != "completed"]
     if unknown := len(result.completed) - len(result.known):
-        return f"in {unknown} of {count} flights a return flies where the terrain is unknown, so its energy is unknown"
+        return f"in {unknown} of {count} flights a return leaves the known terrain, so its energy is unknown"
     if not endings:
         return "the aircraft's model states no power, so the energy is unknown"
     most_frequent = max(set(endings), key=endings.count)
-    return f"{count - completed} of {count} flights do not complete the mission, most of them: {most_frequent}"
+    return f"{count - completed} of {count} flights do not complete the mission; most frequent end: {most_frequent}"
 
 
 def battery_lines(result: BatteryResult) -> list[str]:
@@ -68,18 +69,19 @@ def battery_lines(result: BatteryResult) -> list[str]:
         largest = sorted(range(len(energies)), key=lambda leg: -float(energies[leg]))[:_MAX_LISTED]
         names = leg_names(result)
         parts = [f"{energies[leg]:.1f} Wh ({names[leg]})" for leg in largest]
-        lines.append(f"the mission uses {float(energies.sum()):.1f} Wh (median); most of it: {', '.join(parts)}")
+        lines.append(
+            f"the mission uses {float(energies.sum()):.1f} Wh (median); the largest parts are {', '.join(parts)}"
+        )
     blocked = sum(row.blocked_returns > 0 for row in result.completed)
     if result.base.mission.home is None:
         lines.append("the mission has no home, so no returns were simulated")
     elif blocked:
         lines.append(
-            f"in {blocked} of {total} flights some returns hit an obstacle before they arrive; these returns are left"
-            " out (planfly returns shows them)"
+            f"in {blocked} of {total} flights, returns that hit an obstacle are left out (planfly returns shows them)"
         )
     lines.append(
-        f"{total} of {len(result.rows)} flights complete the mission; a return starts every {result.goal.interval:g} s"
-        " and is simulated up to its loiter; the reserve has to cover loiter and landing"
+        f"{total} of {len(result.rows)} flights complete the mission; a return starts every {result.goal.interval:g} s."
+        " Returns are simulated up to their loiter; the reserve has to cover loiter and landing"
     )
     return [*lines, *return_law_lines(result.base.nominal_setup())]
 
@@ -124,15 +126,15 @@ def leg_rows(result: BatteryResult) -> list[tuple[str, str, str]]:
 def _own_battery_line(result: BatteryResult) -> str:
     """Compare the aircraft's own battery with the smallest battery."""
     if result.is_guessed:
-        return "the aircraft does not state its battery, so it is not compared: state battery_wh in the scenario"
+        return "the aircraft's battery is unknown, so it is not compared; state battery_wh in the scenario"
     if math.isnan(result.capacity):
-        return f"whether the aircraft's battery of {result.own_capacity:.0f} Wh is enough is not judged"
+        return f"it is not judged whether the aircraft's battery of {result.own_capacity:.0f} Wh is enough"
     unknown_text = "may be enough (more flights would decide)" if result.has_returns else "may not cover the returns"
     verdict = {True: "is enough", False: "is too small", None: unknown_text}
     low, high = result.own_probability
     return (
         f"the aircraft's battery of {result.own_capacity:.0f} Wh {verdict[result.is_enough]}: it keeps the reserve in"
-        f" {result.kept} of {len(result.rows)} flights (95 % interval of the probability: {low:.2f} to {high:.2f})"
+        f" {result.kept} of {len(result.rows)} flights (probability {low:.2f} to {high:.2f} at 95 % confidence)"
     )
 
 
@@ -142,13 +144,17 @@ def _mass_lines(result: BatteryResult) -> list[str]:
     If the goal states no energy per mass, the line says that all capacities have the same mass.
     """
     if result.goal.specific_energy is None:
-        return ["the same mass is assumed for every capacity (--specific-energy states the battery's energy per mass)"]
+        return [
+            "the aircraft's mass is assumed to be the same for every capacity; to change this, state --specific-energy"
+        ]
     if not math.isfinite(result.capacity):
         return []
     limit_text = (
-        f"; at least {MIN_MASS_FACTOR:g} times this mass is assumed" if result.mass_factor == MIN_MASS_FACTOR else ""
+        f"; the assumed mass is at least {MIN_MASS_FACTOR:g} times this mass"
+        if result.mass_factor == MIN_MASS_FACTOR
+        else ""
     )
     return [
-        f"with {result.goal.specific_energy:g} Wh/kg the aircraft then weighs {result.mass * result.mass_factor:.2f} kg"
-        f" (now {result.mass:.2f} kg{limit_text})"
+        f"with this battery of {result.goal.specific_energy:g} Wh/kg the aircraft weighs"
+        f" {result.mass * result.mass_factor:.2f} kg (now {result.mass:.2f} kg{limit_text})"
     ]

@@ -47,7 +47,7 @@ def _unknown_reason(result: GroundRiskResult) -> str:
     known = result.population.known_fraction
     shown = "over 99.9%" if known > 0.999 else f"{known:.1%}"
     return (
-        f"{result.population.source} has data for {shown} of the footprint's cells"
+        f"{result.population.source} has data for only {shown} of the footprint's cells"
         f" ({density_text(result.population)} there)"
     )
 
@@ -58,12 +58,13 @@ def risk_lines(result: GroundRiskResult) -> list[str]:
     lines = [
         f"flight geography: {result.half_width:.0f} m to either side of the path, up to {flown.height:.0f} m above"
         f" ground ({_share_text(result)} stay inside)",
-        f"contingency volume: flights and turns of returns reach {flown.contingency_width:.0f} m beyond the flight"
-        f" geography, and {flown.contingency_height:.0f} m above ground; Annex A requires {formula.width:.0f} m and"
-        f" {formula.height:.0f} m; returns on their way home reach {flown.return_distance:.0f} m beyond it",
+        f"contingency volume: flights and the turns of returns reach {flown.contingency_width:.0f} m beyond the flight"
+        f" geography and {flown.contingency_height:.0f} m above ground. Annex A requires {formula.width:.0f} m and"
+        f" {formula.height:.0f} m. Returns on their way home reach {flown.return_distance:.0f} m beyond the flight"
+        " geography",
         f"ground risk buffer: falls{' and glides' if result.goal.glide else ''} reach {flown.buffer_width:.0f} m"
-        f" beyond flights and returns; the 1:1 rule requires {result.one_to_one_buffer:.0f} m{_glide_text(result)}",
-        f"areas: operational volume {result.volume.area / 1e6:.2f} km², with its ground risk buffer"
+        f" beyond flights and returns. The 1:1 rule requires {result.one_to_one_buffer:.0f} m{_glide_text(result)}",
+        f"areas: operational volume {result.volume.area / 1e6:.2f} km², operational volume and ground risk buffer"
         f" {result.footprint.area / 1e6:.2f} km²",
     ]
     if result.population is not None:
@@ -83,7 +84,7 @@ def _glide_text(result: GroundRiskResult) -> str:
     """Return a text on the buffer by a glide, if it was requested."""
     if result.glide_buffer is None or result.glide_ratio is None:
         return ""
-    return f", {result.glide_buffer:.0f} m by a glide of {result.glide_ratio:.1f} : 1"
+    return f"; a glide of {result.glide_ratio:.1f} : 1 requires {result.glide_buffer:.0f} m"
 
 
 def _population_line(population: Population) -> str:
@@ -100,19 +101,19 @@ def _flight_lines(result: GroundRiskResult) -> list[str]:
     """Return the lines on the flights."""
     lines = []
     if result.lost:
-        lines.append(f"{result.lost} of {result.goal.flights} flights could not be simulated, and are left out")
+        lines.append(f"{result.lost} of {result.goal.flights} flights could not be simulated and are left out")
     endings = [row.ended for row in result.rows if row.ended != "completed"]
     if endings:
         most_frequent = max(set(endings), key=endings.count)
         lines.append(
-            f"{len(endings)} of {len(result.rows)} flights do not complete the mission, most of them: {most_frequent};"
-            " the volumes contain them up to their end"
+            f"{len(endings)} of {len(result.rows)} flights do not complete the mission; most frequent end:"
+            f" {most_frequent}. The volumes contain these flights up to their end"
         )
     ground_speed = max(row.ground_speed for row in result.rows)
     if ground_speed > result.speed:
         lines.append(
-            f"flights reach a ground speed of {ground_speed:.1f} m/s, above the highest speed of"
-            f" {result.speed:g} m/s in the formulas (--max-speed)"
+            f"flights reach a ground speed of {ground_speed:.1f} m/s, but the formulas use a highest speed of only"
+            f" {result.speed:g} m/s (--max-speed sets it)"
         )
     spread = result.base.dispersions.name
     setup = result.base.nominal_setup()

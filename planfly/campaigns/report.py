@@ -492,9 +492,9 @@ def _unsettled_lines(winds: WindsResult) -> list[str]:
     max_width = 2.0 * BOUNDARY_ACCURACY_MPS
     return [
         *lines,
-        f"{word}: {unsettled_count} of {directions_text} too few flights ({flights_text}): each requires at least"
-        f" {MIN_FLIGHTS_PER_DIRECTION}, and an interval of at most {max_width:g} m/s; with fewer flights, the interval"
-        " depends mostly on assumptions",
+        f"{word}: {unsettled_count} of {directions_text} too few flights ({flights_text}); each direction requires"
+        f" {MIN_FLIGHTS_PER_DIRECTION} flights and an interval of at most {max_width:g} m/s. With fewer flights,"
+        " the interval depends mostly on assumptions",
     ]
 
 
@@ -507,7 +507,7 @@ def _lost_lines(winds: WindsResult) -> list[str]:
         for number in winds.lost[:10]
     )
     return [
-        f"lost      {count_text(len(winds.lost), 'flight')} could not be flown, because their workers died; they count"
+        f"lost      {count_text(len(winds.lost), 'flight')} could not be flown, because their workers died, and count"
         f" as not flyable: {flight_texts}"
     ]
 
@@ -530,7 +530,7 @@ def _deciding_lines(winds: WindsResult) -> list[str]:
     if not directions_by_rule:
         return []
     texts = (f"{RULE_WORDS[rule].title} from {', '.join(texts)}" for rule, texts in directions_by_rule.items())
-    return [f"rule that fails most flights, up to the boundary: {'; '.join(texts)}"]
+    return [f"most frequent failure in winds up to the boundary: {'; '.join(texts)}"]
 
 
 def _lines_without_failures(winds: WindsResult) -> list[str]:
@@ -547,9 +547,8 @@ def _lines_without_failures(winds: WindsResult) -> list[str]:
     min_count = min(counts)
     probability_text = f"{lower_bound(Tally(min(counts), 0), confidence):.3g}"
     return [
-        f"no flight failed in {len(counts)} of {count_text(len(winds.boundaries), 'direction')}:"
-        f" {count_text(min_count, 'flight')} in {max_speed:g} m/s from each of them show P >= {probability_text}"
-        " by themselves"
+        f"in {len(counts)} of {count_text(len(winds.boundaries), 'direction')} no flight failed: in each, at least"
+        f" {count_text(min_count, 'flight')} in {max_speed:g} m/s show P >= {probability_text}"
     ]
 
 
@@ -577,8 +576,8 @@ def _failing_lines(winds: WindsResult) -> list[str]:
             continue
         speed, count, _ = direction.flights[0]
         lines.append(
-            f"wind from {direction.from_deg:g}°: {count} of {count_text(count, 'flight')} fail in {speed:.1f} m/s, the"
-            f" weakest wind flown; the boundary is below {speed:.1f} m/s, and is not judged"
+            f"wind from {direction.from_deg:g}°: all {count_text(count, 'flight')} in {speed:.1f} m/s, the weakest wind"
+            f" flown, fail; the boundary is below {speed:.1f} m/s and is not judged"
         )
     return lines
 
@@ -599,17 +598,17 @@ def _boundary_lines(winds: WindsResult) -> list[str]:
     if lowest.boundary >= CALM_MPS:
         best_text = ""
         if highest_text != lowest_text:
-            best_text = f", and up to {highest_text} from {highest.from_deg:g}° (the highest)"
+            best_text = f"; highest: {highest_text} from {highest.from_deg:g}°"
         return [
-            f"by the best estimate, flyable with P >= {target:g} in wind up to {lowest_text} from {lowest.from_deg:g}°"
-            f" (the lowest; {_interval_text(lowest.low, lowest.high, max_speed)} m/s at {percent}){best_text}"
+            f"by the best estimate, flyable with P >= {target:g} in wind up to {lowest_text} from the worst direction,"
+            f" {lowest.from_deg:g}° ({_interval_text(lowest.low, lowest.high, max_speed)} m/s at {percent}){best_text}"
         ]
     if highest.boundary < CALM_MPS:
         basis = "" if winds.fails_in_calm_air else "by the best estimate, "
         return [f"{basis}not flyable with P >= {target:g} even in calm air"]
     return [
-        f"by the best estimate, not flyable with P >= {target:g} in any wind from {lowest.from_deg:g}°,"
-        f" even a light one; flyable in wind up to {highest_text} from {highest.from_deg:g}°"
+        f"by the best estimate, not flyable with P >= {target:g} even in light wind from {lowest.from_deg:g}°;"
+        f" from {highest.from_deg:g}°, flyable in wind up to {highest_text}"
     ]
 
 
@@ -622,7 +621,7 @@ def wind_lines(winds: WindsResult) -> list[str]:
         answer_lines.reverse()
     flights_text = count_text(len(winds.flights), "flight")
     if winds.is_only_calm:
-        flights_text += "; no wind was tried, because no flight in calm air is flyable"
+        flights_text += " in calm air only, because none of them is flyable"
     elif any(winds.estimated):
         flights_text += f"; intervals at {percent}, from the flights in each direction"
     return [

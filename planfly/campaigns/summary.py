@@ -468,7 +468,7 @@ def campaign_lines(summary: CampaignSummary) -> list[str]:
         lost_text = ", ".join(map(str, summary.lost[:10]))
         lines.append(
             f"  lost    {count_text(len(summary.lost), 'flight')} could not be flown, because their"
-            f" workers died: {lost_text}"
+            f" workers died (numbers {lost_text})"
         )
     return lines + deciding_lines(summary)
 
@@ -484,9 +484,7 @@ def undecided_lines(summary: CampaignSummary) -> list[str]:
 
 def deciding_lines(summary: CampaignSummary) -> list[str]:
     """Return a line on the margin of each deciding rule and on what it depends on; [] if no margin is known."""
-    choice_text = (
-        "" if summary.by_rule else "no flight fails, and this margin is the smallest relative to its scatter; "
-    )
+    choice_text = "" if summary.by_rule else "no flight fails; this margin is the smallest relative to its scatter; "
     return [
         f"  decides {RULE_WORDS[entry.rule].title}: {choice_text}{_low_margin_text(summary, entry)};"
         f" {_drivers_text(entry)}"
@@ -500,7 +498,9 @@ def _low_margin_text(summary: CampaignSummary, entry: DecidingRule) -> str:
         return f"5 % of the flights have a margin below {quantity_text(entry.low_margin, entry.unit)}"
     failed_count = next(failures.flights for failures in summary.by_rule if failures.rule == entry.rule)
     flights_text = count_text(summary.estimate.tally.flown, "flight")
-    return f"{failed_count} of {flights_text} {'fails' if failed_count == 1 else 'fail'} it, by an unknown margin"
+    return (
+        f"{failed_count} of {flights_text} {'fails' if failed_count == 1 else 'fail'} this rule, by an unknown margin"
+    )
 
 
 def campaign_suite(name: str, summary: CampaignSummary) -> JunitSuite:
@@ -548,9 +548,9 @@ def _drivers_text(entry: DecidingRule) -> str:
     if not entry.sensitivities:
         return f"at least {MIN_FLIGHTS_FOR_INDEX} judged flights are needed to find what the margin depends on"
     if not entry.drivers:
-        return "no dispersed quantity significantly explains the margin"
-    return "of the margin's variance " + ", ".join(
-        f"{sensitivity.title} explains {100.0 * sensitivity.index:.0f} %"
+        return "none of the varied quantities has a significant effect on this margin"
+    return "causes of the margin's variance: " + ", ".join(
+        f"{sensitivity.title} ({100.0 * sensitivity.index:.0f} %)"
         for sensitivity in entry.drivers[:_MAX_NAMED_QUANTITIES]
     )
 
@@ -561,13 +561,15 @@ def _deciding_flights_lines(summary: CampaignSummary) -> list[str]:
         return []
     flights = summary.deciding_flights
     shares_text = (
-        "these shares of flyable and unjudged" if summary.estimate.tally.undecided else "this share of flyable"
+        "these fractions of flyable and unjudged" if summary.estimate.tally.undecided else "this fraction of flyable"
     )
     if flights is None:
-        return [f"  more than {MAX_DECIDING_FLIGHTS:,} flights with {shares_text} ones would be needed to decide it"]
+        return [
+            f"  to decide this, more than {MAX_DECIDING_FLIGHTS:,} flights would be needed, with {shares_text} flights"
+        ]
     if summary.estimate.tally.share == 1.0:
-        return [f"  a campaign of {flights:,} flights without a failure would decide it"]
-    return [f"  a campaign of about {flights:,} flights with {shares_text} ones would decide it"]
+        return [f"  {flights:,} flights without a failure would decide this"]
+    return [f"  about {flights:,} flights would decide this, with {shares_text} flights"]
 
 
 def _to_plain_number(value: float | None) -> float | None:

@@ -43,7 +43,7 @@ def _best_text(result: WindowResult) -> str:
     best = result.best
     if result.windows or best is None or not best.flyable:
         return ""
-    return f"; the best is {best.time:{TIME_FORMAT}} UTC with {best.flyable} of {len(best.rows)}"
+    return f"; the best is {best.time:{TIME_FORMAT}} UTC with {best.flyable} of {len(best.rows)} flights flyable"
 
 
 def unjudged_lines(result: WindowResult) -> list[str]:

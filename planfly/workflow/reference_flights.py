@@ -30,7 +30,7 @@ from planfly.workflow.trial_flight import AbortCheck, Trial, TrialAborted, max_e
 _VERTICAL_RULES = ("clearance", "height", "bounds", "slope", "energy", "stall", "speed")
 
 # Number of flights of a usual search for the deciding parameter.
-_MAX_PARAMETER_FLIGHTS = 10
+_MAX_PARAMETER_FLIGHTS = 20
 # Function that flies with an autopilot and returns True if the flight passes.
 PassesWithAutopilot = Callable[[Autopilot], bool]
 
@@ -43,7 +43,7 @@ def find_passing_parameter(
     Returns None if no parameter does.
 
     findings: findings of the flight that failed.
-    passes: function that flies with the given autopilot and returns True if the flight passes; called about ten times.
+    passes: function that flies with the given autopilot and returns True if the flight passes; called about 20 times.
 
     Candidates for the kind of the failure, vertical or lateral, are tried first.  Pitch limits are tried before the
     other vertical candidates, and only if the flight reached them.  The farthest value of each candidate is flown
@@ -160,7 +160,7 @@ def find_deciding_parameter(
     """Find an autopilot parameter that makes a failed flight pass at another value, or return None.
 
     verdict: verdict on the flight with the setup's own parameters.
-    should_abort: see `explain_verdict`.  This takes about ten flights with the simulated autopilot.  For
+    should_abort: see `explain_verdict`.  This takes up to about twenty flights with the simulated autopilot.  For
     the flight of an autopilot program, the result is None unless the simulated autopilot fails, too.
     """
     if setup.autopilot.parameters is None or verdict.flies:

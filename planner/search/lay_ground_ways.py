@@ -374,12 +374,12 @@ def _find_departure(site: _Site, launch: Launch) -> tuple[ClimbOut | None, str]:
     if not best_rejected.count:
         return (
             None,
-            f"no path launched {courses} is long enough to climb to the start,"
-            f" {start_altitude - home_altitude:.0f} m over home",
+            f"no departure {courses} is long enough to climb to the start,"
+            f" {start_altitude - home_altitude:.0f} m above home",
         )
     return (
         None,
-        f"none of {best_rejected.count} paths launched {courses} is clear; the best one: {best_rejected.problem}",
+        f"none of {best_rejected.count} departures {courses} is clear; the best departure: {best_rejected.problem}",
     )
 
 
@@ -456,15 +456,12 @@ def _find_launches(site: _Site, launch: Launch, takeoff_height: float, altitude:
             heights = climb_slope * distances
             required_heights = np.minimum(site.problem.certified.clearance, _CLIMB_CLEARANCE_FRACTION * heights)
             margins = (site.home[2] + heights - terrain_heights - required_heights)[distances > _LAUNCH_RUN_M]
-            direction = f"on {round(math.degrees(course)) % 360}°"
+            course_text = f"{round(math.degrees(course)) % 360}°"
             if not (margins >= 0.0).all():
                 worst_margin = float(np.nanmin(margins)) if not np.isnan(margins).all() else -math.inf
                 worst_index = int(np.argmin(np.where(np.isnan(margins), math.inf, margins)))
                 distance = float(distances[distances > _LAUNCH_RUN_M][worst_index])
-                reason = (
-                    f"the nearest, {direction}, is {-worst_margin:.0f} m too low above the ground "
-                    f"{distance:.0f} m from home"
-                )
+                reason = f"{course_text} ({-worst_margin:.0f} m too low above the ground {distance:.0f} m from home)"
                 best_rejected = max(best_rejected, (worst_margin, reason))
                 break
             east, north = math.sin(course), math.cos(course)
@@ -473,16 +470,16 @@ def _find_launches(site: _Site, launch: Launch, takeoff_height: float, altitude:
             home_altitude = float(site.home[2])
             obstacle = site.describe_obstacle([(*home, home_altitude), (*end, home_altitude + climb_slope * length)])
             if obstacle:
-                best_rejected = max(best_rejected, (-1e6, f"{direction} it is {obstacle}"))
+                best_rejected = max(best_rejected, (-1e6, f"{course_text} ({obstacle})"))
                 break
             takeoff_end = (home[0] + takeoff_distance * east, home[1] + takeoff_distance * north)
             launches.append(_Launch(course, takeoff_end, end, _drifted_ends(site, course, takeoff_height)))
     subject = "the launch course is" if launch.course is not None else f"none of {len(courses)} launch courses is"
-    negation = "" if launch.course is None else "not "
+    negation, best_text = ("", "; the best course is ") if launch.course is None else ("not ", ": course ")
     return (
         launches,
         f"{subject} {negation}clear of ground, missiles and zones at {SLOPE_FRACTION:.0%} of the "
-        f"steepest climb: {best_rejected[1]}",
+        f"steepest climb{best_text}{best_rejected[1]}",
     )
 
 
@@ -592,7 +589,9 @@ def _find_approach(site: _Site, strip: LandingStrip, final_model: FinalModel) ->
             continue
         go_around = _min_go_around_height(site, final)
         if go_around is None:
-            reason = f"no height would be sufficient for a go-around on {round(math.degrees(final.course)) % 360}°"
+            reason = (
+                f"no climb height is sufficient for a go-around on course {round(math.degrees(final.course)) % 360}°"
+            )
             continue
         return Descent(corners, final.final_waypoints, point, final.course, final.height / final.length, go_around), ""
     return None, reason
@@ -602,12 +601,11 @@ def _describe_strip_fault(terrain: Terrain, strip: LandingStrip, course: float) 
     """Describe why a strip's ground is unsuitable for landing; "" if it is suitable."""
     for direction, slope in zip(("along", "across"), strip_slopes(terrain, strip, course), strict=True):
         if math.isnan(slope):
-            return "the terrain of the strip is unknown towards its ends"
+            return "the terrain at the ends of the strip is unknown"
         if abs(slope) > STEEPEST_STRIP_SLOPE:
-            course_text = f"on a course of {round(math.degrees(course)) % 360}°"
             return (
-                f"the strip slopes by {abs(slope):.0%} {direction} it {course_text};"
-                f" at most {STEEPEST_STRIP_SLOPE:.0%} can be landed on"
+                f"the strip slopes by {abs(slope):.0%} {direction} its course of {round(math.degrees(course)) % 360}°;"
+                f" landings are planned on slopes of at most {STEEPEST_STRIP_SLOPE:.0%}"
             )
     return ""
 
@@ -633,7 +631,7 @@ def _find_finals(
         flown_slope = final_model.slope(height, length, tailwind, field_altitude)
         if flown_slope > max_slope:
             flown_deg, max_deg = math.degrees(math.atan(flown_slope)), math.degrees(math.atan(max_slope))
-            fault = f"the approach needs a glide of {flown_deg:.1f}°, and at most {max_deg:.1f}° can be flown there"
+            fault = f"the approach needs a glide of {flown_deg:.1f}°, but at most {max_deg:.1f}° can be flown there"
             best_rejected = max(best_rejected, (-1e6, fault))
             continue
         final = _Final(course, length, height, _line_up_points(site, point, course, length, height), point)
@@ -731,16 +729,16 @@ def _find_path_to_line_up(site: _Site, final: _Final) -> tuple[Floats | None, st
                 best_rejected.add(certificate)
             if best_rejected.count >= _MAX_CERTIFIED:
                 break
-    route_text = f"from the destination to the final on {round(math.degrees(final.course)) % 360}°"
+    route_text = f"from the destination to the final on course {round(math.degrees(final.course)) % 360}°"
     if not best_rejected.count:
         return (
             None,
             f"no path {route_text} is long enough for its turns and {end_altitude - final_altitude:.0f} m of descent",
         )
-    remedy = "a higher destination (height_m) or another strip may have one"
     return (
         None,
-        f"none of {best_rejected.count} paths {route_text} is clear: {remedy}; the best one: {best_rejected.problem}",
+        f"none of {best_rejected.count} paths {route_text} is clear; the best path: {best_rejected.problem}."
+        " Try a higher destination (height_m) or another strip",
     )
 
 

@@ -211,8 +211,8 @@ def _check_options(scenario: Scenario, airspeed: float) -> None:
     settings = scenario.planner
     if settings.population * 3 * settings.waypoints > MAX_POPULATION_VALUES:
         raise ScenarioError(
-            f"{scenario.name}: planner.population: {settings.population} of {settings.waypoints} waypoints: "
-            f"too large; allowed: population x 3 x waypoints up to {MAX_POPULATION_VALUES:,}",
+            f"{scenario.name}: planner.population: {settings.population} is too large for "
+            f"{settings.waypoints} waypoints; allowed: population x 3 x waypoints up to {MAX_POPULATION_VALUES:,}",
             file=scenario.name,
             field="planner.population",
         )

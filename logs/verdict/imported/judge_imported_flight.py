@@ -100,12 +100,14 @@ def _judged_lines(
         time_text += "" if stretch.mode else " (the log contains no modes)"
         legs = by_start.get(stretch.start)
         if legs is None:
-            lines.append(f"Judged: nothing of {time_text}: it did not pass two waypoints in order")
+            lines.append(f"Not judged: {time_text}, because this part did not pass two waypoints in order")
             continue
         first, last = leg_numbers[legs.first], leg_numbers[legs.last - 1]
         partial_text = f", leg {last} in part" if legs.partial else ""
         start_time = float(legs.aligned.track.time[0])
-        lines.append(f"Judged: {time_text}, legs {first} to {last}{partial_text}, which begin at {start_time:.1f} s")
+        lines.append(
+            f"Judged: {time_text}, legs {first} to {last}{partial_text}; leg {first} begins at {start_time:.1f} s"
+        )
     return lines
 
 
@@ -130,10 +132,10 @@ def heights_text(imported_log: ImportedLog) -> str:
 
     >>> from flight.simulation.setup import HeightOffset, Heights
     >>> heights_text(ImportedLog("a.BIN", "", "", heights=Heights("POS", "amsl", (HeightOffset("GPS.Alt", -0.1),))))
-    'from POS, above mean sea level, according to the log; difference at the start: GPS.Alt -0.1 m'
+    'from POS, above mean sea level, according to the log; other heights differ at the start: GPS.Alt by -0.1 m'
     """
-    offsets = ", ".join(f"{height.name} {height.offset:+.1f} m" for height in imported_log.heights.offsets)
-    offset_text = f"; difference at the start: {offsets}" if offsets else ""
+    offsets = ", ".join(f"{height.name} by {height.offset:+.1f} m" for height in imported_log.heights.offsets)
+    offset_text = f"; other heights differ at the start: {offsets}" if offsets else ""
     return f"from {imported_log.heights.source}, {_DATUM_TEXTS[imported_log.heights.datum]}{offset_text}"
 
 
@@ -168,11 +170,11 @@ def missing_text(missing: MissingItems) -> str:
     """Describe which part of a mission is not judged, and which items the log lacks.
 
     >>> missing_text(MissingItems(tuple(range(7, 14)), total=14, first=1, last=6, end=13))
-    'not judged beyond item 6: items 7 to 13 of 14 are not in the log or ignored'
+    'not judged beyond item 6: items 7 to 13 of 14 are ignored or not in the log'
     >>> missing_text(MissingItems((1, 5), total=0, first=2, last=4, end=9))
-    'not judged before item 2 and beyond item 4: items 1 and 5 are not in the log or ignored'
+    'not judged before item 2 and beyond item 4: items 1 and 5 are ignored or not in the log'
     >>> missing_text(MissingItems((1, 2, 3), total=4, first=0, last=0, end=3))
-    'not judged: items 1 to 3 of 4 are not in the log or ignored'
+    'not judged: items 1 to 3 of 4 are ignored or not in the log'
     """
     ranges: list[list[int]] = []
     for number in missing.numbers:
@@ -193,7 +195,7 @@ def missing_text(missing: MissingItems) -> str:
     total_text = f" of {missing.total}" if missing.total else ""
     items_text = (
         f"{('items' if is_several else 'item')} {numbers_text}{total_text} "
-        f"{('are' if is_several else 'is')} not in the log or ignored"
+        f"{('are' if is_several else 'is')} ignored or not in the log"
     )
     return f"not judged{' ' if unjudged_text else ''}{unjudged_text}: {items_text}"
 
@@ -202,7 +204,7 @@ def damage_text(damage: Damage) -> str:
     """Describe the parts of a file that could not be read; return "nothing" for an undamaged file.
 
     >>> damage_text(Damage(places=2, size=40, cut=True))
-    '2 places in the file (40 bytes) cannot be read; it ends within a message'
+    '2 places in the file (40 bytes) cannot be read; the file ends within a message'
     """
     texts = []
     if damage.places:
@@ -212,9 +214,9 @@ def damage_text(damage: Damage) -> str:
         )
     if damage.unreadable:
         verb = "contains" if damage.unreadable == 1 else "contain"
-        texts.append(f"{count_text(damage.unreadable, 'message')} {verb} nothing that can be used")
+        texts.append(f"{count_text(damage.unreadable, 'message')} {verb} no usable data")
     if damage.cut:
-        texts.append("it ends within a message")
+        texts.append("the file ends within a message")
     return "; ".join(texts) or "nothing"
 
 
@@ -238,11 +240,11 @@ _QUANTITY_LABELS: dict[DataKind, str] = {
 # Track columns of quantities.
 _TRACK_COLUMNS: dict[DataKind, str] = {"airspeed": "airspeed", "attitude": "attitude", "battery": "energy"}
 _DATUM_REASONS = {
-    "ellipsoid": "the log's heights are above the ellipsoid, the plan's above mean sea level",
+    "ellipsoid": "the log's heights are above the ellipsoid, but the plan's heights are above mean sea level",
     "pressure": "the log's heights are pressure altitudes, above the 1013.25 hPa level",
-    "unstated": "the log does not state the datum of its heights: --datum names it",
+    "unstated": "the log does not state the datum of its heights; name it with --datum",
 }
-_UNNAMED_TEXT = "no aircraft was named: --aircraft names it"
+_UNNAMED_TEXT = "no aircraft was named; name it with --aircraft"
 
 
 def judge_imported_flight(setup: FlightSetup, track: Track, *, log_complete: bool) -> Verdict:
@@ -320,7 +322,7 @@ def _pauses_text(flown_stretches: Sequence[FlownLegs]) -> str:
         return ""
     start, end = max(pauses, key=lambda pause: pause[1] - pause[0])
     others_text = f", and in {count_text(len(pauses) - 1, 'more pause')}" if len(pauses) > 1 else ""
-    return f"not judged from {start:.1f} s to {end:.1f} s{others_text}: the log has no rows"
+    return f"not judged from {start:.1f} s to {end:.1f} s{others_text}, because the log has no rows there"
 
 
 def _stretch_times(legs: FlownLegs) -> tuple[float, float]:

@@ -131,7 +131,7 @@ def _below_home_findings(requirements: RouteRequirements) -> list[Finding]:
     lowest_waypoint = requirements.waypoint(k)
     brief = f"waypoint {lowest_waypoint.number} is {float(depths[k]):.0f} m below home ({home.alt:.0f} m AMSL)"
     fault = message(
-        brief, ", and no terrain data confirms that the ground there is so low (--terrain names an elevation file)"
+        brief, "; no terrain data confirms that the ground there is so low. Name an elevation file with --terrain"
     )
     return [make_finding("clearance", lowest_waypoint, ok=None, reason=fault.text, faults=[fault], check=GROUND_PATH)]
 
@@ -156,8 +156,8 @@ def _home_above_ground_findings(requirements: RouteRequirements, leg_findings: l
     )
     brief = f"the mission's home is {height:.0f} m above the ground there"
     explanation = (
-        f": if the aircraft is armed on that ground, the whole flight is lower by this height, and only"
-        f" {min_height:.0f} m above ground at its lowest point"
+        f"; if the aircraft is armed on that ground, the whole flight is {height:.0f} m lower. Its lowest point is then"
+        f" {min_height:.0f} m above ground"
     )
     fault = message(brief, explanation)
     return [make_finding("clearance", FLIGHT, ok=None, reason=fault.text, faults=[fault], check=GROUND_PATH)]
@@ -319,7 +319,7 @@ def _terrain_error_text(clearance: float, limit: float, error: float | None) -> 
     shortfall_text = (
         f", less than the {limit:.0f} m required" if limit - CLEARANCE_TOLERANCE_M > clearance - error else ""
     )
-    return f"; {clearance - error:.1f} m after subtracting the terrain's stated error of {error:g} m{shortfall_text}"
+    return f"; {clearance - error:.1f} m if the terrain's stated error of {error:g} m is subtracted{shortfall_text}"
 
 
 def _planned_finding(

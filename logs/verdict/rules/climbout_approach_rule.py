@@ -87,7 +87,7 @@ class _Obstacles(NamedTuple):
             return message(f"{subject} enters {self.entered_hazard}")
         return message(
             f"{subject} hits the ground",
-            f": {self.distance:.0f} m {origin} it is {-self.clearance:.0f} m below the surface{condition}",
+            f" {self.distance:.0f} m {origin}, where it is {-self.clearance:.0f} m below the surface{condition}",
         )
 
 
@@ -359,8 +359,8 @@ def _climb_text(climb: _Climb, launch: _Launch, item_text: str, end_height: floa
     # The take-off holds its course until it has reached its height.
     if climb.length > launch.leg_length:
         text += (
-            f"; the climb passes {item_text}, {launch.leg_length:.0f} m from home, and ends {end_height:.0f} m above"
-            f" home after {climb.length:.0f} m"
+            f"; the climb ends {end_height:.0f} m above home after {climb.length:.0f} m, beyond {item_text}, which is"
+            f" {launch.leg_length:.0f} m from home"
         )
     return text
 
@@ -481,7 +481,7 @@ def approach_findings(
     if clearance < GLIDE_PATH_TOLERANCE_M:
         fault = message(
             f"{subject} clears the ground by only {clearance:.1f} m",
-            f", and may be flown {GLIDE_PATH_TOLERANCE_M:.0f} m lower than planned",
+            f"; the flight may be {GLIDE_PATH_TOLERANCE_M:.0f} m lower than planned",
         )
         return [_path_finding("approach", place, obstacles, None, fault, GROUND_PATH)]
     reason = f"glides down at {math.degrees(math.atan(glide.slope)):.1f}°"

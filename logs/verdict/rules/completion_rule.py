@@ -112,21 +112,21 @@ def imported_completion_finding(setup: FlightSetup, stretches: Sequence[FlownLeg
         )
         # The flight may have included legs that the log does not contain.
         if missing_items is not None and followed_stretches:
-            unknown_texts.append(f"none of the legs in the log was flown: {_missing_items_text(missing_items)}")
+            unknown_texts.append(f"none of the legs in the log was flown; {_missing_items_text(missing_items)}")
         else:
             faults.append(message(reason))
     elif last_leg in flown_legs and missing_items is not None and missing_items.beyond:
         unknown_texts.append(
-            f"{finished_count} of {count_text(leg_count, 'leg')} in the log flown, the last one to"
-            f" its end; {_missing_items_text(missing_items)}"
+            f"{finished_count} of {count_text(leg_count, 'leg')} in the log flown, including"
+            f" the last leg; {_missing_items_text(missing_items)}"
         )
     elif last_leg in flown_legs:
-        last_leg_text = f"{finished_count} of {count_text(leg_count, 'leg')} flown, the last one to its end"
+        last_leg_text = f"{finished_count} of {count_text(leg_count, 'leg')} flown, including the last leg"
         unflown_legs, doubt_texts = _unflown_legs(setup, stretches, flown_legs)
         if unflown_legs:
             unflown_text = f"{_legs_text(setup, unflown_legs)} not flown along the mission"
-            faults.append(message(unflown_text, f": {last_leg_text}"))
-        unknown_texts += [f"{'; '.join(doubt_texts)}: {last_leg_text}"] if doubt_texts else []
+            faults.append(message(unflown_text, f"; {last_leg_text}"))
+        unknown_texts += [f"{'; '.join(doubt_texts)}; {last_leg_text}"] if doubt_texts else []
         notes += [] if unflown_legs or doubt_texts else [last_leg_text]
     else:
         last_stretch = stretches[-1]
@@ -135,9 +135,9 @@ def imported_completion_finding(setup: FlightSetup, stretches: Sequence[FlownLeg
         if _ends_in_return(setup, last_stretch):
             notes.append(f"{legs_text}, and the return at the mission's end began at {last_stretch.stretch.end:.1f} s")
         elif last_stretch.stretch.ended == "log":
-            unknown_texts.append(f"{ending}: {legs_text}")
+            unknown_texts.append(f"{ending}; {legs_text}")
         else:
-            faults.append(message(ending, f": {legs_text}"))
+            faults.append(message(ending, f"; {legs_text}"))
     unknown_texts += [
         f"the path to item {stop.item} is not judged, because it is not laid out" for stop in setup.route.unjoined_stops
     ]
@@ -173,10 +173,10 @@ def _unflown_legs(
         if leg not in unseen_legs
         and any(stretch_legs.partial and stretch_legs.last - 1 == leg for stretch_legs in flown_stretches)
     ]
-    doubt_texts = [f"the log begins in flight, and {_legs_text(setup, unseen_legs)} not in it"] if unseen_legs else []
-    doubt_texts += (
-        [f"{_legs_text(setup, partly_flown_legs)} flown along the mission in part"] if partly_flown_legs else []
-    )
+    doubt_texts = []
+    if unseen_legs:
+        doubt_texts.append(f"the log begins in flight, and {_legs_text(setup, unseen_legs)} not recorded")
+    doubt_texts += [f"{_legs_text(setup, partly_flown_legs)} flown only in part"] if partly_flown_legs else []
     return [leg for leg in unflown_legs if leg not in unseen_legs and leg not in partly_flown_legs], doubt_texts
 
 
@@ -188,8 +188,8 @@ def _gap_notes(flown_stretches: Sequence[FlownLegs]) -> list[str]:
     longest_gap = max(gaps, key=lambda gap: gap.end - gap.start)
     gap_time = sum(gap.end - gap.start for gap in gaps)
     return [
-        f"the log has {len(gaps)} gaps of {gap_time:.1f} s in all,"
-        f" the longest from {longest_gap.start:.1f} s to {longest_gap.end:.1f} s"
+        f"the log has {count_text(len(gaps), 'gap')} with a total of {gap_time:.1f} s;"
+        f" the longest is from {longest_gap.start:.1f} s to {longest_gap.end:.1f} s"
     ]
 
 

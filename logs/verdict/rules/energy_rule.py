@@ -127,7 +127,7 @@ def _energy_limit(requirements: RouteRequirements) -> tuple[float, str, str]:
     first = min(failsafes, key=lambda failsafe: failsafe.used_charge)
     charge = max(0.0, first.used_charge)
     energy = charge / _MAH_PER_AH * volts
-    clause = f"; {first.parameter} {first.threshold:g} leaves the mission after {energy:.1f} Wh ({charge:.0f} mAh)"
+    clause = f"; the failsafe {first.parameter} {first.threshold:g} acts after {energy:.1f} Wh ({charge:.0f} mAh)"
     return energy, "autopilot", clause
 
 
@@ -136,7 +136,7 @@ def _max_energy_text(max_energy: float, source: str) -> str:
 
     source: source of the aircraft's power.
     """
-    return f"; at most {max_energy:.1f} Wh with 95 % probability, because the power is from {source}"
+    return f"; at most {max_energy:.1f} Wh with 95 % probability, because the power is uncertain (from {source})"
 
 
 def _endless_jump_faults(requirements: RouteRequirements, usable_energy: float, energy_ratio: float) -> list[Message]:
@@ -167,7 +167,7 @@ def _endless_jump_faults(requirements: RouteRequirements, usable_energy: float, 
     if repeats < 0:
         return [message(f"{fault}, but the energy does not last for one round")]
     rounds_text = count_text(repeats + 1, "round")
-    return [message(f"{fault}, but the energy lasts for only {rounds_text}: set its count to {repeats}")]
+    return [message(f"{fault}, but the energy lasts for only {rounds_text}. Set the count of the jump to {repeats}")]
 
 
 def _energy_without_jump(requirements: RouteRequirements) -> float:
@@ -229,19 +229,19 @@ def _judge_battery_failsafes(requirements: RouteRequirements, energy_used: float
         name = f"{failsafe.parameter} {failsafe.threshold:g}"
         if math.isnan(failsafe.used_charge):
             if voltage_text := _reachable_voltage_text(requirements, failsafe, energy_used):
-                messages.undecided.append(message(f"{name} may leave the mission", f": {voltage_text}"))
+                messages.undecided.append(message(f"the failsafe {name} may end the mission", f": {voltage_text}"))
             else:
                 unjudged.append(name)
         elif charge_used > failsafe.used_charge:
-            limit_text = f"leaves the mission after {max(0.0, failsafe.used_charge):.0f} mAh"
+            limit_text = f"the failsafe {name} acts after {max(0.0, failsafe.used_charge):.0f} mAh"
             if failsafe.shares_charge:
-                share_text = f", of {charge_used:.0f} mAh from several monitored batteries"
-                messages.undecided.append(message(f"{name} {limit_text}{share_text}"))
+                share_text = f" from one battery; the flight needs {charge_used:.0f} mAh from several batteries"
+                messages.undecided.append(message(f"{limit_text}{share_text}"))
             else:
-                messages.faults.append(message(f"{name} {limit_text}, but the flight needs {charge_used:.0f} mAh"))
+                messages.faults.append(message(f"{limit_text}, but the flight needs {charge_used:.0f} mAh"))
     if return_time_fault := _return_time_fault(requirements, energy_used):
         messages.undecided.append(return_time_fault)
-    clause = f"; not judged: whether the battery reaches {' or '.join(unjudged)}, which leaves the mission"
+    clause = f"; the voltage is not simulated, so it is not judged whether {' or '.join(unjudged)} ends the mission"
     return messages._replace(unjudged_text=clause if unjudged else "")
 
 
@@ -261,13 +261,14 @@ def _return_time_fault(requirements: RouteRequirements, energy_used: float) -> M
     if remaining > needed:
         return None
     if math.isnan(remaining) or math.isinf(return_time):
-        reason = "how long the battery or a return lasts is not known"
+        reason = "the time left in the battery, or the duration of a return, is unknown"
     else:
         reason = (
-            f"at the mission's end the battery lasts for {max(0.0, remaining) / 60.0:.1f} min by PX4's estimate, and"
-            f" a return of up to {return_time / 60.0:.1f} min needs {needed / 60.0:.1f} min"
+            f"at the mission's end PX4 estimates {max(0.0, remaining) / 60.0:.1f} min of battery, but requires"
+            f" {needed / 60.0:.1f} min for a return of up to {return_time / 60.0:.1f} min"
         )
-    return message(f"{failsafe.parameter} may return before the mission ends", f": {reason}; {failsafe.remedy}")
+    brief = f"the failsafe {failsafe.parameter} may start a return before the mission ends"
+    return message(brief, f": {reason}; {failsafe.remedy}")
 
 
 def _reachable_voltage_text(requirements: RouteRequirements, failsafe: BatteryFailsafe, energy_used: float) -> str:
@@ -288,7 +289,7 @@ def _reachable_voltage_text(requirements: RouteRequirements, failsafe: BatteryFa
     if not cells or failsafe.threshold / cells <= EMPTY_CELL_VOLTAGE_V + _VOLTAGE_ROUNDING_V:
         return ""
     cell_text = f"{failsafe.threshold / cells:.2f} V in each of {cells} cells ({setup.envelope.volts:g} V)"
-    return f"{cell_text}, above the {EMPTY_CELL_VOLTAGE_V:g} V of an empty cell, and the voltage is not simulated"
+    return f"{cell_text}, more than the {EMPTY_CELL_VOLTAGE_V:g} V of an empty cell; the voltage is not simulated"
 
 
 def _used_text(requirements: RouteRequirements, energy_used: float, max_current: float, *, is_empty: bool) -> str:
@@ -300,8 +301,8 @@ def _used_text(requirements: RouteRequirements, energy_used: float, max_current:
     if envelope.power_level.size and not envelope.volts:
         fraction = energy_used / capacity
         return (
-            f"{energy_used:.0f} Wh of {capacity:.0f} Wh of fuel heat used, {fraction:.1%} of the fuel"
-            f"{': the tank is empty' if is_empty else ''}; no battery, so no current"
+            f"{fraction:.1%} of the fuel used ({energy_used:.0f} Wh of {capacity:.0f} Wh of heat)"
+            f"{': the tank is empty' if is_empty else ''}; without a battery, no current is judged"
         )
     current_text = f", peak current {max_current:.1f} A" if math.isfinite(max_current) else ""
     capacity_text = quantity_text(capacity, "Wh")

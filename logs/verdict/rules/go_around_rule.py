@@ -56,7 +56,7 @@ _MAX_HEIGHT_M = 1000.0
 _ABORT_SPACING_M = 50.0
 # Maximum number of simulated abort points.
 _MAX_ABORT_POINTS = 12
-_NO_HEIGHT_TEXT = f"no climb up to {_MAX_HEIGHT_M:.0f} m above home would be sufficient"
+_NO_HEIGHT_TEXT = f"No climb up to {_MAX_HEIGHT_M:.0f} m above home is sufficient"
 # Pitch of the climb if the mission has no take-off, rad (`Plane::do_land`, ArduPlane/commands_logic.cpp).
 _CLIMB_PITCH_RAD = math.radians(10.0)
 
@@ -267,7 +267,7 @@ def _go_around_finding(
     """Simulate go-arounds from several positions on the glide, and judge the worst; it fails only if required."""
     setup, place, height = requirements.setup, requirements.waypoint(landing.waypoint), landing.climb_height
     climb_text = (
-        f"the aircraft climbs to {height:.0f} m above home, which is"
+        f"the aircraft climbs to {height:.0f} m above home,"
         f" {landing.home_altitude + height - landing.ground_altitude:.0f} m above the landing point"
     )
     # A go-around flies to no rally point.
@@ -296,13 +296,12 @@ def _go_around_finding(
     else:
         sufficient_height = _next_sufficient_height(requirements, terrain, world, landing, worst.abort_distance)
         remedy_text = (
-            f"a climb to {sufficient_height:.0f} m above home would be sufficient"
-            f" (parameter 1 of item {landing.item.seq})"
+            f"A climb to {sufficient_height:.0f} m above home is sufficient: set parameter 1 of item"
+            f" {landing.item.seq} to this height"
         )
         fault = message(
             _brief_outcome(worst),
-            f": {climb_text}, and {_outcome_text(worst)};"
-            f" {remedy_text if sufficient_height > 0.0 else _NO_HEIGHT_TEXT}",
+            f": {_outcome_text(worst)} ({climb_text}). {remedy_text if sufficient_height > 0.0 else _NO_HEIGHT_TEXT}",
         )
     ok = worst.is_clear or (False if is_required else None)
     return make_finding(
@@ -436,7 +435,7 @@ def _judge_go_around(
             f"the ground by {min_climb_height:.0f} m"
         )
         go_around = go_around._replace(
-            unknown_part_text=f"{passing_text}, and may be flown {GO_AROUND_MODEL_ERROR_M:.0f} m lower"
+            unknown_part_text=f"{passing_text}; the flight may be {GO_AROUND_MODEL_ERROR_M:.0f} m lower"
         )
     required = _required_heights(terrain, destination, 0.5 * (positions[:-1] + positions[1:]))[climb_end:]
     return_heights = np.where(np.isnan(heights[climb_end:]), math.inf, heights[climb_end:])
@@ -518,8 +517,8 @@ def _brief_outcome(worst: _GoAround) -> str:
 def _outcome_text(worst: _GoAround) -> str:
     """Describe the abort and the outcome of the worst go-around."""
     abort_text = (
-        f"after an abort {worst.abort_distance:.0f} m before the landing point,"
-        f" {worst.abort_height:.0f} m above ground,"
+        f"after an abort {worst.abort_height:.0f} m above ground,"
+        f" {worst.abort_distance:.0f} m before the landing point,"
     )
     turn_text = " is already above this height, turns at once and" if worst.turns_at_once else ""
     if not math.isnan(worst.impact_time):

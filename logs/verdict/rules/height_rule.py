@@ -141,7 +141,7 @@ def _leg_finding(
         ceiling = requirements.setup.scenario.ceiling
         height_text = f"{judged_maximum.height:.1f} m above ground {judged_maximum.time_and_place}"
         if judged_maximum.height > limit + HEIGHT_TOLERANCE_M:
-            faults.append(message(height_text, f"; {limit:g} m are allowed"))
+            faults.append(message(height_text, f"; at most {limit:g} m are allowed"))
         elif math.isfinite(judged_maximum.height):
             facts.append(f"{height_text} at the highest")
         if judged_maximum.amsl > ceiling + HEIGHT_TOLERANCE_M:

@@ -53,22 +53,21 @@ def _launch_finding(requirements: RouteRequirements, ground: FlownGround, take_o
         faults.append(message(gentle_launch_text(take_off.acceleration, trigger), ": the motor never starts"))
     top_altitude = float(position[:, 2].max())
     if top_altitude <= take_off.end_altitude:
-        brief = f"the take-off ended {top_altitude - take_off.home_altitude:.0f} m above home"
-        faults.append(message(brief, f"; it must reach {take_off.end_altitude - take_off.home_altitude:.0f} m"))
+        brief = f"the take-off climbed to only {top_altitude - take_off.home_altitude:.0f} m above home"
+        faults.append(message(brief, f"; it must climb to {take_off.end_altitude - take_off.home_altitude:.0f} m"))
     if height_lost > MAX_LAUNCH_HEIGHT_LOSS_M:
         faults.append(
-            message(f"sinks {height_lost:.1f} m after the launch", f"; {MAX_LAUNCH_HEIGHT_LOSS_M:g} m are allowed")
+            message(
+                f"sinks {height_lost:.1f} m after the launch", f"; at most {MAX_LAUNCH_HEIGHT_LOSS_M:g} m are allowed"
+            )
         )
     runway_left = _remaining_runway(requirements, take_off, position)
     if runway_left < RUNWAY_MARGIN_M:
         brief = f"leaves the ground {take_off.launch.effective_length - runway_left:.0f} m from home"
-        runway_text = (
-            f"; the runway is {take_off.launch.effective_length:.0f} m long,"
-            f" of which {RUNWAY_MARGIN_M:.0f} m must be left"
-        )
+        runway_text = f"; {RUNWAY_MARGIN_M:.0f} m of the {take_off.launch.effective_length:.0f} m runway must be left"
         faults.append(message(brief, runway_text))
     if clearance < LAUNCH_CLEARANCE_M:
-        place_text = f" {distance:.0f} m from home, on the course flown; {LAUNCH_CLEARANCE_M:g} m are required"
+        place_text = f" {distance:.0f} m from home on the flown course; {LAUNCH_CLEARANCE_M:g} m are required"
         side = "above" if clearance >= 0.0 else "below"
         faults.append(message(f"{abs(clearance):.1f} m {side} ground", place_text))
     entered_hazard = first_hazard_on_path(requirements, path)
@@ -79,7 +78,8 @@ def _launch_finding(requirements: RouteRequirements, ground: FlownGround, take_o
     if not faults and LAUNCH_CLEARANCE_M <= clearance < LAUNCH_CLEARANCE_M + CLIMB_MODEL_ERROR_M:
         brief = f"the launch passes {clearance:.1f} m above ground {distance:.0f} m from home"
         error_text = (
-            f"; {LAUNCH_CLEARANCE_M:g} m are required, and the simulated climb may be {CLIMB_MODEL_ERROR_M:g} m off"
+            f"; {LAUNCH_CLEARANCE_M:g} m are required, and the simulated climb may be"
+            f" {CLIMB_MODEL_ERROR_M:g} m too high"
         )
         undecided_messages.append(message(brief, error_text))
     elif not faults and math.isnan(clearance):

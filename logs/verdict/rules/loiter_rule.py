@@ -182,8 +182,7 @@ def _loiter_finding(
     requirements: RouteRequirements, aligned: AlignedTrack | None, circle: LoiterCircle, corner_findings: list[Finding]
 ) -> Finding:
     """Judge one loiter by its radius and by the findings on its corners, which this finding replaces."""
-    corners = slice(circle.first, circle.last + 1)
-    is_known = bool(np.isfinite(requirements.turn_limit[corners]).all())
+    is_known = bool(np.isfinite(requirements.turn_limit[circle.first : circle.last + 1]).all())
     min_radius = _min_radius(requirements, circle) if is_known else math.nan
     corner_findings = [_unjudge_if_unreached_corner(aligned, finding) for finding in corner_findings]
     failed_corners = [finding for finding in corner_findings if finding.ok is False]

@@ -60,7 +60,9 @@ def takeoff_findings(
     imported_log = requirements.setup.imported_log
     if imported_log is not None and not imported_log.aircraft_known:
         return [
-            _unjudged_finding("takeoff", requirements.waypoint(waypoint), "no aircraft was named: --aircraft names it")
+            _unjudged_finding(
+                "takeoff", requirements.waypoint(waypoint), "no aircraft was named; name it with --aircraft"
+            )
         ]
     # The flight starts over home, and climbs to the take-off item's own waypoint.
     return [_slope_finding(requirements, "takeoff", 0, waypoint, route.takeoff_ground, altitude)]

@@ -246,12 +246,13 @@ def _detect_faults(approach: Approach, landing: _Landing) -> list[Message]:
     if abs(touchdown[0]) > allowed_distance:
         direction = "before" if touchdown[0] < 0.0 else "beyond"
         brief = f"touches down {abs(touchdown[0]):.0f} m {direction} the strip's center"
-        faults.append(message(brief, f"; {max(0.0, half_length - TOUCHDOWN_ERROR_M):.0f} m are allowed on this strip"))
+        allowed_distance = max(0.0, half_length - TOUCHDOWN_ERROR_M)
+        faults.append(message(brief, f"; {allowed_distance:.0f} m before or beyond it are allowed"))
     if stop[0] > allowed_distance:
         brief = f"comes to rest {half_length - stop[0]:.0f} m before the strip's end"
         if stop[0] > half_length:
             brief = f"runs {stop[0] - half_length:.0f} m beyond the strip's end"
-        faults.append(message(brief, f"; {TOUCHDOWN_ERROR_M:.0f} m of the strip must be left"))
+        faults.append(message(brief, f"; {TOUCHDOWN_ERROR_M:.0f} m must be left"))
     width_text = f"; the strip is {2.0 * half_width:.0f} m wide"
     for verb, offset in (("touches down", abs(touchdown[1])), ("comes to rest", abs(stop[1]))):
         if offset > half_width:
@@ -268,8 +269,7 @@ def _short_strip_messages(approach: Approach) -> list[Message]:
     return [
         message(
             brief,
-            f"; the touchdown point is known only within {TOUCHDOWN_ERROR_M:.0f} m either way, which "
-            "requires a longer strip",
+            f"; the touchdown point is uncertain by ±{TOUCHDOWN_ERROR_M:.0f} m, so a longer strip is required",
         )
     ]
 
@@ -281,14 +281,14 @@ def _undecided_messages(approach: Approach, landing: _Landing, *, has_gusts: boo
     if has_gusts and strip_left < GUST_TOUCHDOWN_ERROR_M and not messages:
         brief = f"touches down or comes to rest {strip_left:.0f} m before the strip's end"
         messages.append(
-            message(brief, f"; in turbulence the touchdown point is known only within {GUST_TOUCHDOWN_ERROR_M:.0f} m")
+            message(brief, f"; in turbulence the touchdown point is uncertain by ±{GUST_TOUCHDOWN_ERROR_M:.0f} m")
         )
     if landing.point_height > LANDING_POINT_ERROR_M:
         brief = f"the landing point of {_landing_point_text(approach)} is {landing.point_height:.0f} m above the ground"
         messages.append(message(brief, ": the aircraft flares too early and drops"))
     if landing.final_clearance < FINAL_APPROACH_CLEARANCE_M:
         brief = f"the final approach clears the ground by only {landing.final_clearance:.1f} m"
-        messages.append(message(brief, f", and may be flown {FINAL_APPROACH_CLEARANCE_M:.0f} m lower than simulated"))
+        messages.append(message(brief, f"; the flight may be {FINAL_APPROACH_CLEARANCE_M:.0f} m lower than simulated"))
     if landing.ground_sink > MAX_TOUCHDOWN_SINK_MPS:
         brief = f"sinks at {landing.ground_sink:.1f} m/s towards the ground at touchdown"
         messages.append(

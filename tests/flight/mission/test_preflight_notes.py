@@ -136,7 +136,7 @@ def _home(east: float, north: float) -> str:
 def test_a_rally_point_in_the_ground(alt: float, told: bool) -> None:
     found = notes(*WAY, rally(300, 300, alt))
     assert bool(found) is told
-    assert all(one.startswith("rally point 1 is 0 m below the ground: 100 m AMSL") for one in found)
+    assert all(one.startswith("rally point 1 is 0 m below the ground (100 m AMSL") for one in found)
 
 
 @pytest.mark.parametrize(("alt", "depth"), [(-9.0, None), (-11.0, 11), (-50.0, 50)])
@@ -144,7 +144,7 @@ def test_a_rally_point_in_the_ground_is_named_though_the_return_ends_above_it(al
     """PX4 descends to RTL_DESCEND_ALT over a rally point: with 60 m, a point 50 m below the ground looks flyable."""
     found = notes(*WAY, rally(300, 300, alt), rules=ReturnRules(rally_height=60.0))
     expected = [
-        f"rally point 1 is {depth} m below the ground: {100 + alt:.0f} m AMSL, but the ground there is at 100 m"
+        f"rally point 1 is {depth} m below the ground ({100 + alt:.0f} m AMSL; the ground there is at 100 m AMSL)"
     ]
     assert found == ([] if depth is None else expected)
 
@@ -153,7 +153,7 @@ def test_a_rally_point_in_the_ground_is_named_though_the_return_ends_above_it(al
 def test_a_rally_point_that_no_return_flies_to(east: float, told: bool) -> None:
     found = notes(*WAY, rally(east, 1000, 100), rules=ReturnRules(rally_limit=5000.0))
     assert bool(found) is told
-    assert all("at least 5.0 km from the mission, beyond RALLY_LIMIT_KM 5: no RTL flies to it" in one for one in found)
+    assert all("because it is at least 5.0 km from the mission, beyond RALLY_LIMIT_KM 5" in one for one in found)
     # Without a limit none is too far.
     assert notes(*WAY, rally(east, 1000, 100), rules=ReturnRules(rally_limit=0.0)) == []
 
@@ -175,7 +175,7 @@ def test_a_return_below_the_hills_about_home(north: float, top: float, told: boo
     found = notes(*WAY, rules=ReturnRules(height=80.0), ground=hill(north, top))
     assert bool(found) is told
     assert all(
-        one.startswith("an RTL loiters 80 m above home, but within 260 m of home the ground rises to 8")
+        one.startswith("an RTL loiters 80 m above home, but the ground within 260 m of home rises to 8")
         for one in found
     )
 
@@ -185,14 +185,14 @@ def test_a_landing_sequence_that_does_not_arm(value: float | None, told: bool) -
     way = (*WAY[:2], "2 189 0 0 0 0 0 0 0", *WAY[2:])
     stated = {} if value is None else {"RTL_AUTOLAND": value}
     found = notes(*way, parameters=stated)
-    assert found == (["item 3: DO_LAND_START with RTL_AUTOLAND 0: ArduPlane does not arm"] if told else [])
+    assert found == (["item 3: ArduPlane does not arm with DO_LAND_START and RTL_AUTOLAND 0"] if told else [])
     # Without a landing sequence it does.
     assert notes(*WAY, parameters={"RTL_AUTOLAND": 0.0}) == []
 
 
 def test_a_setting_that_is_assumed_for_a_landing_sequence_is_told() -> None:
     way = (*WAY[:2], "2 189 0 0 0 0 0 0 0", *WAY[2:])
-    text = "item 3: DO_LAND_START: RTL_AUTOLAND 1 is assumed, because ArduPlane does not arm with its default 0"
+    text = "item 3: RTL_AUTOLAND 1 is assumed for DO_LAND_START, because ArduPlane does not arm with the default 0"
     assert notes(*way, assumed={"RTL_AUTOLAND": 1.0}) == [text]
     # planfly writes the parameters of a scenario with a landing.
     strip = LandingStrip(2500.0, 2000.0)
@@ -210,8 +210,8 @@ def test_an_item_that_states_its_height_above_home_as_amsl_is_named() -> None:
     """The ground is at 100 m AMSL and home is on it: 80 m AMSL are 20 m below the ground, 180 m AMSL 80 m above it."""
     (note,) = notes(TAKE_OFF, wp(0, 2000, 80), wp(1500, 2000, 80, frame=0), LAND)
     assert note == (
-        "item 3: flown as altitudes above mean sea level (frame 0): 20 m below ground;"
-        " check the frame: read as heights above home (frame 3), they are 80 m above ground"
+        "item 3: flown as altitudes above mean sea level (frame 0), 20 m below ground;"
+        " read as heights above home (frame 3): 80 m above ground. Check the frame"
     )
     # Above the ground in its own frame, and below the ground in both: nothing is said.
     assert notes(TAKE_OFF, wp(0, 2000, 80), wp(1500, 2000, 180, frame=0), LAND) == []
@@ -223,12 +223,12 @@ def test_a_mission_that_states_amsl_as_heights_above_home_is_named() -> None:
     raised = (wp(0, 0, 160, command=22), wp(0, 2000, 180), wp(1500, 2000, 180), wp(2500, 2000, 100, command=21))
     (note,) = notes(*raised)
     assert note == (
-        "items 1, 2, 3, 4: flown as heights above home (frame 3): 100 to 180 m above ground;"
-        " check the frame: read as altitudes above mean sea level (frame 0), they are 0 to 80 m above ground"
+        "items 1, 2, 3, 4: flown as heights above home (frame 3), 100 to 180 m above ground;"
+        " read as altitudes above mean sea level (frame 0): 0 to 80 m above ground. Check the frame"
     )
     # One item that is higher than the others by home's altitude, and one that is 1 m short of it.
     (note,) = notes(TAKE_OFF, wp(0, 2000, 80), wp(1500, 2000, 160), LAND)
-    assert note.startswith("item 3: flown as heights above home (frame 3): 160 m above ground; check the ")
+    assert note.startswith("item 3: flown as heights above home (frame 3), 160 m above ground; read as ")
     assert notes(TAKE_OFF, wp(0, 2000, 80), wp(1500, 2000, 159), LAND) == []
     # Heights above home among altitudes that are right as AMSL: as high as these, or 1 m below.
     mixed = (wp(0, 500, 180, frame=0), wp(0, 2000, 180), wp(1500, 2000, 180))

@@ -31,7 +31,7 @@ def test_an_aircraft_that_nobody_named_is_said_to_be_the_default() -> None:
     unnamed = replace(setup.scenario, flight=FlightTable(aircraft_by_default=True))
     line, _ = lines_of(setup.in_scenario(unnamed))
     assert line.startswith("Aircraft: aerosonde, 11 kg, ")
-    assert line.endswith("; no aircraft was named, so this is the default (--aircraft names yours)")
+    assert line.endswith("; no aircraft was named, so this is the default (name yours with --aircraft)")
     # An option that says nothing of the aircraft names none either.
     line, _ = lines_of(setup.in_scenario(with_flight(unnamed, airspeed_mps=24.0)))
     assert "no aircraft was named" in line
@@ -143,7 +143,7 @@ def test_an_imported_flight_is_told_as_far_as_its_log_goes() -> None:
     setup = replace(setup.in_scenario(replace(setup.scenario, flight=FlightTable())), imported_log=source)
     lines = lines_of(setup)
     assert lines[0] == (
-        "Aircraft: not named, so none of its limits are judged (--aircraft names yours);"
+        "Aircraft: not named, so none of its limits are judged (name yours with --aircraft);"
         " 25.2 m/s true airspeed (from the log)"
     )
     assert "turbulence" not in lines[1]

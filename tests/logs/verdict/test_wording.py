@@ -114,10 +114,10 @@ def test_places(place: Place, text: str) -> None:
 @pytest.mark.parametrize(
     ("change", "text"),
     [
-        (LONGER, "make leg 1 300 m long instead of 150 m"),
-        (Change("length", leg(1), 0.2, 300.0, "m"), "make leg 1 300 m long (now it is vertical)"),
-        (Change("rise", leg(2), 60.0, 44.0, "m"), "climb 44 m on leg 2 instead of 60 m"),
-        (Change("rise", leg(2), -60.0, -44.0, "m"), "descend 44 m on leg 2 instead of 60 m"),
+        (LONGER, "lengthen leg 1 from 150 m to 300 m"),
+        (Change("length", leg(1), 0.2, 300.0, "m"), "lengthen leg 1 to 300 m (it is vertical)"),
+        (Change("rise", leg(2), 60.0, 44.0, "m"), "climb 44 m instead of 60 m on leg 2"),
+        (Change("rise", leg(2), -60.0, -44.0, "m"), "descend 44 m instead of 60 m on leg 2"),
         (Change("rise", leg(2), None, -0.0, "m"), "descend 0 m on leg 2"),
         (Change("airspeed", waypoint(1), 25.0, 20.5, "m/s"), "fly through waypoint 1 at 20.5 m/s instead of 25 m/s"),
         (Change("airspeed", leg(3), 35.0, 18.1, "m/s", most=31.0), "command an airspeed of 18.1 to 31.0 m/s on leg 3"),
@@ -138,7 +138,7 @@ def test_changes(change: Change, text: str) -> None:
 def test_changes_together_and_alternatives() -> None:
     gentler = tuple(Change("rise", leg(k), None, -20.0, "m") for k in (1, 2))
     assert suggestion_text(gentler) == "descend 20 m on leg 1 and descend 20 m on leg 2"
-    text = "make leg 1 300 m long instead of 150 m and leg 1 300 m long instead of 150 m"
+    text = "lengthen leg 1 from 150 m to 300 m and leg 1 from 150 m to 300 m"
     assert suggestion_text((LONGER, LONGER)) == text
     assert suggestions_text((gentler, (LONGER, LONGER))) == f"{suggestion_text(gentler)}, or {text}"
     assert suggestions_text(()) == ""
@@ -165,19 +165,19 @@ def powered(volts: float) -> FlightSetup:
 
 # A failing route, its rule and place; where the number stands in the text of what is suggested, and its decimals.
 SUGGESTED = {
-    "rise": (lambda: make_setup(STEEP), "slope", leg(1), r"climb ([\d.]+) m on leg 1, to item 2, instead of 300 m", 0),
+    "rise": (lambda: make_setup(STEEP), "slope", leg(1), r"climb ([\d.]+) m instead of 300 m on leg 1, to item 2", 0),
     "fall": (
         lambda: make_setup(STEEP[::-1]),
         "slope",
         leg(1),
-        r"descend ([\d.]+) m on leg 1, to item 2, instead of 300 m",
+        r"descend ([\d.]+) m instead of 300 m on leg 1, to item 2",
         0,
     ),
     "length": (
         lambda: make_setup(STEEP),
         "slope",
         leg(1),
-        r"make leg 1, to item 2, ([\d.]+) m long instead of 1000 m",
+        r"lengthen leg 1, to item 2, from 1000 m to ([\d.]+) m",
         0,
     ),
     "airspeed": (

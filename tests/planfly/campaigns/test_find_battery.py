@@ -102,7 +102,7 @@ def test_flights_that_do_not_complete_leave_it_unknown(base: CampaignBase, crash
     result = battery_result(base, rows, own=200.0)
     assert math.isfinite(result.capacity) == is_known
     assert (
-        "6 of 100 flights do not complete the mission, most of them: ground contact" in answer_line(result)
+        "6 of 100 flights do not complete the mission; most frequent end: ground contact" in answer_line(result)
     ) != is_known
     if not is_known:
         assert result.is_enough is None
@@ -131,7 +131,7 @@ def test_the_own_battery_is_judged_by_the_binomial_bounds(
 def test_a_guessed_battery_is_not_compared(base: CampaignBase) -> None:
     result = replace(battery_result(base, [energy_row(80.0)] * 100, own=888.0), is_guessed=True)
     assert result.is_enough is None
-    assert any("does not state its battery" in line for line in battery_lines(result))
+    assert any("the aircraft's battery is unknown" in line for line in battery_lines(result))
 
 
 def test_no_battery_carries_itself(base: CampaignBase) -> None:
@@ -153,10 +153,9 @@ def test_no_battery_covers_a_return_that_does_not_arrive(base: CampaignBase, los
     assert result.kept == 100 - lost
     assert math.isfinite(result.capacity) == is_known
     nothing = (
-        "no battery keeps a reserve of 20% in the mission and in every return with probability 0.95:"
-        " in 5 of 100 flights a return "
+        "no battery keeps a reserve of 20% in the mission and in every return with probability 0.95, because a return "
     )
-    assert (answer_line(result) == f"{nothing}does not arrive") != is_known
+    assert (answer_line(result) == f"{nothing}does not arrive in 5 of 100 flights") != is_known
     battery_page(result, draw_battery(result), "").render()
 
 
@@ -165,8 +164,8 @@ def test_a_return_of_unknown_energy_leaves_it_unknown(base: CampaignBase) -> Non
     result = battery_result(base, rows, own=888.0)
     assert math.isnan(result.capacity)
     assert result.is_enough is None
-    assert answer_line(result).startswith("not judged: in 6 of 100 flights a return flies where the terrain is unknown")
-    assert "whether the aircraft's battery of 888 Wh is enough is not judged" in battery_lines(result)
+    assert answer_line(result).startswith("not judged: in 6 of 100 flights a return leaves the known terrain")
+    assert "it is not judged whether the aircraft's battery of 888 Wh is enough" in battery_lines(result)
 
 
 def test_a_return_that_hits_something_is_no_matter_of_the_battery(base: CampaignBase) -> None:

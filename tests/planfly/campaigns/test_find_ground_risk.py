@@ -125,7 +125,7 @@ def test_the_largest_turn_counts_along_the_whole_path(base: CampaignBase) -> Non
 def test_a_glide_widens_the_buffer(base: CampaignBase) -> None:
     result = volumes(base, [row(50.0, 40.0, 60.0)] * 20, glide_ratio=10.0)
     assert result.buffer_width == pytest.approx(10.0 * result.volume_height)
-    assert "m by a glide of 10.0 : 1" in "\n".join(risk_lines(result))
+    assert "a glide of 10.0 : 1 requires" in "\n".join(risk_lines(result))
 
 
 def write_density(path: Path, density: float, half_width: float = 0.03, nodata_from: int = 999) -> Path:
@@ -186,7 +186,7 @@ def test_lines_and_table_say_what_counts_and_what_it_is_not(base: CampaignBase) 
     result = replace(volumes(base, rows), goal=GroundRiskGoal(flights=22))
     lines = risk_lines(result)
     assert lines[-1] == DISCLAIMER
-    assert "2 of 22 flights could not be simulated, and are left out" in lines
+    assert "2 of 22 flights could not be simulated and are left out" in lines
     assert any(line.startswith("1 of 20 flights do not complete the mission") for line in lines)
     table = table_text(result)
     assert "| width S_CV by formula | 207.7 m |" in table

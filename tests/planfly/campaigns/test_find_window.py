@@ -150,7 +150,9 @@ def test_a_share_that_reaches_the_probability_is_open(tmp_path: Path) -> None:
     assert found(base, 0.0, probability=0.8).is_go is True
     closed = found(base, 0.0, probability=0.81)
     assert closed.is_go is False
-    assert answer_line(closed) == "no take-off time is open; the best is 2026-05-01 06:00 UTC with 8 of 10"
+    assert (
+        answer_line(closed) == "no take-off time is open; the best is 2026-05-01 06:00 UTC with 8 of 10 flights flyable"
+    )
 
 
 @pytest.mark.usefixtures("made_flights")

@@ -133,8 +133,8 @@ def test_a_direction_in_which_every_flight_fails_does_not_fail_the_mission_in_ca
     lines = wind_lines(found)
     assert lines[0].startswith("not judged: 4 of 4 directions have too few flights (6 to 10 flights)")
     assert lines[1] == (
-        "wind from 180°: 4 of 4 flights fail in 5.0 m/s, the weakest wind flown;"
-        " the boundary is below 5.0 m/s, and is not judged"
+        "wind from 180°: all 4 flights in 5.0 m/s, the weakest wind flown, fail;"
+        " the boundary is below 5.0 m/s and is not judged"
     )
     assert not any("calm" in line for line in lines)
     # Flights in nearly calm air show it.
@@ -194,7 +194,7 @@ def test_a_mission_that_is_not_judged_in_calm_air_is_not_searched(wind_base: Cam
     assert found.undecided == tuple((number, "loiters (a guess)") for number in range(3))
     lines = wind_lines(found)
     assert lines[0] == ("not judged: 3 of 3 flights are not judged in full; reason of the first: loiters (a guess)")
-    assert lines[-1] == "3 flights; no wind was tried, because no flight in calm air is flyable"
+    assert lines[-1] == "3 flights in calm air only, because none of them is flyable"
     assert not any("fail" in line for line in lines)
 
 
@@ -239,7 +239,7 @@ def test_a_mission_that_always_fails_in_calm_air_is_answered_at_once(
     assert lines[1] == f"in calm air, {flights} of {flights} flights fail"
     assert "clearance" in lines[2]
     assert "leg 3" in lines[2]
-    assert lines[-1] == f"{flights} flights; no wind was tried, because no flight in calm air is flyable"
+    assert lines[-1] == f"{flights} flights in calm air only, because none of them is flyable"
     assert not any("not settled" in line for line in lines)
     assert searched(wind_base, tmp_path, goal, fly=flight_that_fails_in_calm_air) == found
 

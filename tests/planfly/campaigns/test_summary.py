@@ -160,7 +160,7 @@ def test_a_flight_that_failed_by_an_unknown_margin_counts_as_beyond_the_limit(
 ) -> None:
     """16 of 40 fail without a number; with one of 41, two flights of the lowest 5 % are between -inf and 0.5."""
     passed = [(0.5 + 0.1 * k, False) for k in range(40)]
-    unknown = "16 of 40 flights fail it, by an unknown margin"
+    unknown = "16 of 40 flights fail this rule, by an unknown margin"
     cases = {
         "many": ([*passed[:24], *[(None, True)] * 16], unknown, None, None),
         "one": ([*passed, (None, True)], "5 % of the flights have a margin below 0.6°", 0.6, None),
@@ -168,7 +168,7 @@ def test_a_flight_that_failed_by_an_unknown_margin_counts_as_beyond_the_limit(
         # A leg may pass by 3 degrees where another one fails without a number.
         "other leg": (
             [*passed[:24], *[(3.0, True)] * 16],
-            "16 of 40 flights fail it, by an unknown margin",
+            "16 of 40 flights fail this rule, by an unknown margin",
             None,
             None,
         ),
@@ -177,7 +177,9 @@ def test_a_flight_that_failed_by_an_unknown_margin_counts_as_beyond_the_limit(
         (tmp_path / name).mkdir()
         summary = summary_of_margins(base, tmp_path / name, flights)
         line = campaign_lines(summary)[-1]
-        assert line == f"  decides slopes: {text}; no dispersed quantity significantly explains the margin"
+        assert (
+            line == f"  decides slopes: {text}; none of the varied quantities has a significant effect on this margin"
+        )
         data = json.loads(summary_json(summary))
         assert (data["margin_of_one_in_twenty"], data["margin_unit"]) == (low_margin, "deg")
         assert (data["closest_rules"][0]["smallest_margin"], data["closest_rules"][0]["unit"]) == (lowest, "deg")
@@ -194,7 +196,7 @@ def test_only_what_is_shown_to_explain_the_margin_is_named_also_of_the_aircraft(
     seeds = [draw_flight(drawn.dispersions, drawn.seed, index).seed for index in range(40)]
     summary = summary_of_margins(drawn, tmp_path, [(5.0 * float(thrust[seed % 64]), False) for seed in seeds])
     assert [driver.quantity for driver in summary.deciding[0].drivers] == ["ident/thrust"]
-    assert "; of the margin's variance the aircraft's thrust explains " in campaign_lines(summary)[-1]
+    assert "; causes of the margin's variance: the aircraft's thrust (" in campaign_lines(summary)[-1]
     sensitivities = {entry["quantity"]: entry for entry in json.loads(summary_json(summary))["sensitivities"]}
     assert {name for name, entry in sensitivities.items() if entry["shown"]} == {"ident/thrust"}
     assert {"ident/lift-slope", "mass", "wind_speed"} < set(sensitivities)
@@ -216,8 +218,8 @@ def test_all_rules_that_most_flights_fail_are_explained(base: CampaignBase, tmp_
         summary = summarise_campaign(base, goal, Estimator(goal).estimate(store.tally()), store)
     assert [entry.rule for entry in summary.deciding] == ["slope", "clearance"]
     slope, clearance = (line for line in campaign_lines(summary) if line.startswith("  decides"))
-    assert "slopes: 5 of 40 flights fail it, by an unknown margin" in slope
-    assert "of the margin's variance terrain height explains " in clearance
+    assert "slopes: 5 of 40 flights fail this rule, by an unknown margin" in slope
+    assert "causes of the margin's variance: terrain height (" in clearance
     data = json.loads(summary_json(summary))
     assert (data["deciding_rule"], [entry["deciding_rule"] for entry in data["tied_rules"]]) == ("slope", ["clearance"])
 
@@ -230,7 +232,7 @@ def test_an_undecided_target_names_the_flights_that_would_decide_it(base: Campai
             store.add(with_margins(base, index, ("clearance", 9.0)))
         summary = summarise_campaign(base, goal, Estimator(goal).estimate(store.tally()), store)
     assert summary.estimate.answer == "undecided"
-    assert "  a campaign of 59 flights without a failure would decide it" in campaign_lines(summary)
+    assert "  59 flights without a failure would decide this" in campaign_lines(summary)
     assert json.loads(summary_json(summary))["deciding_flights"] == 59
     assert summary.unjudged_return == ""
     lines = campaign_lines(replace(summary, unjudged_return="the mission has no home"))

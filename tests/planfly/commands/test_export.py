@@ -84,7 +84,7 @@ def test_the_cruise_speed_of_a_plan_file_is_that_of_the_mission_or_the_aircraft(
     Path("x8.toml").write_text(f'name = "x"\n{terrain}{area}{ends}[flight]\naircraft = "x8"\n')
     x8 = planfly.aircraft("x8").airspeed
     for source, more, speed, words in (
-        ("m.waypoints", [], 25.0, "from the default aircraft aerosonde; --aircraft names yours"),
+        ("m.waypoints", [], 25.0, "from the default aircraft aerosonde; name yours with --aircraft"),
         ("m.waypoints", ["--aircraft", "x8"], x8, "from x8"),
         ("slow.waypoints", [], 19.0, "the mission's"),
         ("m.waypoints", ["--scenario", "x8.toml"], x8, "from x8"),
@@ -269,7 +269,7 @@ def test_a_plan_file_is_for_the_autopilot_that_is_named(
     Path("px4.params").write_text("# Stack: PX4 Pro\n1\t1\tNAV_ACC_RAD\t20\t9\n", encoding="ascii")
     assert main(["export", "a.waypoints", "a.plan", *options]) == 0
     assert json.loads(Path("a.plan").read_text())["mission"]["firmwareType"] == firmware
-    note = "a.waypoints names no autopilot: the .plan is for ArduPilot; --autopilot or --params names another"
+    note = "a.waypoints names no autopilot: the .plan is for ArduPilot; name another with --autopilot or --params"
     assert (note in capsys.readouterr().err) is not bool(options)
     # Converted again, it stays what it is.
     assert main(["export", "a.plan", "b.plan"]) == 0

@@ -194,7 +194,7 @@ def test_a_mission_that_is_in_the_log_in_part_is_judged_in_part(tmp_path: Path, 
     for lost in range(1, 14) if SOAK else (1, 7, 11, 12, 13):
         log = write(tmp_path / name, with_13_items(), without_items=range(14 - lost, 14))
         missing = "item 13" if lost == 1 else f"items {14 - lost} to 13"
-        named = f"{missing} of {total} {'is' if lost == 1 else 'are'} not in the log or ignored"
+        named = f"{missing} of {total} {'is' if lost == 1 else 'are'} ignored or not in the log"
         code = main(["check", str(log)])
         out, error = capsys.readouterr()
         if lost < 12:
@@ -210,12 +210,12 @@ def test_a_mission_that_is_in_the_log_in_part_is_judged_in_part(tmp_path: Path, 
 def test_items_that_are_missing_anywhere_are_all_named(tmp_path: Path, capsys: Output, name: str) -> None:
     write, total = COUNTED[name]
     for lost, text in (
-        ((1, 2, 3), "not judged before item 4: items 1 to 3 of {} are not in the log or ignored"),
-        ((5,), "not judged before item 6: item 5 of {} is not in the log or ignored"),
-        ((9, 13), "not judged beyond item 8: items 9 and 13 of {} are not in the log or ignored"),
+        ((1, 2, 3), "not judged before item 4: items 1 to 3 of {} are ignored or not in the log"),
+        ((5,), "not judged before item 6: item 5 of {} is ignored or not in the log"),
+        ((9, 13), "not judged beyond item 8: items 9 and 13 of {} are ignored or not in the log"),
         (
             (2, 8, 9, 13),
-            "not judged before item 3 and beyond item 7: items 2, 8 to 9 and 13 of {} are not in the log or ignored",
+            "not judged before item 3 and beyond item 7: items 2, 8 to 9 and 13 of {} are ignored or not in the log",
         ),
     ):
         log = write(tmp_path / name, with_13_items(), without_items=lost)
@@ -231,7 +231,7 @@ def test_a_flight_that_is_judged_in_part_is_so_in_every_command(tmp_path: Path, 
     assert (answer["exit_code"], answer["verdict"]["flyable"], answer["verdict"]["complete"]) == (3, False, False)
     assert main(["check", str(flight)]) == 3
     said = capsys.readouterr().out
-    assert said.count("not judged beyond item 6: items 7 to 13 of 14 are not in the log or ignored") >= 2
+    assert said.count("not judged beyond item 6: items 7 to 13 of 14 are ignored or not in the log") >= 2
     assert "6 of 6 legs" not in said
     # The whole mission beside it, and the flight is judged to its end.
     plan = tmp_path / "plan.waypoints"
@@ -250,7 +250,7 @@ def test_what_fails_on_the_items_that_the_log_holds_is_not_flown_as_planned(tmp_
     assert main(["check", str(log)]) == 4
     first = capsys.readouterr().out.splitlines()[0]
     assert first.startswith("not flown as planned: ")
-    assert first.endswith("; not judged beyond item 6: items 7 to 13 of 14 are not in the log or ignored")
+    assert first.endswith("; not judged beyond item 6: items 7 to 13 of 14 are ignored or not in the log")
 
 
 def test_options_that_do_not_go_together_are_refused(tmp_path: Path, capsys: Output) -> None:

@@ -100,7 +100,7 @@ def test_without_terrain_nothing_is_known(hill: Path, capsys: pytest.CaptureFixt
     assert main(["returns", "hill.waypoints", "--every", "50"]) == 3
     out = capsys.readouterr().out
     assert "fly where the terrain is unknown" in out
-    assert "--terrain names an elevation file" in out
+    assert "name an elevation file with --terrain" in out
     assert "engine out: not judged: there is no elevation file" in out
 
 

@@ -91,7 +91,7 @@ def test_failures_stand_below_the_summary_with_what_would_pass(capsys: pytest.Ca
     lines = printed(capsys, Verdict(findings, False, True, ("not flyable: slope",), "flown"), "gusty")
     assert lines[0] == "not flyable: slope"
     assert lines[1] == "  failed  slope at leg 1: leg 1 is as it is"
-    assert lines[2].endswith("would pass: make leg 1 400 m long instead of 300 m")
+    assert lines[2].endswith("would pass: lengthen leg 1 from 300 m to 400 m")
     # Of 5 and 7.5 and 9 against 8 the last has the least margin.
     assert "2 of 3 ok; furthest beyond its limit at leg 1: slope 9° (limit ≤ 8.1°, aircraft)" in lines[3]
     assert lines[-1] == "  note    gusty"
@@ -109,7 +109,7 @@ def test_failures_of_one_rule_are_one_paragraph_the_worst_first(capsys: pytest.C
     findings = (*(slope(k, 9.0 + k, 8.0) for k in range(9)), slope(9, 4.0, 8.0))
     lines = printed(capsys, Verdict(findings, False, True, ("not flyable",), "flown"))
     assert lines[1] == "  failed  slope: 9 of 10 fail; the worst at leg 8: leg 8 is as it is"
-    assert lines[2].endswith("would pass: make leg 8 400 m long instead of 300 m")
+    assert lines[2].endswith("would pass: lengthen leg 8 from 300 m to 400 m")
     assert lines[3] == (
         "          also at leg 7 (16°); leg 6 (15°); leg 5 (14°); leg 4 (13°); leg 3 (12°); leg 2 (11°); 2 more"
     )

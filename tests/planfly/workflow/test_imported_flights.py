@@ -217,8 +217,8 @@ def test_notes_tell_what_a_person_should_know(tmp_path: Path) -> None:
     assert "Note: the log contains no parameters: ArduPlane's defaults are used" in flight.verdict.lines
     assert "Wind: 3.0 m/s on average, from 000°, according to XKF2 of the log" in flight.verdict.lines
     assert (
-        "Heights: from POS, above mean sea level, according to the log; difference at the start: GPS.Alt +0.5 m"
-        in flight.verdict.lines
+        "Heights: from POS, above mean sea level, according to the log;"
+        " other heights differ at the start: GPS.Alt by +0.5 m" in flight.verdict.lines
     )
 
 

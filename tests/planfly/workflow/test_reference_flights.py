@@ -200,7 +200,8 @@ def test_both_ways(name: str, passes: Callable[[ArduPilotParameters], bool], pas
 def test_none_where_none_decides() -> None:
     flights = Flights(lambda new: False)
     assert find_passing_parameter(ArduPlane(ArduPilotParameters.defaults()), (WIDE,), flights) is None
-    assert flights.count == 8
+    # The farthest value and the value halfway of each of eight candidates.
+    assert flights.count == 16
     assert find_passing_parameter(ArduPlane(ArduPilotParameters.defaults()), (HEIGHTS,), flights) is None
 
 

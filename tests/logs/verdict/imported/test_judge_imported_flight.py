@@ -79,7 +79,7 @@ def test_a_quantity_that_is_missing_for_a_while_is_told_with_its_times(tmp_path:
 def test_an_aircraft_that_is_not_named_has_no_limits(tmp_path: Path) -> None:
     flight = judged(tmp_path)
     for rule in ("turn", "slope", "speed"):
-        assert reasons(flight, rule) == {"no aircraft was named: --aircraft names it"}
+        assert reasons(flight, rule) == {"no aircraft was named; name it with --aircraft"}
     assert outcome(flight, "corridor") == [True, True]
 
 
@@ -89,7 +89,7 @@ def test_a_landing_of_an_aircraft_that_is_not_named_has_no_limit(tmp_path: Path)
     *items, last = found.mission.items
     landing = replace(found.mission, items=(*items, replace(last, command=21, alt=last.alt - 20.0)))
     landing_log = replace(raw, missions=(*raw.missions[:-1], replace(found, mission=landing)))
-    assert reasons(judged(tmp_path, landing_log), "landing") == {"no aircraft was named: --aircraft names it"}
+    assert reasons(judged(tmp_path, landing_log), "landing") == {"no aircraft was named; name it with --aircraft"}
 
 
 @pytest.mark.parametrize(("datum", "judged_by"), [("unstated", False), ("ellipsoid", False), ("amsl", True)])
@@ -119,7 +119,7 @@ def test_a_gap_is_not_bridged_in_silence(tmp_path: Path) -> None:
     assert "the log has no rows from 39.8 s to 45.2 s" in reasons(flight, "corridor")
     assert "Rows: 1 gap" in flight.verdict.summary
     completion = next(item for item in flight.verdict.findings if item.rule == "completion")
-    assert "1 gaps of 5.4 s in all, the longest from 39.8 s to 45.2 s" in completion.reason
+    assert "1 gap with a total of 5.4 s; the longest is from 39.8 s to 45.2 s" in completion.reason
     assert flight.verdict.flyable
 
 
@@ -130,7 +130,7 @@ def test_a_pause_of_over_ten_seconds_leaves_a_flight_undecided(tmp_path: Path, u
     flight = judged(tmp_path, with_rows((time < 39.9) | (time > until)), AEROSONDE)
     assert flight.verdict.undecided is undecided
     assert flight.verdict.flyable is not undecided
-    says = "not judged from 39.8 s to 50.4 s: the log has no rows"
+    says = "not judged from 39.8 s to 50.4 s, because the log has no rows"
     assert flight.verdict.headline.startswith(says) is undecided
 
 
@@ -143,11 +143,11 @@ def test_what_is_wrong_beside_a_gap_is_wrong(tmp_path: Path) -> None:
 def test_only_stretches_in_auto_are_judged_each_with_its_time(tmp_path: Path) -> None:
     flight = judged(tmp_path, with_modes((20.0, "AUTO"), (80.0, "FBWA")), AEROSONDE)
     assert (
-        "Judged: AUTO from 20.0 s to 80.0 s, legs 0 to 1, leg 1 in part, which begin at 30.0 s" in flight.verdict.lines
+        "Judged: AUTO from 20.0 s to 80.0 s, legs 0 to 1, leg 1 in part; leg 0 begins at 30.0 s" in flight.verdict.lines
     )
     assert not flight.verdict.flyable
     completion = next(item for item in flight.verdict.findings if item.rule == "completion")
-    assert completion.reason.startswith("AUTO was left for FBWA at 80.0 s, on the way to waypoint 2 (item 3): 1 of 2")
+    assert completion.reason.startswith("AUTO was left for FBWA at 80.0 s, on the way to waypoint 2 (item 3); 1 of 2")
     assert len(flight.track) == 460, "the rest is shown"
 
 
@@ -164,7 +164,7 @@ def test_a_stretch_that_begins_within_the_mission_is_judged_from_there(tmp_path:
     verdict = judge_flight(on_the_ground, flight.track, "")
     completion = next(item for item in verdict.findings if item.rule == "completion")
     assert (completion.ok, completion.margin) == (False, -1)
-    assert completion.reason == "leg 0 is not flown along the mission: 1 of 2 legs flown, the last one to its end"
+    assert completion.reason == "leg 0 is not flown along the mission; 1 of 2 legs flown, including the last leg"
     assert verdict.answer == "not flown as planned"
 
 
@@ -219,7 +219,7 @@ def test_two_stretches_are_judged_together(tmp_path: Path) -> None:
     assert len(judged_lines) == 2
     # Three seconds by hand on the first leg: neither as planned, nor not.
     assert outcome(flight, "completion") == [None]
-    assert "leg 0 is flown along the mission in part" in flight.verdict.headline
+    assert "leg 0 is flown only in part" in flight.verdict.headline
     assert len(outcome(flight, "departure")) == 1
 
 
@@ -259,5 +259,5 @@ def test_each_datum_is_named() -> None:
 
 def test_what_is_lost_is_told() -> None:
     assert damage_text(Damage(places=1, size=1200, unreadable=2)) == (
-        "1 place in the file (1,200 bytes) cannot be read; 2 messages contain nothing that can be used"
+        "1 place in the file (1,200 bytes) cannot be read; 2 messages contain no usable data"
     )

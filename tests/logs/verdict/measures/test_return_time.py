@@ -82,5 +82,5 @@ def test_a_battery_that_lasts_longer_than_the_longest_return_leaves_nothing_open
     capacity = 1000.0 * (energy / setup.envelope.volts + share * charge)
     item = of(judge_geometry(replace(setup, autopilot=windy(*OUT, BAT1_CAPACITY=capacity).autopilot)), "energy")
     assert item.ok is ok
-    assert ("COM_FLTT_LOW_ACT 3 may return before the mission ends" in item.reason) is (ok is None)
+    assert ("COM_FLTT_LOW_ACT 3 may start a return before the mission ends" in item.reason) is (ok is None)
     assert ("COM_FLTT_LOW_ACT 0, or a larger battery (BAT1_CAPACITY), avoids it" in item.reason) is (ok is None)

@@ -141,7 +141,7 @@ def test_both_levels_show_it_and_it_decides_nothing() -> None:
     for verdict in (judge_geometry(setup), judge(setup, fly_path(setup))):
         item = of(verdict, "clearance", leg(0))
         assert item.ok is True
-        assert "54.0 m after subtracting the terrain's stated error of 16 m, less than the 60 m required" in item.reason
+        assert "54.0 m if the terrain's stated error of 16 m is subtracted, less than the 60 m required" in item.reason
         assert (
             "Terrain's stated error: 16 m; the lowest clearance is 70.0 m, or 54.0 m with that error subtracted"
             in verdict.summary

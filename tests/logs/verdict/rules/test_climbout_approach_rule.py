@@ -84,7 +84,7 @@ def test_the_way_to_the_first_waypoint_is_left_open_where_a_wall_stands_in_it() 
         verdict.headline
         == "not judged in full: the flight starts in the air, but a straight climb from home to item 1 hits the ground"
     )
-    assert into_it.reason.endswith(": 1000 m from home it is 2 m below the surface, even at the steepest climb")
+    assert into_it.reason.endswith(" 1000 m from home, where it is 2 m below the surface, even at the steepest climb")
 
 
 def test_beyond_the_climb_the_way_to_the_first_waypoint_is_level() -> None:
@@ -126,7 +126,7 @@ def test_a_take_off_into_a_wall_fails_and_one_that_only_its_steepest_climb_clear
     assert "the climb from home towards item 2 hits the ground" in verdict.headline
     assert failed.planned == pytest.approx(-30.0, abs=0.5)
     assert (
-        ": 500 m from home it is 30 m below the surface, even at the steepest climb (climb angle 14.1°); a launch "
+        " 500 m from home, where it is 30 m below the surface, even at the steepest climb (climb angle 14.1°); a "
     ) in failed.reason
 
 
@@ -143,10 +143,10 @@ def test_a_climb_past_its_item_states_its_angle_and_its_end(deviation_deg: float
     reason = "; the steepest climb is 14.1°, but only 9.0° is certain"
     assert found.ok is None
     assert found.reason == (
-        f"the climb from home towards item 2, at 70 % of the steepest {certain_text}climb, hits the ground: 400 m from"
-        f" home it is {80.0 - 400.0 * slope:.0f} m below the surface (climb angle"
-        f" {math.degrees(math.atan(slope)):.1f}°; the climb passes item 2, 300 m from home, and ends 100 m above"
-        f" home after {100.0 / slope:.0f} m{f'{reason} for this aircraft' if deviation_deg else ''})"
+        f"the climb from home towards item 2, at 70 % of the steepest {certain_text}climb, hits the ground 400 m from"
+        f" home, where it is {80.0 - 400.0 * slope:.0f} m below the surface (climb angle"
+        f" {math.degrees(math.atan(slope)):.1f}°; the climb ends 100 m above home after {100.0 / slope:.0f} m,"
+        f" beyond item 2, which is 300 m from home{f'{reason} for this aircraft' if deviation_deg else ''})"
     )
 
 
@@ -300,7 +300,7 @@ def test_a_glide_into_a_wall_fails_and_one_that_only_just_clears_it_is_left_open
     failed, verdict = judged("approach", wall(POINT - 600.0, up + 60.0), *landing())
     assert "approach at waypoint 2, item 3 (the glide to item 3 hits the ground)" in verdict.headline
     assert failed.reason == (
-        "the glide to item 3 hits the ground: 600 m before the landing point it is 60 m below the surface"
+        "the glide to item 3 hits the ground 600 m before the landing point, where it is 60 m below the surface"
     )
     _, verdict = judged("approach", wall(POINT - 600.0, up - 3.0), *landing())
     assert verdict.headline == "not judged in full: the glide to item 3 clears the ground by only 3.0 m"

@@ -77,7 +77,7 @@ def test_a_voltage_at_which_arduplane_leaves_the_mission_is_said_not_to_be_judge
     law = ArduPlane(ArduPilotParameters.of_text("BATT_LOW_VOLT 21\nBATT_FS_LOW_ACT 2\n", "mine.param"))
     item = of(judge_geometry(replace(real_setup(), autopilot=law)), "energy")
     assert item.ok
-    assert "not judged: whether the battery reaches BATT_LOW_VOLT 21, which leaves the mission" in item.reason
+    assert "it is not judged whether BATT_LOW_VOLT 21 ends the mission" in item.reason
 
 
 def test_a_battery_that_is_too_small_fails_before_the_flight_too() -> None:
@@ -153,7 +153,7 @@ def test_energy_within_what_is_not_known_is_undecided(share: float, ok: bool | N
     item = of(verdict, "energy")
     assert (item.ok, verdict.undecided) == (ok, ok is None)
     # The pessimistic end is always stated: a suggested battery holds it, also where the limit itself is exceeded.
-    assert f"at most {1.50871 * used:.1f} Wh with 95 % probability, because the power is from a data" in item.reason
+    assert f"at most {1.50871 * used:.1f} Wh with 95 % probability, because the power is uncertain (from" in item.reason
     if ok is None:
         assert verdict.headline.startswith(
             "not judged in full: energy is too close to the limit to judge, because the aircraft's limits are uncertain"
@@ -196,7 +196,7 @@ def test_a_jump_without_end_needs_more_than_any_battery() -> None:
     first_energy = power * (6000.0 - first_cut * radius) / 25.0 / 3600.0
     # Of 1000 Wh, 20 % are the reserve.
     repeats = math.floor((800.0 - first_energy) / round_energy)
-    assert f"the energy lasts for only {repeats + 1} rounds: set its count to {repeats} (" in item.reason
+    assert f"the energy lasts for only {repeats + 1} rounds. Set the count of the jump to {repeats} (" in item.reason
     assert item.brief.startswith("the jump of item 5 repeats without end")
 
 
@@ -210,7 +210,7 @@ def test_the_rounds_of_an_endless_jump_leave_the_rest_of_the_mission_and_the_res
 
     words = energy(-1).brief.split()
     count = int(words[-1])
-    assert words[words.index("rounds:") - 1] == str(count + 1)
+    assert words[words.index("rounds.") - 1] == str(count + 1)
     assert count > 2
     assert energy(count).ok
     assert energy(count + 1).ok is False
@@ -223,7 +223,7 @@ def test_an_aircraft_that_burns_fuel_has_no_current() -> None:
         judge_flight(real_setup(table=envelope), fly_to_end(Flight(real_setup(), AEROSONDE)).track, "completed"),
     ):
         reason = of(verdict, "energy").reason
-        assert "of fuel heat used" in reason
+        assert "of the fuel used" in reason
         assert "peak current" not in reason
 
 
@@ -247,7 +247,7 @@ def test_a_further_battery_that_leaves_the_mission_leaves_the_energy_open() -> N
     for monitor in ("BATT2", "BATT3", "BATTA"):
         item = _energy_with(text.format(monitor))
         assert (item.ok, item.check) == (None, "not flown")
-        assert f"{monitor}_CRT_MAH 999 leaves the mission after 1 mAh" in item.reason
+        assert f"{monitor}_CRT_MAH 999 acts after 1 mAh" in item.reason
     # The same values of a battery without a monitor, or without an action.
     assert _energy_with(text.format("BATT2").replace("BATT2_MONITOR 4", "BATT2_MONITOR 0")).ok
     assert _energy_with(text.format("BATT2").replace("ACT 1", "ACT 0")).ok
@@ -330,5 +330,5 @@ def test_a_failsafe_that_an_uncertain_power_may_reach_leaves_the_energy_open(
     # A larger battery changes nothing: the failsafe counts from BATT_CAPACITY.
     assert all(change.what == "duration" for suggestion in item.suggestions for change in suggestion)
     if ok is None:
-        assert f"BATT_LOW_MAH 1500 leaves the mission after {share * needed:.1f} Wh" in item.reason
+        assert f"BATT_LOW_MAH 1500 acts after {share * needed:.1f} Wh" in item.reason
         assert item.suggestions

@@ -35,9 +35,9 @@ def test_a_go_around_from_a_field_above_home_is_too_low_and_the_height_that_woul
     assert warned.ok is None
     # From below 50 m it climbs there, from above it sinks no deeper than it was.
     assert warned.planned == pytest.approx(13.0, abs=2.5)
-    assert "which is 13 m above the landing point" in warned.reason
+    assert "above home, 13 m above the landing point" in warned.reason
     assert "m above ground on the way back" in warned.reason
-    assert warned.reason.endswith("a climb to 60 m above home would be sufficient (parameter 1 of item 3)")
+    assert warned.reason.endswith("A climb to 60 m above home is sufficient: set parameter 1 of item 3 to this height")
     # It decides no verdict, and is said.
     assert verdict.flyable
     assert f"Go-around: {warned.reason}" in verdict.lines
@@ -50,7 +50,7 @@ def test_a_hill_ahead_of_the_landing_leaves_no_height_for_a_go_around() -> None:
     found, _ = go_around(wall(POINT + 150.0, 300.0), *landing())
     assert found.ok is None
     assert "hits the ground" in found.reason
-    assert found.reason.endswith("no climb up to 1000 m above home would be sufficient")
+    assert found.reason.endswith("No climb up to 1000 m above home is sufficient")
 
 
 def test_a_go_around_flies_back_to_where_the_landing_sequence_begins_and_on_to_the_line_up() -> None:

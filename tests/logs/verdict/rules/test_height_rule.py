@@ -39,7 +39,7 @@ def test_each_leg_has_its_own_height() -> None:
     assert [item.planned for item in items[::3]] == pytest.approx([300.0, 300.0], abs=1.5)
     assert items[1].planned == pytest.approx(380.0, abs=2.5)
     assert items[1].margin == pytest.approx(350.0 - (items[1].planned or 0.0))
-    assert "350 m are allowed" in items[1].reason
+    assert "at most 350 m are allowed" in items[1].reason
     assert all(item.ok for item in findings(limited(381.0)))
 
 

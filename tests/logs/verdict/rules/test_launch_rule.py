@@ -39,7 +39,7 @@ def test_a_flight_whose_motor_never_started_says_so_and_not_that_it_landed_badly
     one = found(flown.setup, flown.track, "launch", flown.flight.ended)
     assert one.ok is False
     assert "less than TKOFF_THR_MINACC 15: the motor never starts" in one.reason
-    assert "it must reach 60 m" in one.reason
+    assert "it must climb to 60 m" in one.reason
     assert found(flown.setup, flown.track, "touchdown", flown.flight.ended).ok is None
 
 

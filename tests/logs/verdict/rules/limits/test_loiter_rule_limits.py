@@ -35,7 +35,7 @@ def test_a_guessed_bank_limit_leaves_circles_open_that_60_degrees_hold(short: fl
     if ok is None:
         assert verdict.undecided
         assert [change.what for one in item.suggestions for change in one] == ["stated bank"]
-        assert "because its 30° are a guess: planfly aircraft --new ... --bank DEGREES" in item.suggestion
+        assert "because its 30° is a guess: planfly aircraft --new ... --bank DEGREES" in item.suggestion
         assert "loiter at 1 waypoint is too close to the limit" in verdict.headline
 
 
