@@ -70,8 +70,7 @@ def _launch_finding(requirements: RouteRequirements, ground: FlownGround, take_o
         faults.append(message(brief, runway_text))
     if clearance < LAUNCH_CLEARANCE_M:
         place_text = f" {distance:.0f} m from home, on the course flown; {LAUNCH_CLEARANCE_M:g} m are required"
-        side = "above" if clearance >= 0.0 else "below"
-        faults.append(message(f"{abs(clearance):.1f} m {side} ground", place_text))
+        faults.append(message(f"{abs(clearance):.1f} m {'above' if clearance >= 0.0 else 'below'} ground", place_text))
     entered_hazard = first_hazard_on_path(requirements, path)
     if entered_hazard:
         faults.append(message(f"the climb enters {entered_hazard}"))
