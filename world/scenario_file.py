@@ -152,11 +152,30 @@ def first_fault(error: ValidationError, data: Any = None, model: type[BaseModel]
     if first_error["type"] == "missing":
         value, value_text = None, ""
         keys = [str(part) for part in first_error["loc"]]
-    remainder = f" (and {len(errors) - 1} more)" if len({error_entry["loc"][:2] for error_entry in errors}) > 1 else ""
+    remainder = _remaining_faults_text(errors)
     field = ".".join(key if key.isprintable() else json.dumps(key) for key in keys)
     # A check of the whole file names its key itself.
     prefix = "" if not field and first_error["type"] == "value_error" else f"{field or 'file'}{value_text}: "
     return Fault(field, value, message, f"{prefix}{message}{remainder}")
+
+
+# Tables of the ends of a flight, which a scenario for a mission needs, too.
+_ENDS = (("start",), ("destination",))
+
+
+def _remaining_faults_text(errors: Sequence[Any]) -> str:
+    """Return a text on the errors after the first: the names of missing keys, or else the number of errors."""
+    if len({error_entry["loc"][:2] for error_entry in errors}) < 2 and errors[0]["loc"] not in _ENDS:
+        return ""
+    if any(error_entry["type"] != "missing" for error_entry in errors):
+        return f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
+    others = [".".join(map(str, error_entry["loc"])) for error_entry in errors[1:]]
+    text = f" (also missing: {', '.join(others)})" if others else ""
+    if any(error_entry["loc"] in _ENDS for error_entry in errors):
+        text += (
+            "; tables [start] and [destination] need east_m and north_m, or lat_deg and lon_deg, and amsl_m or height_m"
+        )
+    return text
 
 
 def _spelling_suggestion(parts: Sequence[str | int], model: type[BaseModel] | None) -> str:

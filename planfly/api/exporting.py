@@ -107,6 +107,10 @@ class _SourceContent:
     airspeed: float | None = None
     aircraft: str = ""
 
+    def of_plan(self) -> "_SourceContent":
+        """Return the content of a plan in memory, whose messages do not name its temporary file."""
+        return replace(self, mission=replace(self.mission, source="the plan"))
+
 
 @api_function()
 def export(
@@ -153,7 +157,8 @@ def export(
         options = MissionOptions(
             fence=fence, at=at, scenario=scenario, autopilot=autopilot, params=params, aircraft=aircraft
         )
-        source_content = _read_source(path, targets, options)
+        read_content = _read_source(path, targets, options)
+        source_content = read_content.of_plan() if isinstance(source, Plan) else read_content
         if any(target.suffix.lower() == ".plan" for target in targets):
             source_content = _with_plan_notes(source_content, chosen_autopilot, fence)
         contents = [_target_content(source_content, target) for target in targets]

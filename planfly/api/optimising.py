@@ -76,6 +76,8 @@ class Optimiser:
         self._levels: tuple[Level, ...] = ()
         self._violation_count = 0
         self._max_points = population
+        # True if the caller knows the points whose values `tell` takes.
+        self._is_asked = initial is not None
         self._search = _MODELS[model](
             lower, upper, lambda scores: ranks(scores, self._levels), population, rng, initial=initial
         )
@@ -87,10 +89,13 @@ class Optimiser:
         The first call returns the whole population, later calls return half of it.  "multistart" returns as many points
         as the current generation of its search has, and "partial" as many as its population has.
         """
+        self._is_asked = True
         return np.array(self._search.ask())
 
     def tell(self, values: ArrayLike, violations: ArrayLike | None = None) -> None:
         """Receive the values of the points from `ask`, and draw the next points from the better half.
+
+        The first values may be those of the points given as `initial`, without a call of `ask`.
 
         values: values to minimise, (n,), or (n, m) for m objectives, which are compared by Pareto dominance.
         violations: amount by which each constraint is violated, (n,) or (n, v), 0 or less if the constraint is met; a
@@ -98,9 +103,11 @@ class Optimiser:
 
         NaN is treated as the worst value.
 
-        Raises ArgumentError if the number of rows differs from the number of points that `ask` returned, or if the
-        number of columns differs from the previous call.
+        Raises ArgumentError if `ask` was not called since the last values, if the number of rows differs from the
+        number of points that `ask` returned, or if the number of columns differs from the previous call.
         """
+        if not self._is_asked:
+            raise ArgumentError.of_argument("values", values, "call ask() first, which returns their points", shown="")
         points = self._search.ask()
         objective_values = _parse_columns("values", values, len(points))
         violation_values = (
@@ -121,6 +128,7 @@ class Optimiser:
         self.evaluations += len(points)
         self._update_front(points, scores)
         self._search.tell(scores)
+        self._is_asked = False
 
     def _update_front(self, points: Floats, scores: Floats) -> None:
         """Merge points into the front, which keeps only non-dominated points, sorted by the first objective."""

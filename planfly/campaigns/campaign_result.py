@@ -13,7 +13,7 @@ from planfly.arguments import check_arguments
 from planfly.campaigns.find_winds import DEFAULT_WIND_FLIGHTS, WindsGoal
 from planfly.campaigns.statistics.decision import DEFAULT_CONFIDENCE, Answer, Goal, Interval
 from planfly.campaigns.summary import CampaignSummary, campaign_lines
-from planfly.campaigns.tables import read_path_arrays
+from planfly.campaigns.tables import read_path_arrays, with_place_numbers
 from world.errors import ArgumentError
 from world.html_table import html_table
 from world.wording import count_text
@@ -123,12 +123,17 @@ class CampaignResult:
 
     @property
     def flights(self) -> Any:
-        """Table of flights as a pandas DataFrame, or as arrays keyed by name if pandas is not installed."""
+        """Table of flights as a pandas DataFrame, or as arrays keyed by name if pandas is not installed.
+
+        The place of the smallest margin of each rule has three columns: ``place_RULE_kind`` (such as "leg", None if not
+        judged), ``place_RULE_index`` and ``place_RULE_item``, NaN if there is none.
+        """
+        columns = with_place_numbers(self.columns)
         try:
             import pandas as pd
         except ImportError:
-            return dict(self.columns)
-        return pd.DataFrame(dict(self.columns))
+            return columns
+        return pd.DataFrame(columns)
 
     def path_arrays(self) -> dict[str, NDArray[np.float32]]:
         """Read each flight's clearance along the route and offset at each stop from the campaign's folder.

@@ -656,6 +656,26 @@ def read_table(path: Path) -> dict[str, NDArray[Any]]:
     return columns
 
 
+def with_place_numbers(columns: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """Return a table's columns with kind, index and item of each place in columns of their own, instead of JSON.
+
+    The item of a leg is the item to which it leads.  Missing numbers are NaN.
+    """
+    names = {rule.place_column for rule in RULE_WORDS.values()}
+    places = {text: json.loads(text) for name in names & columns.keys() for text in set(columns[name]) - {None}}
+    result: dict[str, NDArray[Any]] = {}
+    for name, column in columns.items():
+        if name not in names:
+            result[name] = column
+            continue
+        found = [{} if text is None else places[text] for text in column]
+        items = [place.get("to_item") if place.get("item") is None else place["item"] for place in found]
+        result[f"{name}_kind"] = np.array([place.get("kind") for place in found], dtype=object)
+        result[f"{name}_index"] = np.array([place.get("index") for place in found], dtype=np.float64)
+        result[f"{name}_item"] = np.array(items, dtype=np.float64)
+    return result
+
+
 def check_rows(path: Path) -> None:
     """Raise StoreError if rows of a campaign's table are damaged, or if another program changed them."""
     with _open_to_read(path) as connection:

@@ -61,7 +61,15 @@ def test_one_fault_one_line(case: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("content", "wanted"),
     [
-        (b"", "name: Field required"),
+        (
+            b"",
+            "name: Field required (also missing: terrain, start, destination); tables [start] and [destination] need ",
+        ),
+        (
+            b'[landing]\neast_m = 0\nnorth_m = 0\n[terrain]\nkind = "dem"\npath = "jacksboro"\n',
+            "name: Field required (also missing: start, destination); tables [start] and [destination] need east_m and"
+            " north_m, or lat_deg and lon_deg, and amsl_m or height_m",
+        ),
         (b"\x00\x01\x02\xff\xfe" * 50, "not a text file in UTF-8"),
         (b"\x89HDF\r\n\x1a\n" + bytes(200), "not a text file in UTF-8"),
         (bytes(300), "not valid TOML"),

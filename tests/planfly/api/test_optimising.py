@@ -187,12 +187,31 @@ def test_options_that_are_none_are_refused(options: dict[str, Any], words: str) 
         planfly.optimise([0.0], [1.0], **options)
 
 
+def test_values_of_points_that_nobody_knows_are_refused() -> None:
+    search = planfly.optimise([0.0], [1.0], population=4)
+    with pytest.raises(planfly.ArgumentError, match=r"values: call ask\(\) first"):
+        search.tell(np.zeros(4))
+    search.ask()
+    search.tell(np.zeros(4))
+    # The next points are others than those whose values were told.
+    with pytest.raises(planfly.ArgumentError, match=r"values: call ask\(\) first"):
+        search.tell(np.zeros(2))
+    assert search.evaluations == 4
+    # The points of `initial` are known; the points after them are not.
+    search = planfly.optimise([0.0], [1.0], population=4, initial=[[0.1], [0.2], [0.3], [0.4]])
+    search.tell(np.zeros(4))
+    with pytest.raises(planfly.ArgumentError, match=r"values: call ask\(\) first"):
+        search.tell(np.zeros(2))
+
+
 def test_values_of_another_shape_are_refused() -> None:
     search = planfly.optimise([0.0], [1.0], population=4)
+    search.ask()
     for values in ([1.0, 2.0], 1.0, np.zeros((4, 1, 1)), np.zeros((4, 0)), ["a"] * 4):
         with pytest.raises(planfly.ArgumentError, match=r"values"):
             search.tell(values)
     search.tell(np.zeros(4))
+    search.ask()
     with pytest.raises(ValueError, match="differ from the previous call"):
         search.tell(np.zeros((2, 2)))
     with pytest.raises(ValueError, match="differ from the previous call"):

@@ -107,6 +107,13 @@ def test_what_it_tells(base: CampaignBase, tmp_path: Path) -> None:
     assert list(flights["flight"]) == list(range(60))
     assert list(flights["outcome"]).count("lost") == 1
     assert "clearance" not in flights
+    # Places are numbers, not JSON: NaN only where the rule was not judged.
+    assert not any(name in flights for name in ("place_clearance", "place_energy"))
+    for name in ("index", "item"):
+        assert flights[f"place_clearance_{name}"].dtype.kind == "f"
+    is_leg = flights["place_clearance_kind"] == "leg"
+    assert is_leg.sum() > 0
+    assert (flights["place_clearance_index"].notna() == is_leg).all()
     assert result.path_arrays()["clearance"].shape == (60, STATION_COUNT)
     with pytest.raises(ValueError, match="has no folder; name one with `out`"):
         CampaignResult(summary, result.columns).path_arrays()

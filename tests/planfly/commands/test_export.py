@@ -296,3 +296,10 @@ def test_rally_points_of_a_plan_are_kept_and_those_of_a_fence_are_not_taken(
 
 
 CORNERS = ((45.9, 7.9), (45.9, 8.1), (46.1, 8.0))
+
+
+def test_an_error_about_a_plan_names_no_temporary_file(tmp_path: Path) -> None:
+    plan = a_plan([(0.0, 0.0, 700.0), (2000.0, 0.0, 700.0), (4000.0, 100.0, 700.0), (6000.0, 0.0, 700.0)])
+    with pytest.raises(MissionError) as caught:
+        planfly.export(plan, tmp_path / "p.rally")
+    assert str(caught.value) == f"the plan: contains no rally points to write to {tmp_path / 'p.rally'}"
