@@ -213,8 +213,7 @@ END_BATTERY_EMPTY = 7
 NO_MOTOR = 8
 # The aircraft touched the ground with something other than belly or wheels.
 END_TIPPED_OVER = 9
-# Horizontal distance from the end of the route beyond which a flight that passes the end has missed it, m.  There is no
-# limit for the altitude, because autopilots end a mission by distance, and the findings on the last leg judge altitude.
+# Lateral or vertical distance from the end of the route beyond which a flight that passes the end has missed it, m.
 MISSED_ROUTE_DISTANCE_M = 100.0
 # Distance from the center at which an RTL has arrived at its loiter, m. A loiter of 60 m cannot be flown at 26 m/s and
 # 30 degrees of bank: ArduPlane flies up to 260 m from its center.
@@ -237,7 +236,7 @@ ENDS = {
     GROUND: "ground contact",
     END_OVERBANK: "loss of control: bank beyond 75 degrees",
     STALLED: "loss of control: airspeed below the stall",
-    END_MISSED_ROUTE: "missed: passed the end of the route more than 100 m to one side",
+    END_MISSED_ROUTE: "missed: passed the end of the route more than 100 m to one side of it, above it or below it",
     END_BATTERY_EMPTY: "nothing is left in the battery or the tank",
     NO_MOTOR: "not launched: the motor never started",
     END_TIPPED_OVER: "ground contact: not on its belly or wheels",
@@ -453,7 +452,9 @@ def _find_airborne_end(
     if state.airspeed < min_airspeed:
         return STALLED
     if memory.is_finished:
-        is_near = memory.is_in_rtl or abs(memory.cross_track) <= MISSED_ROUTE_DISTANCE_M
+        is_near = memory.is_in_rtl or (
+            abs(memory.cross_track) <= MISSED_ROUTE_DISTANCE_M and abs(memory.height_error) <= MISSED_ROUTE_DISTANCE_M
+        )
         return COMPLETED if is_near else END_MISSED_ROUTE
     return END_BATTERY_EMPTY if is_battery_empty else 0
 

@@ -198,9 +198,10 @@ def test_a_reading_that_is_no_number_ends_the_flight(name: str, value: float) ->
         ({"north": LENGTH + 0.01, "east": 100.1}, END_MISSED_ROUTE),
         ({"north": LENGTH + 0.01, "east": -99.9}, COMPLETED),
         ({"north": LENGTH + 0.01, "east": -100.1}, END_MISSED_ROUTE),
-        # The end is reached whatever the altitude.
-        ({"north": LENGTH + 0.01, "up": HEIGHT + 150.0}, COMPLETED),
-        ({"north": LENGTH + 0.01, "up": HEIGHT - 150.0}, COMPLETED),
+        ({"north": LENGTH + 0.01, "up": HEIGHT + 99.9}, COMPLETED),
+        ({"north": LENGTH + 0.01, "up": HEIGHT + 100.1}, END_MISSED_ROUTE),
+        ({"north": LENGTH + 0.01, "up": HEIGHT - 99.9}, COMPLETED),
+        ({"north": LENGTH + 0.01, "up": HEIGHT - 100.1}, END_MISSED_ROUTE),
         # Far from a path whose end is ahead, a flight goes on.
         ({"east": 300.0, "up": HEIGHT + 300.0}, 0),
     ],
