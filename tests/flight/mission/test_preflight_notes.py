@@ -233,11 +233,15 @@ def test_a_mission_that_states_amsl_as_heights_above_home_is_named() -> None:
     # Heights above home among altitudes that are right as AMSL: as high as these, or 1 m below.
     mixed = (wp(0, 500, 180, frame=0), wp(0, 2000, 180), wp(1500, 2000, 180))
     (note,) = [text for text in notes(*mixed) if "frame" in text]
-    assert note.startswith("items 2, 3: flown as heights above home (frame 3): 180 m above ground; check the ")
+    assert note.startswith(
+        "items 2, 3: flown as heights above home (frame 3), 180 m above ground; read as altitudes above"
+    )
     assert not any("frame" in text for text in notes(mixed[0], wp(0, 2000, 179), wp(1500, 2000, 179)))
     # An altitude below the ground is wrong itself, and says nothing about the others.
     (note,) = [text for text in notes(wp(0, 500, 80, frame=0), wp(0, 2000, 80), wp(1500, 2000, 80)) if "frame" in text]
-    assert note.startswith("item 1: flown as altitudes above mean sea level (frame 0): 20 m below ground")
+    assert note.startswith(
+        "item 1: flown as altitudes above mean sea level (frame 0), 20 m below ground; read as heights above home"
+    )
     # A home near sea level does not tell the frames apart.
     low = make_gridded_terrain(np.full((3, 3), 20.0), *[np.array([-9e3, 0.0, 9e3])] * 2, source="", sha256="", datum="")
     assert notes(*raised, home="36.5 -84.2 20", ground=low) == []
