@@ -219,7 +219,8 @@ def comparison_lines(comparison: CampaignComparison) -> list[str]:
         f"  paired  {count_text(comparison.pairs, 'flight')} with the same draws: {comparison.only_first} flyable only"
         f" in the first, {comparison.only_second} only in the second (McNemar's exact test: p = {p_value:.2g})"
         if comparison.pairs
-        else f"  paired  no: the flights have other draws (Fisher's exact test: p = {p_value:.2g})"
+        else f"  paired  no: the flights have other draws (Fisher's exact test: p = {p_value:.2g}); with the same"
+        " --seed and --spread they are compared in pairs, which shows smaller differences"
     )
     lines += [
         f"  fails   {RULE_WORDS[rule].title}: {_change_text(first, second, comparison)}"

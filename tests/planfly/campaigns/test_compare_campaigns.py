@@ -77,6 +77,10 @@ def test_other_draws_are_other_samples(base: CampaignBase, tmp_path: Path) -> No
     second = fly(replace(base, seed=2), tmp_path / "b", 70, dict.fromkeys(range(14), "slope"))
     found = planfly.compare_campaigns(first, second)
     assert found.pairs == 0
+    (hint,) = [line for line in comparison_lines(found) if line.startswith("  paired  no: ")]
+    assert hint.endswith(
+        "; with the same --seed and --spread they are compared in pairs, which shows smaller differences"
+    )
     assert [round(bound, 4) for bound in found.difference.interval] == [0.0524, 0.3339]
     assert found.answer == "more likely"
     assert found.inputs == ("seed 2 instead of 1",)
