@@ -62,6 +62,7 @@ class Restored(NamedTuple):
     undone_steps: undone edits after the edited mission, each with its description, for redo.
     replaced: saved settings that are not restored, each with the reason or the value that replaces it.
     by_options: True if options of the command line replaced them, which are then saved in their place.
+    unused_edits: number of unsaved edits of another content of the mission file, which are not restored.
     """
 
     mission: Mission
@@ -70,6 +71,7 @@ class Restored(NamedTuple):
     undone_steps: list[tuple[Mission, str]]
     replaced: tuple[str, ...] = ()
     by_options: bool = False
+    unused_edits: int = 0
 
 
 def autosave_text(
@@ -134,7 +136,9 @@ def _scenario_name(context: EditContext) -> str:
 
 
 def read_autosave(file: Path, context: EditContext, document: Document, options: MissionOptions) -> Restored | None:
-    """Return the saved mission and its editing context; None without a file, or if it is of another mission.
+    """Return the saved mission and its editing context; None without a file, or if it is of another version.
+
+    If the opened mission is not the mission that the edits were made in, only the settings are restored.
 
     options: options of the command line, which replace saved settings.
     Raises one of `INTERNAL` or PlanflyError for a file that cannot be read.
@@ -146,8 +150,13 @@ def read_autosave(file: Path, context: EditContext, document: Document, options:
     )
     first = document.setup.mission
     is_same_file = bool(document.on_disk) and data.get("file") == _file_digest(document)
-    if data["schema"] != _SCHEMA or (data["first"] != mission_data(first) and not is_same_file):
+    if data["schema"] != _SCHEMA:
         return None
+    unused_edits = 0
+    if data["first"] != mission_data(first) and not is_same_file:
+        is_unsaved = data["mission"] != data["first"] and data.get("in_file") is not True
+        unused_edits = max(1, len(data.get("steps", []))) if is_unsaved else 0
+        data |= {"mission": mission_data(first), "steps": [], "undone": [], "plan": None}
     is_opened = data["mission"] == mission_data(first) or (is_same_file and data.get("in_file") is True)
     mission = first if is_opened else mission_from_data(data["mission"], first)
     steps, undone_steps = (
@@ -161,10 +170,17 @@ def read_autosave(file: Path, context: EditContext, document: Document, options:
             (mission, new_context) if replaced else _restore_plan(new_context, mission, data)
         )
         by_options = bool(replaced) and data.get("scenario") == _scenario_name(context)
-        return Restored(restored_mission, restored_context, steps, undone_steps, replaced, by_options)
+        return Restored(restored_mission, restored_context, steps, undone_steps, replaced, by_options, unused_edits)
     except (*INTERNAL, PlanflyError) as error:
         # If the settings cannot be restored, restore at least the edited mission.
-        return Restored(mission, context, steps, undone_steps, (f"none of them can be restored: {error}",))
+        reason = f"none of them can be restored: {error}"
+        return Restored(mission, context, steps, undone_steps, (reason,), unused_edits=unused_edits)
+
+
+def set_autosave_aside(file: Path) -> Path:
+    """Rename an autosave file so that it is not overwritten; return its new path, named by a digest of the content."""
+    digest = hashlib.sha256(file.read_bytes()).hexdigest()[:8]
+    return file.replace(file.with_name(f"{file.stem}-earlier-{digest}{file.suffix}"))
 
 
 def sibling_autosave_path(file: Path, first: Mission) -> Path:

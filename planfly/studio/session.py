@@ -17,7 +17,7 @@ from logs.verdict.places import Suggestion
 from logs.verdict.rule_words import rule_word
 from logs.verdict.wording import count_text, moves_text, suggestion_text, without_trial
 from planfly.flight_options import MissionOptions, read_named_fences
-from planfly.studio.autosave import autosave_text, read_autosave, sibling_autosave_path
+from planfly.studio.autosave import autosave_text, read_autosave, set_autosave_aside, sibling_autosave_path
 from planfly.studio.documents import KINDS, Document, SavedFile, open_document, planned_mission, save_document
 from planfly.studio.edit_context import EditContext
 from planfly.studio.history import History
@@ -83,6 +83,7 @@ class Session:
     undone_states: states of the documents whose opening was undone.
     replaced_settings: autosaved settings of this document that were not restored, each as text.
     must_autosave: True if options of the command replaced autosaved settings, so that the autosave is written again.
+    unused_text: text on autosaved edits of another content of the mission file, which were set aside; "" without any.
     aircraft_folders: folders of the user's own aircraft that the session has flown, by name.
     """
 
@@ -103,6 +104,7 @@ class Session:
     undone_states: list[_OpenedState] = field(default_factory=list)
     replaced_settings: tuple[str, ...] = ()
     must_autosave: bool = False
+    unused_text: str = ""
     aircraft_folders: dict[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -129,7 +131,7 @@ class Session:
         )
         self._restore_state((new_session.document, new_session.context, new_session.history))
         self.aircraft_folders |= new_session.aircraft_folders
-        self.replaced_settings, self.must_autosave = (), False
+        self.replaced_settings, self.must_autosave, self.unused_text = (), False, ""
 
     def _opened_state(self) -> _OpenedState:
         """Return the document with its context and history, to restore it later."""
@@ -449,7 +451,11 @@ class Session:
             "redo": self.redo_text,
             "over": self.file_kind,
             "planned": self.judged.setup.plan is not None,
-            "notes": [*filter(None, [self.replaced_text]), *self.mission.warnings, *self.judged.setup.notes],
+            "notes": [
+                *filter(None, [self.unused_text, self.replaced_text]),
+                *self.mission.warnings,
+                *self.judged.setup.notes,
+            ],
             **mission_json(self.context, self.judged),
             **({"findings": tried.findings} if tried is not None and tried.rev == self.rev else {}),
         }
@@ -506,7 +512,8 @@ class Session:
     @property
     def needs_autosave(self) -> bool:
         """True if the mission or the settings differ from the opened document, or from the autosave."""
-        return self.is_edited or self.must_autosave or self.context.scenario is not self.document.setup.scenario
+        has_notes = self.must_autosave or bool(self.unused_text)
+        return self.is_edited or has_notes or self.context.scenario is not self.document.setup.scenario
 
     def autosave_path(self, file: Path) -> Path:
         """Return the autosave path of the current document.
@@ -535,15 +542,15 @@ class Session:
     def restore(self, file: Path) -> bool:
         """Restore the autosave of this document, with its edits; return True if there was one.
 
-        An autosave of another document is ignored. An autosave that cannot be read is added to `unreadable`, and is
-        neither restored nor overwritten.
+        If the mission file has changed since, only the settings are restored, and an autosave with unsaved edits is set
+        aside. An autosave that cannot be read is added to `unreadable`, and is neither restored nor overwritten.
         """
         previous_state = self.context, self.judged, self.plans
         try:
             autosave = read_autosave(file, self.context, self.document, self.options)
             if autosave is None:
                 return False
-            mission, context, steps, undone_steps, replaced_settings, self.must_autosave = autosave
+            mission, context, steps, undone_steps, replaced_settings, self.must_autosave, unused_edits = autosave
             is_edited = mission is not self.history.first
             if is_edited or context is not self.context:
                 self._set_mission(mission, context)
@@ -555,6 +562,9 @@ class Session:
             return False
         self.aircraft_folders |= own_aircraft(self.context.scenario)
         self.replaced_settings = replaced_settings
+        if unused_edits:
+            self._set_aside(file, unused_edits)
+            return False
         if is_edited:
             self.history.steps = steps[:-1]
             self.history.position = len(self.history.steps)
@@ -562,6 +572,17 @@ class Session:
             self._add_to_history(mission, steps[-1][1] if steps else "the edits of the previous session")
         self.history.steps += undone_steps
         return is_edited or context is not previous_state[0]
+
+    def _set_aside(self, file: Path, count: int) -> None:
+        """Set an autosave aside, and note its edits.  count: number of its edits, which are not restored."""
+        try:
+            kept_file = set_autosave_aside(file)
+        except OSError:
+            self.unreadable.append(file)
+            kept_file = file
+        what = "mission" if self.document.path is None else "mission file"
+        edits_text = f"{count_text(count, 'earlier edit')} {'was' if count == 1 else 'were'} set aside"
+        self.unused_text = f"the {what} has changed since; {edits_text} in {kept_file}"
 
 
 def open_session(target: str, options: MissionOptions, autosave_file: Path | None = None) -> tuple[Session, bool]:

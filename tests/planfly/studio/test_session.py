@@ -277,6 +277,36 @@ def test_what_was_done_is_there_after_the_server_died(tmp_path: Path) -> None:
     assert not other.is_changed
 
 
+def test_edits_of_a_file_that_has_changed_since_are_set_aside_and_this_is_said(tmp_path: Path) -> None:
+    file, kept, world = tmp_path / "m.waypoints", tmp_path / "m.json", MissionOptions(scenario="jacksboro")
+    file.write_text(mission_text(drawn_session(8, 6).mission, "waypoints"), encoding="utf-8")
+    session, _ = open_session(str(file), world, kept)
+    session.change_settings(messages.Settings(kind="settings", wind_speed=9.0, parameter="WP_RADIUS=55"))
+    for by in (10.0, 20.0):
+        session.edit(messages.Raise(kind="raise", rev=session.rev, by=by))
+    session.autosave(kept)
+    edited = kept.read_bytes()
+    opened = file.read_bytes()
+    file.write_text(mission_text(drawn_session(9, 6).mission, "waypoints"), encoding="utf-8")
+    again, restored = open_session(str(file), world, kept)
+    assert (restored, again.is_edited, kept.exists()) == (False, False, False)
+    (aside,) = tmp_path.glob("m-earlier-*.json")
+    assert aside.read_bytes() == edited
+    said = f"the mission file has changed since; 2 earlier edits were set aside in {aside}"
+    assert again.unused_text == said
+    assert said in again.mission_message()["notes"]
+    # The settings do not depend on the file's content.
+    assert again.settings_json() == session.settings_json()
+    assert again.needs_autosave
+    again.autosave(kept)
+    third, _ = open_session(str(file), world, kept)
+    assert (third.unused_text, third.settings_json()) == ("", session.settings_json())
+    # The file as it was, with the session as it was.
+    file.write_bytes(opened)
+    aside.replace(kept)
+    assert open_session(str(file), world, kept)[0].mission.items == session.mission.items
+
+
 def test_settings_and_a_planned_path_are_there_after_the_server_died(tmp_path: Path) -> None:
     file, kept, world = tmp_path / "m.waypoints", tmp_path / "m.json", MissionOptions(scenario="jacksboro-air")
     file.write_text(mission_text(drawn_session(8, 10).mission, "waypoints"), encoding="utf-8")
