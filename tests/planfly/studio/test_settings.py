@@ -101,7 +101,8 @@ def test_an_aircraft_named_by_its_folder_can_be_chosen_again(tmp_path: Path) -> 
     session.autosave(kept)
     again, _ = open_session(str(file), MissionOptions(scenario="jacksboro"), kept)
     again.open(open_document(str(file), again.options))
-    assert again.settings_json()["aircraft"] == "aerosonde"
+    assert again.settings_json()["aircraft"] == "own"
+    set_in(again, aircraft="aerosonde")
     set_in(again, aircraft="own")
     assert again.settings_json()["aircraft"] == "own"
 
