@@ -230,7 +230,10 @@ def restore_settings(
         replaced += _take_entries(new_spec, spec, "flight", _AUTOPILOT_KEYS)
     saved_parameters = data.get("parameters") or asdict(ChangedParameters())
     parameters = ChangedParameters(
-        dict(saved_parameters["values"]), saved_parameters["file"], tuple(saved_parameters["unused"])
+        dict(saved_parameters["values"]),
+        saved_parameters["file"],
+        tuple(saved_parameters["unused"]),
+        tuple(saved_parameters.get("typed", ())),
     )
     # As in the studio, a parameter file replaces all parameters, and another autopilot has other parameters.
     has_other_autopilot = any(text.startswith("autopilot ") for text in replaced)
