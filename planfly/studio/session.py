@@ -33,6 +33,7 @@ from planfly.studio.messages import Apply, Choose, Delete, Drag, Insert, Move, R
 from planfly.studio.settings import (
     apply_parameter_settings,
     apply_scenario_settings,
+    autopilot_parameters,
     error_in_page_words,
     own_aircraft,
     settings_json,
@@ -45,6 +46,7 @@ from planner.plan import Plan
 from world.errors import MissionError, PlanflyError
 from world.files import write_atomically
 from world.frames import to_geo
+from world.scenario import with_flight
 
 Edit = Move | Insert | Delete | Raise | Apply
 # Document, context and history of edits.
@@ -92,6 +94,7 @@ class Session:
     must_autosave: True if options of the command replaced autosaved settings, so that the autosave is written again.
     unused_text: text on autosaved edits of another content of the mission file, which were set aside; "" without any.
     aircraft_folders: folders of the user's own aircraft that the session has flown, by name.
+    named_parameters: scenario's entries of the autopilot with its parameter file, by the autopilots flown with a file.
     """
 
     document: Document
@@ -113,6 +116,7 @@ class Session:
     must_autosave: bool = False
     unused_text: str = ""
     aircraft_folders: dict[str, str] = field(default_factory=dict)
+    named_parameters: dict[str, dict[str, str]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.aircraft_folders |= own_aircraft(self.context.scenario)
@@ -457,6 +461,9 @@ class Session:
         """
         try:
             scenario = apply_scenario_settings(self.context.scenario, settings, self.aircraft_folders)
+            if settings.autopilot is not None and settings.autopilot != self.context.uav.autopilot.name:
+                self.named_parameters |= autopilot_parameters(self.context.scenario, self.context.uav)
+                scenario = with_flight(scenario, **self.named_parameters.get(settings.autopilot, {}))
             parameters = apply_parameter_settings(self.context.parameters, scenario, settings)
             context = self.context.with_settings(scenario, parameters)
             judged_mission = context.judge(self.mission)

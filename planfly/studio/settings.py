@@ -103,6 +103,13 @@ def own_aircraft(scenario: Scenario) -> dict[str, str]:
     return {Path(folder).name: folder} if names_folder(folder) else {}
 
 
+def autopilot_parameters(scenario: Scenario, uav: Uav) -> dict[str, dict[str, str]]:
+    """Return the entries that fly a scenario's parameter file, by its autopilot; empty without a parameter file."""
+    table = scenario.flight.model_dump(include={"autopilot", "params", "arduplane_version", "px4_version"})
+    entries = {key: str(value) for key, value in table.items() if value is not None}
+    return {uav.autopilot.name: entries} if "params" in entries else {}
+
+
 def error_in_page_words(error: PlanflyError, settings: Settings, scenario_name: str) -> PlanflyError:
     """Return an error of a change of settings that names the settings by their labels on the page.
 

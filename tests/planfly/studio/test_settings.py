@@ -112,6 +112,18 @@ def test_parameters_of_the_command_and_of_the_studio_are_told_apart(tmp_path: Pa
         assert "mine.param, changed in the studio: RTL_RADIUS (" in one.judged.setup.autopilot.describe("aerosonde")
 
 
+def test_the_parameters_of_the_command_are_flown_again_after_another_autopilot(tmp_path: Path) -> None:
+    file, own = tmp_path / "m.waypoints", tmp_path / "my.parm"
+    file.write_text(mission_text(drawn_session(6, 8).mission, "waypoints"), encoding="utf-8")
+    own.write_text("WP_RADIUS 60\nNAVL1_PERIOD 20\n", encoding="utf-8")
+    session, _ = open_session(str(file), MissionOptions(terrain="jacksboro", params=own))
+    set_in(session, autopilot="px4")
+    assert session.settings_json()["scenario_parameter_file"] == ""
+    set_in(session, autopilot="ardupilot")
+    assert session.settings_json()["scenario_parameter_file"] == "my.parm"
+    assert session.context.uav.autopilot.stated_value("WP_RADIUS") == 60.0
+
+
 def test_an_aircraft_named_by_its_folder_can_be_chosen_again(tmp_path: Path) -> None:
     copy_aerosonde(tmp_path)
     file, kept = tmp_path / "m.waypoints", tmp_path / "m.json"
