@@ -62,6 +62,7 @@ class Restored(NamedTuple):
     undone_steps: undone edits after the edited mission, each with its description, for redo.
     replaced: saved settings that are not restored, each with the reason or the value that replaces it.
     by_options: True if options of the command line replaced them, which are then saved in their place.
+    unused_edits: number of unsaved edits of another content of the mission file, which are not restored.
     """
 
     mission: Mission
@@ -70,6 +71,7 @@ class Restored(NamedTuple):
     undone_steps: list[tuple[Mission, str]]
     replaced: tuple[str, ...] = ()
     by_options: bool = False
+    unused_edits: int = 0
 
 
 def autosave_text(
@@ -86,9 +88,6 @@ def autosave_text(
     plan: the plan of the mission, or None if the mission was changed after planning.
     is_in_file: True if the file of the document contains the edited mission.
     """
-    spec = context.scenario.to_json()
-    # An area made around a mission is not saved; it is made again when the mission is restored.
-    names = [table for table in _SAVED_TABLES if table in spec and (table != "area" or not context.scenario.external)]
     data = {
         "schema": _SCHEMA,
         "name": document.name,
@@ -100,13 +99,24 @@ def autosave_text(
         "first": mission_data(document.setup.mission),
         "file": _file_digest(document),
         "in_file": is_in_file,
-        "scenario": _scenario_name(context),
-        "settings": {table: spec[table] for table in names},
-        "parameters": asdict(context.parameters),
+        **settings_data(context),
         "planned": context.planned,
         "plan": None if plan is None else plan_json(plan),
     }
     return json.dumps(data)
+
+
+def settings_data(context: EditContext) -> Json:
+    """Return the settings of an editing context as data, with the name of the scenario that they belong to."""
+    spec = context.scenario.to_json()
+    # An area made around a mission is not saved; it is made again when the mission is restored.
+    names = [table for table in _SAVED_TABLES if table in spec and (table != "area" or not context.scenario.external)]
+    data = {
+        "scenario": _scenario_name(context),
+        "settings": {table: spec[table] for table in names},
+        "parameters": asdict(context.parameters),
+    }
+    return dict(json.loads(json.dumps(data)))
 
 
 def _steps_to_save(document: Document, history: History) -> list[tuple[Mission, str]]:
@@ -133,10 +143,15 @@ def _scenario_name(context: EditContext) -> str:
     return "" if context.scenario.external else context.scenario.name
 
 
-def read_autosave(file: Path, context: EditContext, document: Document, options: MissionOptions) -> Restored | None:
-    """Return the saved mission and its editing context; None without a file, or if it is of another mission.
+def read_autosave(
+    file: Path, context: EditContext, document: Document, options: MissionOptions, settings: Json | None = None
+) -> Restored | None:
+    """Return the saved mission and its editing context; None without a file, or if it is of another version.
+
+    If the opened mission is not the mission that the edits were made in, only the settings are restored.
 
     options: options of the command line, which replace saved settings.
+    settings: settings of the session, which replace all saved settings of the same scenario; None for a new session.
     Raises one of `INTERNAL` or PlanflyError for a file that cannot be read.
     """
     if not file.exists():
@@ -146,8 +161,17 @@ def read_autosave(file: Path, context: EditContext, document: Document, options:
     )
     first = document.setup.mission
     is_same_file = bool(document.on_disk) and data.get("file") == _file_digest(document)
-    if data["schema"] != _SCHEMA or (data["first"] != mission_data(first) and not is_same_file):
+    if data["schema"] != _SCHEMA:
         return None
+    unused_edits = 0
+    if data["first"] != mission_data(first) and not is_same_file:
+        is_unsaved = data["mission"] != data["first"] and data.get("in_file") is not True
+        unused_edits = max(1, len(data.get("steps", []))) if is_unsaved else 0
+        data |= {"mission": mission_data(first), "steps": [], "undone": [], "plan": None}
+    if settings is not None and settings["scenario"] == data.get("scenario"):
+        # The certificate of a plan applies only to the settings that it was made for.
+        has_same_settings = all(data.get(key) == value for key, value in settings.items())
+        data |= settings | ({} if has_same_settings else {"plan": None})
     is_opened = data["mission"] == mission_data(first) or (is_same_file and data.get("in_file") is True)
     mission = first if is_opened else mission_from_data(data["mission"], first)
     steps, undone_steps = (
@@ -155,16 +179,22 @@ def read_autosave(file: Path, context: EditContext, document: Document, options:
         for name in ("steps", "undone")
     )
     try:
-        new_context, replaced = _restore_settings(context, data, options)
-        # The certificate of a plan applies only to the settings that it was made for.
+        new_context, replaced = restore_settings(context, data, options)
         restored_mission, restored_context = (
             (mission, new_context) if replaced else _restore_plan(new_context, mission, data)
         )
         by_options = bool(replaced) and data.get("scenario") == _scenario_name(context)
-        return Restored(restored_mission, restored_context, steps, undone_steps, replaced, by_options)
+        return Restored(restored_mission, restored_context, steps, undone_steps, replaced, by_options, unused_edits)
     except (*INTERNAL, PlanflyError) as error:
         # If the settings cannot be restored, restore at least the edited mission.
-        return Restored(mission, context, steps, undone_steps, (f"none of them can be restored: {error}",))
+        reason = f"none of them can be restored: {error}"
+        return Restored(mission, context, steps, undone_steps, (reason,), unused_edits=unused_edits)
+
+
+def set_autosave_aside(file: Path) -> Path:
+    """Rename an autosave file so that it is not overwritten; return its new path, named by a digest of the content."""
+    digest = hashlib.sha256(file.read_bytes()).hexdigest()[:8]
+    return file.replace(file.with_name(f"{file.stem}-earlier-{digest}{file.suffix}"))
 
 
 def sibling_autosave_path(file: Path, first: Mission) -> Path:
@@ -177,12 +207,15 @@ def sibling_autosave_path(file: Path, first: Mission) -> Path:
     return file.with_name(f"{file.stem}-{digest}{file.suffix}")
 
 
-def _restore_settings(context: EditContext, data: Json, options: MissionOptions) -> tuple[EditContext, tuple[str, ...]]:
+def restore_settings(
+    context: EditContext, data: Json, options: MissionOptions, *, file_autopilot: bool = False
+) -> tuple[EditContext, tuple[str, ...]]:
     """Return the editing context with the saved settings, and texts on saved settings that were replaced.
 
     The context is `context` itself if the settings do not differ.
 
     options: options of the command line, which replace saved settings.
+    file_autopilot: True if the autopilot that the opened file was written for replaces the saved one.
     """
     scenario: Scenario = context.scenario
     scenario_name = data.get("scenario", _scenario_name(context))
@@ -191,9 +224,16 @@ def _restore_settings(context: EditContext, data: Json, options: MissionOptions)
     spec, saved = json.loads(json.dumps(scenario.to_json())), data.get("settings", {})
     new_spec = spec | {table: dict(value) for table, value in saved.items() if table in _SAVED_TABLES}
     replaced = _apply_options(new_spec, spec, options)
+    flight = spec.get("flight", {})
+    is_other_autopilot = flight.get("autopilot") != new_spec.get("flight", {}).get("autopilot")
+    if file_autopilot and "autopilot_from" in flight and is_other_autopilot:
+        replaced += _take_entries(new_spec, spec, "flight", _AUTOPILOT_KEYS)
     saved_parameters = data.get("parameters") or asdict(ChangedParameters())
     parameters = ChangedParameters(
-        dict(saved_parameters["values"]), saved_parameters["file"], tuple(saved_parameters["unused"])
+        dict(saved_parameters["values"]),
+        saved_parameters["file"],
+        tuple(saved_parameters["unused"]),
+        tuple(saved_parameters.get("typed", ())),
     )
     # As in the studio, a parameter file replaces all parameters, and another autopilot has other parameters.
     has_other_autopilot = any(text.startswith("autopilot ") for text in replaced)
@@ -215,19 +255,29 @@ def _apply_options(saved_spec: Json, opened_spec: Json, options: MissionOptions)
 
     Returns one text for each entry that was different, with both values.
     """
-    replaced = []
+    replaced: list[str] = []
     for option, (table, keys) in _OPTION_ENTRIES.items():
         if options.get(option) is None:
             continue
         saved, opened = saved_spec.setdefault(table, {}), opened_spec.get(table, {})
         if option == "aircraft" and not _is_same_value(saved.get("aircraft"), opened.get("aircraft")):
             keys = (*keys, *_AIRCRAFT_KEYS)
-        for key in keys:
-            old_value, new_value = saved.pop(key, None), opened.get(key)
-            if new_value is not None:
-                saved[key] = new_value
-            if not _is_same_value(old_value, new_value) and key not in ("aircraft_by_default", "autopilot_from"):
-                replaced.append(f"{_key_text(key)} {_value_text(old_value)} \u2192 {_value_text(new_value)}")
+        replaced += _take_entries(saved_spec, opened_spec, table, keys)
+    return replaced
+
+
+def _take_entries(saved_spec: Json, opened_spec: Json, table: str, keys: tuple[str, ...]) -> list[str]:
+    """Replace entries of a table of a saved scenario by those of the opened scenario.
+
+    Returns one text for each entry that was different, with both values.
+    """
+    replaced, saved, opened = [], saved_spec.setdefault(table, {}), opened_spec.get(table, {})
+    for key in keys:
+        old_value, new_value = saved.pop(key, None), opened.get(key)
+        if new_value is not None:
+            saved[key] = new_value
+        if not _is_same_value(old_value, new_value) and key not in ("aircraft_by_default", "autopilot_from"):
+            replaced.append(f"{_key_text(key)} {_value_text(old_value)} \u2192 {_value_text(new_value)}")
     return replaced
 
 

@@ -105,7 +105,7 @@ class Raise(_Message):
 
 
 class Step(_Message):
-    """Undo, redo, or revert to the file as it was opened."""
+    """Undo, redo, or revert to the mission file."""
 
     kind: Literal["undo", "redo", "revert"]
 

@@ -74,6 +74,8 @@ def open_studio(
         if restored:
             undo_hint = "; undo reverts this" if session.undo_text else ""
             on_message(f"earlier edits are restored (from {autosave_file}){undo_hint}")
+        if session.unused_text:
+            on_message(session.unused_text)
         if session.replaced_text:
             on_message(f"{session.replaced_text} (from {autosave_file})")
         for file in session.unreadable:

@@ -400,9 +400,7 @@ class Server:
                     # An error here is reported at the next regular autosave.
                     with contextlib.suppress(OSError, PlanflyError):
                         session.autosave(self._autosave_file)
-                session.open(document)
-                if self._autosave_file is not None:
-                    session.restore(session.autosave_path(self._autosave_file))
+                session.open(document, self._autosave_file)
                 self.jobs.discard_results()
 
     def _open_file(self, message: messages.Open) -> Any:

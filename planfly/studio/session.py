@@ -17,7 +17,14 @@ from logs.verdict.places import Suggestion
 from logs.verdict.rule_words import rule_word
 from logs.verdict.wording import count_text, moves_text, suggestion_text, without_trial
 from planfly.flight_options import MissionOptions, read_named_fences
-from planfly.studio.autosave import autosave_text, read_autosave, sibling_autosave_path
+from planfly.studio.autosave import (
+    autosave_text,
+    read_autosave,
+    restore_settings,
+    set_autosave_aside,
+    settings_data,
+    sibling_autosave_path,
+)
 from planfly.studio.documents import KINDS, Document, SavedFile, open_document, planned_mission, save_document
 from planfly.studio.edit_context import EditContext
 from planfly.studio.history import History
@@ -26,6 +33,7 @@ from planfly.studio.messages import Apply, Choose, Delete, Drag, Insert, Move, R
 from planfly.studio.settings import (
     apply_parameter_settings,
     apply_scenario_settings,
+    autopilot_parameters,
     error_in_page_words,
     own_aircraft,
     settings_json,
@@ -38,6 +46,7 @@ from planner.plan import Plan
 from world.errors import MissionError, PlanflyError
 from world.files import write_atomically
 from world.frames import to_geo
+from world.scenario import with_flight
 
 Edit = Move | Insert | Delete | Raise | Apply
 # Document, context and history of edits.
@@ -83,7 +92,9 @@ class Session:
     undone_states: states of the documents whose opening was undone.
     replaced_settings: autosaved settings of this document that were not restored, each as text.
     must_autosave: True if options of the command replaced autosaved settings, so that the autosave is written again.
+    unused_text: text on autosaved edits of another content of the mission file, which were set aside; "" without any.
     aircraft_folders: folders of the user's own aircraft that the session has flown, by name.
+    named_parameters: scenario's entries of the autopilot with its parameter file, by the autopilots flown with a file.
     """
 
     document: Document
@@ -103,7 +114,9 @@ class Session:
     undone_states: list[_OpenedState] = field(default_factory=list)
     replaced_settings: tuple[str, ...] = ()
     must_autosave: bool = False
+    unused_text: str = ""
     aircraft_folders: dict[str, str] = field(default_factory=dict)
+    named_parameters: dict[str, dict[str, str]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.aircraft_folders |= own_aircraft(self.context.scenario)
@@ -119,17 +132,31 @@ class Session:
         named_path = None if document.path is None else document.path.resolve()
         return cls(document, options, context, history, judged_mission, named_file=named_path)
 
-    def open(self, document: Document) -> None:
-        """Open another document; an undo before its first edit restores the previous document."""
+    def open(self, document: Document, first_autosave_file: Path | None = None) -> None:
+        """Open another document; an undo before its first edit restores the previous document.
+
+        A mission file is judged with the settings of the session.  A plan or a log has its own settings.
+
+        first_autosave_file: autosave path of the first document; None to restore no earlier edits of the document.
+        """
         is_named_file = document.path is not None and document.path.resolve() == self.named_file
         new_session = Session.from_document(document if is_named_file else replace(document, path=None), self.options)
-        self.earlier_states, self.undone_states = (
-            [*self.earlier_states, self._opened_state()][-_MAX_EARLIER_DOCUMENTS:],
-            [],
-        )
-        self._restore_state((new_session.document, new_session.context, new_session.history))
+        context, settings = new_session.context, None
+        replaced_settings: tuple[str, ...] = ()
+        if document.kind in ("waypoints", "plan"):
+            previous_settings = settings_data(self.context)
+            context, replaced_settings = restore_settings(
+                context, previous_settings, MissionOptions(), file_autopilot=True
+            )
+            settings = settings_data(context)
+            settings = settings if settings["scenario"] == previous_settings["scenario"] else None
+        current_state = self._opened_state()
+        self._restore_state((new_session.document, context, new_session.history))
+        self.earlier_states, self.undone_states = [*self.earlier_states, current_state][-_MAX_EARLIER_DOCUMENTS:], []
         self.aircraft_folders |= new_session.aircraft_folders
-        self.replaced_settings, self.must_autosave = (), False
+        self.replaced_settings, self.must_autosave, self.unused_text = replaced_settings, False, ""
+        if first_autosave_file is not None:
+            self.restore(self.autosave_path(first_autosave_file), settings)
 
     def _opened_state(self) -> _OpenedState:
         """Return the document with its context and history, to restore it later."""
@@ -208,6 +235,7 @@ class Session:
         kind: "undo", "redo" or "revert".
         """
         if kind == "revert":
+            self._read_changed_file()
             if self.is_unsaved:
                 self._set_mission(self.history.saved)
                 self._add_to_history(self.history.saved, "revert to the file")
@@ -230,6 +258,18 @@ class Session:
         except Exception:
             self.history.position = previous_position
             raise
+
+    def _read_changed_file(self) -> None:
+        """Read the mission file again if another program has changed it; its mission then counts as the saved one.
+
+        Raises PlanflyError if the file cannot be read.
+        """
+        path = self.document.path
+        if path is None or not self.file_kind or (path.exists() and path.read_bytes() == self.document.on_disk):
+            return
+        changed_document = open_document(str(path), self.options)
+        self.history.saved = changed_document.setup.mission
+        self.document = replace(self.document, on_disk=changed_document.on_disk)
 
     def judge_drag(self, message: Drag) -> Json:
         """Judge the mission with an item dragged to another position, without changing the mission.
@@ -421,6 +461,9 @@ class Session:
         """
         try:
             scenario = apply_scenario_settings(self.context.scenario, settings, self.aircraft_folders)
+            if settings.autopilot is not None and settings.autopilot != self.context.uav.autopilot.name:
+                self.named_parameters |= autopilot_parameters(self.context.scenario, self.context.uav)
+                scenario = with_flight(scenario, **self.named_parameters.get(settings.autopilot, {}))
             parameters = apply_parameter_settings(self.context.parameters, scenario, settings)
             context = self.context.with_settings(scenario, parameters)
             judged_mission = context.judge(self.mission)
@@ -449,7 +492,11 @@ class Session:
             "redo": self.redo_text,
             "over": self.file_kind,
             "planned": self.judged.setup.plan is not None,
-            "notes": [*filter(None, [self.replaced_text]), *self.mission.warnings, *self.judged.setup.notes],
+            "notes": [
+                *filter(None, [self.unused_text, self.replaced_text]),
+                *self.mission.warnings,
+                *self.judged.setup.notes,
+            ],
             **mission_json(self.context, self.judged),
             **({"findings": tried.findings} if tried is not None and tried.rev == self.rev else {}),
         }
@@ -506,14 +553,16 @@ class Session:
     @property
     def needs_autosave(self) -> bool:
         """True if the mission or the settings differ from the opened document, or from the autosave."""
-        return self.is_edited or self.must_autosave or self.context.scenario is not self.document.setup.scenario
+        has_notes = self.must_autosave or bool(self.unused_text)
+        return self.is_edited or has_notes or self.context.scenario is not self.document.setup.scenario
 
     def autosave_path(self, file: Path) -> Path:
         """Return the autosave path of the current document.
 
-        file: autosave path of the first document; later documents get another file in its folder.
+        file: autosave path of the first document; other documents get another file in its folder.
         """
-        return sibling_autosave_path(file, self.history.first) if self.earlier_states else file
+        is_first = self.document.path is not None or not self.earlier_states
+        return file if is_first else sibling_autosave_path(file, self.history.first)
 
     def autosave(self, first_autosave_file: Path) -> None:
         """Write the autosave file if anything has changed since the last autosave.
@@ -532,18 +581,21 @@ class Session:
         write_atomically(file, text)
         self.autosaved_rev = self.rev
 
-    def restore(self, file: Path) -> bool:
+    def restore(self, file: Path, settings: Json | None = None) -> bool:
         """Restore the autosave of this document, with its edits; return True if there was one.
 
-        An autosave of another document is ignored. An autosave that cannot be read is added to `unreadable`, and is
-        neither restored nor overwritten.
+        If the mission file has changed since, only the settings are restored, and an autosave with unsaved edits is set
+        aside. An autosave that cannot be read is added to `unreadable`, and is neither restored nor overwritten.
+
+        settings: current settings, which replace the autosaved ones and the command's options; None for a new session.
         """
         previous_state = self.context, self.judged, self.plans
         try:
-            autosave = read_autosave(file, self.context, self.document, self.options)
+            options = self.options if settings is None else MissionOptions()
+            autosave = read_autosave(file, self.context, self.document, options, settings)
             if autosave is None:
                 return False
-            mission, context, steps, undone_steps, replaced_settings, self.must_autosave = autosave
+            mission, context, steps, undone_steps, replaced_settings, self.must_autosave, unused_edits = autosave
             is_edited = mission is not self.history.first
             if is_edited or context is not self.context:
                 self._set_mission(mission, context)
@@ -554,7 +606,10 @@ class Session:
             self.unreadable.append(file)
             return False
         self.aircraft_folders |= own_aircraft(self.context.scenario)
-        self.replaced_settings = replaced_settings
+        self.replaced_settings = replaced_settings or self.replaced_settings
+        if unused_edits:
+            self._set_aside(file, unused_edits)
+            return False
         if is_edited:
             self.history.steps = steps[:-1]
             self.history.position = len(self.history.steps)
@@ -562,6 +617,17 @@ class Session:
             self._add_to_history(mission, steps[-1][1] if steps else "the edits of the previous session")
         self.history.steps += undone_steps
         return is_edited or context is not previous_state[0]
+
+    def _set_aside(self, file: Path, count: int) -> None:
+        """Set an autosave aside, and note its edits.  count: number of its edits, which are not restored."""
+        try:
+            kept_file = set_autosave_aside(file)
+        except OSError:
+            self.unreadable.append(file)
+            kept_file = file
+        what = "mission" if self.document.path is None else "mission file"
+        edits_text = f"{count_text(count, 'earlier edit')} {'was' if count == 1 else 'were'} set aside"
+        self.unused_text = f"the {what} has changed since; {edits_text} in {kept_file}"
 
 
 def open_session(target: str, options: MissionOptions, autosave_file: Path | None = None) -> tuple[Session, bool]:

@@ -68,11 +68,13 @@ class ChangedParameters:
     values: values by name, in the units of the autopilot.
     file: name of the file that was read last, or "".
     unused: names in this file that the simulated autopilot does not use.
+    typed: names of the values that were set one at a time.
     """
 
     values: dict[str, float] = field(default_factory=dict)
     file: str = ""
     unused: tuple[str, ...] = ()
+    typed: tuple[str, ...] = ()
 
     def text(self, title: str) -> str:
         """Return the text of a parameter file for ground stations.  title: comment in its first line."""
@@ -87,9 +89,11 @@ class ChangedParameters:
         stored_autopilot = uav.autopilot.store()
         if not self.values or stored_autopilot.parameters is None:
             return uav
-        parameters = stored_autopilot.parameters._replace(
-            source=self.file or stored_autopilot.parameters.source or "the studio"
-        )
+        file = self.file or stored_autopilot.parameters.source
+        names = list(self.values) if not self.file else list(self.typed)
+        names_text = ", ".join(names[:_MAX_LISTED_NAMES]) + (", ..." if len(names) > _MAX_LISTED_NAMES else "")
+        source = f"{file}, changed in the studio: {names_text}" if file and names else file or "the studio"
+        parameters = stored_autopilot.parameters._replace(source=source)
         return replace(uav, autopilot=uav.autopilot.restore(stored_autopilot._replace(parameters=parameters)))
 
 
@@ -97,6 +101,13 @@ def own_aircraft(scenario: Scenario) -> dict[str, str]:
     """Return the folder of a scenario's aircraft by the aircraft's name; empty for an embedded aircraft."""
     folder = scenario.flight.aircraft
     return {Path(folder).name: folder} if names_folder(folder) else {}
+
+
+def autopilot_parameters(scenario: Scenario, uav: Uav) -> dict[str, dict[str, str]]:
+    """Return the entries that fly a scenario's parameter file, by its autopilot; empty without a parameter file."""
+    table = scenario.flight.model_dump(include={"autopilot", "params", "arduplane_version", "px4_version"})
+    entries = {key: str(value) for key, value in table.items() if value is not None}
+    return {uav.autopilot.name: entries} if "params" in entries else {}
 
 
 def error_in_page_words(error: PlanflyError, settings: Settings, scenario_name: str) -> PlanflyError:
@@ -109,6 +120,9 @@ def error_in_page_words(error: PlanflyError, settings: Settings, scenario_name: 
     'Maximum above ground: 20: must be above Minimum clearance 30'
     """
     text = str(error).removeprefix(f"{scenario_name}: ").removeprefix(": ")
+    if settings.parameter is not None and error.file != "parameter":
+        # The value was typed, and is in no file.
+        text = text.removeprefix(f"{error.file}: ")
     for key, pattern in _NAME_PATTERNS.items():
         text = re.sub(pattern, _LABELS[key], text)
     requested = settings.model_dump(exclude_none=True)
@@ -165,17 +179,24 @@ def apply_parameter_settings(current: ChangedParameters, scenario: Scenario, set
     if settings.autopilot is not None:
         current = ChangedParameters()
     values = {name: value for name, value in current.values.items() if name not in (settings.without or ())}
-    result = ChangedParameters(values, current.file if values else "", current.unused if values else ())
+    typed = tuple(name for name in current.typed if name in values)
+    result = ChangedParameters(values, current.file if values else "", current.unused if values else (), typed)
     if settings.parameter_file is not None:
         return read_parameters(scenario, settings.parameter_text or "", settings.parameter_file)
     if settings.parameter is not None:
-        single = read_parameters(scenario, settings.parameter, "parameter")
+        try:
+            single = read_parameters(scenario, settings.parameter, "parameter")
+        except PlanflyError as error:
+            known_as_file = r"not known to the (simulated \w+); expected a parameter file of .*"
+            text = re.sub(known_as_file, r"not a parameter of the \1", str(error))
+            raise PlanflyError(text, file=error.file, field=error.field, value=error.value) from None
         if single.unused:
             name = single.unused[0]
             known_names = [parameter.name for parameter in _load_autopilot_parameters(scenario).values]
             allowed = f"expected a parameter of the simulated autopilot{did_you_mean(name, known_names)}"
             raise PlanflyError(f"parameter: {name}: {allowed}", field="parameter", value=name, allowed=allowed)
-        result = ChangedParameters(values | single.values, result.file, result.unused)
+        all_typed = tuple(dict.fromkeys((*typed, *single.values)))
+        result = ChangedParameters(values | single.values, result.file, result.unused, all_typed)
     return result
 
 
@@ -239,6 +260,7 @@ def settings_json(
         "ceiling": None if scenario.external else float(scenario.ceiling),
         "parameters": dict(changed_parameters.values),
         "parameter_file": changed_parameters.file,
+        "scenario_parameter_file": Path(scenario.flight.params or "").name,
         "unused": ", ".join(changed_parameters.unused[:_MAX_LISTED_NAMES]) + remainder_text,
         "labels": _LABELS,
         "known": {} if parameters is None else {name: value for name, value, _ in parameters.values},

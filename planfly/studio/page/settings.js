@@ -78,7 +78,7 @@ function parameters(settings, app, send) {
     field(settings.labels.parameter, element("span", { class: "with-button" }, one, element("button", { type: "button", onclick: enter }, "Set")), one.id),
     element("datalist", { id: "known-parameters" }, ...known.map((name) => element("option", { value: `${name}=${settings.known[name]}` }))),
     field("From a file", file),
-    element("p", { class: "more" }, set.length ? from : `No parameter is set here: ${settings.autopilot_title} flies with the parameters of the aircraft and of the scenario. A file replaces all of them.`),
+    element("p", { class: "more" }, set.length ? from : `No parameter is set here: ${settings.autopilot_title} flies with the parameters of the aircraft and of ${settings.scenario_parameter_file || "the scenario"}. A file replaces all that are set here.`),
     ...(settings.unused ? [element("p", { class: "more" }, `The simulated autopilot does not use ${settings.unused}.`)] : []),
     ...(set.length ? [element("ul", { class: "parameters" }, ...rows), element("p", {}, element("button", { type: "button", onclick: () => send({ without: set.map(([name]) => name) }) }, "Clear all"), " ", element("button", { type: "button", onclick: () => app.send({ kind: "save", form: "parm" }) }, "Save as .parm"))] : []),
   ];

@@ -277,6 +277,99 @@ def test_what_was_done_is_there_after_the_server_died(tmp_path: Path) -> None:
     assert not other.is_changed
 
 
+def test_edits_of_a_file_that_has_changed_since_are_set_aside_and_this_is_said(tmp_path: Path) -> None:
+    file, kept, world = tmp_path / "m.waypoints", tmp_path / "m.json", MissionOptions(scenario="jacksboro")
+    file.write_text(mission_text(drawn_session(8, 6).mission, "waypoints"), encoding="utf-8")
+    session, _ = open_session(str(file), world, kept)
+    session.change_settings(messages.Settings(kind="settings", wind_speed=9.0, parameter="WP_RADIUS=55"))
+    for by in (10.0, 20.0):
+        session.edit(messages.Raise(kind="raise", rev=session.rev, by=by))
+    session.autosave(kept)
+    edited = kept.read_bytes()
+    opened = file.read_bytes()
+    file.write_text(mission_text(drawn_session(9, 6).mission, "waypoints"), encoding="utf-8")
+    again, restored = open_session(str(file), world, kept)
+    assert (restored, again.is_edited, kept.exists()) == (False, False, False)
+    (aside,) = tmp_path.glob("m-earlier-*.json")
+    assert aside.read_bytes() == edited
+    said = f"the mission file has changed since; 2 earlier edits were set aside in {aside}"
+    assert again.unused_text == said
+    assert said in again.mission_message()["notes"]
+    # The settings do not depend on the file's content.
+    assert again.settings_json() == session.settings_json()
+    assert again.needs_autosave
+    again.autosave(kept)
+    third, _ = open_session(str(file), world, kept)
+    assert (third.unused_text, third.settings_json()) == ("", session.settings_json())
+    # The file as it was, with the session as it was.
+    file.write_bytes(opened)
+    aside.replace(kept)
+    assert open_session(str(file), world, kept)[0].mission.items == session.mission.items
+
+
+def test_a_file_opened_from_the_page_keeps_the_settings_and_its_kept_session(tmp_path: Path) -> None:
+    file, other, kept = tmp_path / "m.waypoints", tmp_path / "other.waypoints", tmp_path / "m.json"
+    for path, seed in ((file, 8), (other, 9)):
+        path.write_text(mission_text(drawn_session(seed, 6).mission, "waypoints"), encoding="utf-8")
+    (tmp_path / "my.parm").write_text("WP_RADIUS 60\n", encoding="utf-8")
+    named = MissionOptions(terrain="jacksboro", wind=(3.0, 90.0), params=tmp_path / "my.parm")
+    session, _ = open_session(str(file), named, kept)
+    session.change_settings(
+        messages.Settings(kind="settings", aircraft="x8", airspeed=17.0, wind_speed=6.0, parameter="NAVL1_PERIOD=21")
+    )
+    session.edit(messages.Raise(kind="raise", rev=session.rev, by=10.0))
+    edited, settings = session.mission, session.settings_json()
+    for path in (other, file):
+        session.autosave(kept)
+        session.open(open_document(str(path), session.options), kept)
+        assert session.settings_json() == settings
+        assert session.context.uav.autopilot.stated_value("WP_RADIUS") == 60.0
+    # The file has its edits, and one kept session whichever way it was opened.
+    assert session.mission.items == edited.items
+    session.change_settings(messages.Settings(kind="settings", wind_speed=7.0))
+    session.edit(messages.Raise(kind="raise", rev=session.rev, by=20.0))
+    session.autosave(kept)
+    again, _ = open_session(str(file), MissionOptions(terrain="jacksboro"), kept)
+    assert again.mission.items == session.mission.items
+    assert again.settings_json() == session.settings_json()
+    # The settings of the session, not those that were kept with the other file.
+    again.open(open_document(str(other), again.options), kept)
+    assert again.settings_json() == session.settings_json()
+
+
+def test_an_opened_plan_of_another_autopilot_is_flown_by_it(tmp_path: Path) -> None:
+    file, plan, mission = tmp_path / "m.waypoints", tmp_path / "m.plan", drawn_session(8, 6).mission
+    file.write_text(mission_text(mission, "waypoints"), encoding="utf-8")
+    plan.write_text(mission_text(replace(mission, autopilot="px4"), "plan"), encoding="utf-8")
+    session, _ = open_session(str(file), MissionOptions(terrain="jacksboro"))
+    session.change_settings(messages.Settings(kind="settings", wind_speed=6.0))
+    session.open(open_document(str(plan), session.options))
+    assert (session.settings_json()["autopilot"], session.settings_json()["wind_speed"]) == ("px4", 6.0)
+    assert "kept settings not used: autopilot ardupilot \u2192 px4" in "\n".join(session.mission_message()["notes"])
+
+
+def test_a_revert_reads_the_file_that_another_program_has_changed(tmp_path: Path) -> None:
+    file, world = tmp_path / "m.waypoints", MissionOptions(scenario="jacksboro")
+    file.write_text(mission_text(drawn_session(8, 6).mission, "waypoints"), encoding="utf-8")
+    session, _ = open_session(str(file), world)
+    session.edit(messages.Raise(kind="raise", rev=session.rev, by=10.0))
+    text = mission_text(drawn_session(9, 6).mission, "waypoints")
+    file.write_text(text, encoding="utf-8")
+    session.step_history("revert")
+    assert session.mission.items == parse_mission(text, "m.waypoints").items
+    assert (session.is_unsaved, session.undo_text) == (False, "revert to the file")
+    session.step_history("undo")
+    session.overwrite_file()
+    assert parse_mission(file.read_text(encoding="utf-8"), "m.waypoints").items == session.mission.items
+    # Without a file nothing is changed, and this is said.
+    session.edit(messages.Raise(kind="raise", rev=session.rev, by=5.0))
+    file.unlink()
+    mission = session.mission
+    with pytest.raises(PlanflyError, match=r"m\.waypoints"):
+        session.step_history("revert")
+    assert session.mission is mission
+
+
 def test_settings_and_a_planned_path_are_there_after_the_server_died(tmp_path: Path) -> None:
     file, kept, world = tmp_path / "m.waypoints", tmp_path / "m.json", MissionOptions(scenario="jacksboro-air")
     file.write_text(mission_text(drawn_session(8, 10).mission, "waypoints"), encoding="utf-8")

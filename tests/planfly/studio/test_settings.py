@@ -86,6 +86,44 @@ def test_parameters_are_flown_with_and_saved() -> None:
         session.save("parm")
 
 
+def test_parameters_of_the_command_and_of_the_studio_are_told_apart(tmp_path: Path) -> None:
+    file, kept, own = tmp_path / "m.waypoints", tmp_path / "m.json", tmp_path / "my.parm"
+    file.write_text(mission_text(drawn_session(6, 8).mission, "waypoints"), encoding="utf-8")
+    own.write_text("WP_RADIUS 60\nNAVL1_PERIOD 20\n", encoding="utf-8")
+    session, _ = open_session(str(file), MissionOptions(terrain="jacksboro", params=own), kept)
+    assert session.settings_json()["scenario_parameter_file"] == "my.parm"
+    set_in(session, parameter="WP_RADIUS=90")
+    described = session.judged.setup.autopilot.describe("aerosonde")
+    assert "my.parm, changed in the studio: WP_RADIUS (WP_RADIUS 90 m" in described
+    # The airspeeds of the aircraft (its TOML); the value is in no file.
+    with pytest.raises(PlanflyError) as refused:
+        set_in(session, parameter="AIRSPEED_CRUISE=40")
+    assert str(refused.value) == "Parameter AIRSPEED_CRUISE: 40: aerosonde flies 18..31 m/s"
+    with pytest.raises(PlanflyError) as refused:
+        set_in(session, parameter="NO_SUCH=1")
+    assert str(refused.value) == "Parameter NO_SUCH: not a parameter of the simulated ArduPlane"
+    # Of a file that was opened on the page, too, and after a restart.
+    set_in(session, parameter_file="mine.param", parameter_text="WP_RADIUS 45\nRTL_RADIUS 80\n")
+    assert "changed in the studio" not in session.judged.setup.autopilot.describe("aerosonde")
+    set_in(session, parameter="RTL_RADIUS=70")
+    session.autosave(kept)
+    again, _ = open_session(str(file), MissionOptions(terrain="jacksboro"), kept)
+    for one in (session, again):
+        assert "mine.param, changed in the studio: RTL_RADIUS (" in one.judged.setup.autopilot.describe("aerosonde")
+
+
+def test_the_parameters_of_the_command_are_flown_again_after_another_autopilot(tmp_path: Path) -> None:
+    file, own = tmp_path / "m.waypoints", tmp_path / "my.parm"
+    file.write_text(mission_text(drawn_session(6, 8).mission, "waypoints"), encoding="utf-8")
+    own.write_text("WP_RADIUS 60\nNAVL1_PERIOD 20\n", encoding="utf-8")
+    session, _ = open_session(str(file), MissionOptions(terrain="jacksboro", params=own))
+    set_in(session, autopilot="px4")
+    assert session.settings_json()["scenario_parameter_file"] == ""
+    set_in(session, autopilot="ardupilot")
+    assert session.settings_json()["scenario_parameter_file"] == "my.parm"
+    assert session.context.uav.autopilot.stated_value("WP_RADIUS") == 60.0
+
+
 def test_an_aircraft_named_by_its_folder_can_be_chosen_again(tmp_path: Path) -> None:
     copy_aerosonde(tmp_path)
     file, kept = tmp_path / "m.waypoints", tmp_path / "m.json"
@@ -101,7 +139,8 @@ def test_an_aircraft_named_by_its_folder_can_be_chosen_again(tmp_path: Path) -> 
     session.autosave(kept)
     again, _ = open_session(str(file), MissionOptions(scenario="jacksboro"), kept)
     again.open(open_document(str(file), again.options))
-    assert again.settings_json()["aircraft"] == "aerosonde"
+    assert again.settings_json()["aircraft"] == "own"
+    set_in(again, aircraft="aerosonde")
     set_in(again, aircraft="own")
     assert again.settings_json()["aircraft"] == "own"
 
@@ -129,7 +168,7 @@ def test_an_aircraft_named_by_its_folder_can_be_chosen_again(tmp_path: Path) -> 
         ({"aircraft": "../x8"}, "Aircraft: expected an aircraft listed by 'planfly aircraft'"),
         ({"parameter": "WP_RADIUS=99999"}, "Parameter WP_RADIUS: 99999: allowed 0..32767"),
         ({"parameter": "WP_RADIUS=wide"}, "Parameter WP_RADIUS: 'wide': expected a finite number"),
-        ({"parameter": "WP_RADIU=50"}, "Parameter WP_RADIU: not known to the simulated ArduPlane"),
+        ({"parameter": "WP_RADIU=50"}, "Parameter WP_RADIU: not a parameter of the simulated ArduPlane"),
         ({"parameter": "THR_MIN=100"}, "Parameter THR_MIN 100: must be below THR_MAX"),
         ({"parameter_file": "a.parm", "parameter_text": "\n"}, "a.parm: no parameter"),
     ],
