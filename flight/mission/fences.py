@@ -202,7 +202,7 @@ def with_fences(mission: Mission, scenario: Scenario, passes: PassTest) -> tuple
     >>> [len(shape) for shape in fence_shapes(fenced.fences)][:4]  # the area's corners, then a circle a missile
     [4, 1, 1, 1]
     >>> notes
-    ('28 missile spheres became exclusion circles: a fence has no height, so that each is a cylinder',)
+    ('28 missile spheres became exclusion circles: a fence has no height limits, so it applies at every height',)
     """
     (west, east), (south, north) = scenario.bounds
     corners = np.array([[west, south], [east, south], [east, north], [west, north]])
