@@ -112,7 +112,7 @@ KINDS: dict[str, tuple[Maker, tuple[int, ...], str]] = {
     "landing": (landing, (4,), "approach"),
     "return": (going_back, (4,), "clearance"),
     "last item": (last_item, (4,), "return"),
-    "first leg": (from_the_air, (3, 4), "the climb from home"),
+    "first leg": (from_the_air, (3, 4), "climb from home"),
 }
 
 
