@@ -316,10 +316,7 @@ class Search:
             if self.has_safe() and path_length(path) >= self.length_ratio() * self._straight_length():
                 return False
             certificate = certify(self.problem, path)
-            if self.meets_goal(certificate):
-                self.shortest = path, certificate
-                if self.improved is not None:
-                    self.improved(path)
+            if self._keep_if_finished(path, certificate):
                 return True
             least_distance = 0.0 if self.furthest_short is None else self.furthest_short[1].kill_distance
             if certificate.ok and certificate.kill_distance > least_distance:
@@ -328,6 +325,15 @@ class Search:
                 break
         self.narrow_places += list(closest_places(data, path, self.required_distance + data.tracking.across))
         return self._shorten_again(path)
+
+    def _keep_if_finished(self, path: Floats, certificate: Certificate) -> bool:
+        """Keep a path (w, 3) as the shortest, report it, and return True, if its certificate meets the goal."""
+        if not self.meets_goal(certificate):
+            return False
+        self.shortest = path, certificate
+        if self.improved is not None:
+            self.improved(path)
+        return True
 
     def _shorten_again(self, path: Floats) -> bool:
         """Shorten a path (w, 3) without a certificate again, from equal legs and then with narrow margins.
@@ -349,10 +355,7 @@ class Search:
             if path_length(path) >= max_length:
                 return False
             certificate = certify(self.problem, path)
-            if self.meets_goal(certificate):
-                self.shortest = path, certificate
-                if self.improved is not None:
-                    self.improved(path)
+            if self._keep_if_finished(path, certificate):
                 return True
         return False
 
