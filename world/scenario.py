@@ -557,7 +557,9 @@ def _assemble_scenario(
     # The ends of an external mission are its own waypoints: the verdict reports zones that they violate.
     check_ends(zones, source, ends if zones and not external else (), ground)
     if not external and math.dist(start[:2], destination[:2]) < 10.0:
-        raise ScenarioError(f"{source}: destination: less than 10 m from start", file=source, field="destination")
+        raise ScenarioError(
+            f"{source}: destination: less than 10 m horizontally from the start", file=source, field="destination"
+        )
     table, start_up = spec.wind, float(start[2])
     wind = Wind(table.speed_mps, math.radians(table.from_deg), table.gradient, table.turbulence, table.seed, start_up)
     return Scenario(

@@ -274,7 +274,10 @@ def explain_failure(plan: Plan, limits: Limits | None = None) -> list[str]:
     if algorithm is not None and algorithm.encoding == "rotated" and algorithm.seeded:
         lines.append("routes that turn back or circle to climb were searched too, on a coarse lattice")
         if has_no_explanation and algorithm.optimiser == "waypoints" and scenario.planner.budget is None:
-            lines.append("it is not proven that no path exists; --budget 1000000 searches for longer")
+            lines.append(
+                f"it is not proven that no path exists: [planner] waypoints = {2 * len(plan.waypoints)} allows more"
+                " turns, and --budget 1000000 searches for longer"
+            )
     elif algorithm is not None and algorithm.encoding == "rotated":
         lines.append(
             "paths in the rotated frame always advance along the line to the destination; "
@@ -386,6 +389,25 @@ def _describe_proven_closure(problem: Problem) -> list[str]:
         " map;"
         " without any one of them a path may exist"
     ]
+
+
+def nearest_missile_text(plan: Plan) -> str:
+    """Return a line that names the missile that a plan's legs approach most closely, and the leg.
+
+    The certificate's distance is smaller than the leg's, because the flight may deviate from its legs.
+    """
+    threats, waypoints = plan.scenario.threats, plan.waypoints
+    starts, legs = waypoints[:-1, None], np.diff(waypoints, axis=0)[:, None]
+    squared_lengths = np.maximum((legs**2).sum(axis=2), 1e-9)
+    fractions = np.clip(((threats.position - starts) * legs).sum(axis=2) / squared_lengths, 0.0, 1.0)
+    closest_points = starts + fractions[..., None] * legs
+    distances = np.sqrt(((threats.position - closest_points) ** 2).sum(axis=2)) - threats.kill_radius
+    distances[:, threats.kill_radius <= 0.0] = math.inf
+    leg, missile = np.unravel_index(int(np.argmin(distances)), distances.shape)
+    return (
+        f"leg {leg} passes {distances[leg, missile]:.1f} m outside the kill radius of {threats.names[missile]};"
+        f" with its tracking error the flight may come {-plan.certificate.kill_distance:.1f} m inside it"
+    )
 
 
 def violated_zones(scenario: Scenario, path: np.ndarray) -> list[str]:

@@ -12,12 +12,11 @@ from planner.evaluation.problem import make_problem
 from planner.plan import Objectives, Plan, Violations
 from planner.search.algorithms import find_algorithm, limits_for
 from planner.search.explain_failure import violated_zones
-from planner.search.plan_path import plan_path
+from planner.search.plan_path import plan_path, with_waypoints
 from planner.search.search_state import SearchProgress, StopCondition
 from planner.search.shared_budget import Search, SharedBudget
-from world.arrays import Floats
 from world.errors import MissionError
-from world.geometry import leg_courses, leg_runs
+from world.geometry import leg_courses
 from world.scenario import Scenario
 
 # Function that completes a plan, with a search that it may call for a changed scenario or for other limits.
@@ -145,12 +144,3 @@ def _check_first_waypoint(scenario: Scenario, old_plan: Plan, leg: int) -> None:
         reason = f"its first waypoint, {leg}, violates {zone_names[0]}"
         message = f"{scenario.name}: leg {leg}: {reason}, so every path from there violates it"
         raise MissionError(message, file=scenario.name, field="leg", value=leg)
-
-
-def with_waypoints(path: Floats, count: int) -> Floats:
-    """Return a path (w, 3) with its longest legs halved until it has `count` waypoints."""
-    waypoints = [np.asarray(point, dtype=np.float64) for point in path]
-    while len(waypoints) < count:
-        longest_leg = int(np.argmax(leg_runs(np.array(waypoints))))
-        waypoints.insert(longest_leg + 1, 0.5 * (waypoints[longest_leg] + waypoints[longest_leg + 1]))
-    return np.array(waypoints)

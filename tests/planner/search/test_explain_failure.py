@@ -10,7 +10,14 @@ import pytest
 from aircraft.path_limits import Limits
 from planner.evaluation.problem import CERTIFIED_BUFFER_M, make_problem
 from planner.plan import Certificate, Plan
-from planner.search.explain_failure import closed_bands, explain_failure, max_altitude, separating_zones, violated_zones
+from planner.search.explain_failure import (
+    closed_bands,
+    explain_failure,
+    max_altitude,
+    nearest_missile_text,
+    separating_zones,
+    violated_zones,
+)
 from planner.search.plan_path import plan_path
 from tests.setups import with_path
 from world.scenario import Scenario
@@ -183,3 +190,20 @@ def test_of_a_path_that_fails_by_its_autopilot_alone_nothing_is_said(small: Smal
     assert explain_failure(circles, make_limits(scenario)) == []
     stray = with_path(circles, plan.waypoints - [0.0, 0.0, 200.0])
     assert explain_failure(stray, make_limits(scenario)) != []
+
+
+def test_the_nearest_missile_and_its_leg(small: Callable[..., Scenario]) -> None:
+    """The second leg runs along north = 0, 1,000 m from a missile of 990 m; a radar without a kill radius is nearer."""
+    threats = [
+        {"name": "far", "east_m": 1000, "north_m": -2000, "kill_radius_m": 990, "kill_scale_m": 100, "height_m": 150},
+        {"name": "near", "east_m": 4500, "north_m": 1000, "kill_radius_m": 990, "kill_scale_m": 100, "height_m": 150},
+        {"name": "radar", "east_m": 1000, "north_m": 10, "detection_radius_m": 500, "detection_scale_m": 100},
+    ]
+    scenario = small(terrain=FLAT, threats=threats)
+    path = np.array([[0.0, 0.0, 150.0], [3000.0, 0.0, 150.0], [6000.0, 0.0, 150.0]])
+    certificate = Certificate(0.1, np.inf, 0.1, 9.0, 50.0, -2.5, ())
+    plan = Plan(scenario, path, np.zeros(4), np.zeros(4), certificate, 7, "umda", 60, np.zeros((0, 3)))
+    assert nearest_missile_text(plan) == (
+        "leg 1 passes 10.0 m outside the kill radius of near;"
+        " with its tracking error the flight may come 2.5 m inside it"
+    )

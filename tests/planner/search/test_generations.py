@@ -144,7 +144,8 @@ def test_a_search_that_finds_no_way_evaluates_so_many_legs(
     assert 0.5 * most < sum(legs for _, legs in joins) <= most + 2 * first
     # The second attempt has twice the candidates, which are too many to be joined without a bound; there is no third.
     assert max(candidates for candidates, _ in joins) == 2 * first
-    assert "--budget 1000000 searches for longer" in explain_failure(plan, make_limits(scenario))[-1]
+    advice = explain_failure(plan, make_limits(scenario))[-1]
+    assert "[planner] waypoints = 16 allows more turns, and --budget 1000000 searches for longer" in advice
     # A budget asks for more.
     joins.clear()
     plan_path(with_planner(scenario, "--budget", budget=10**9), make_limits(scenario), seed=1)
