@@ -68,8 +68,8 @@ def find_contradictions(values: Iterable[ParameterValue], orders: Iterable[tuple
 
     orders: groups of parameter names; within a group no value may be below the value of the name before it.
 
-    >>> made = [ParameterValue("THR_MIN", 74.0, "aircraft"), ParameterValue("TRIM_THROTTLE", 60.0, "file")]
-    >>> find_contradictions(made, [("THR_MIN", "TRIM_THROTTLE")])
+    >>> values = [ParameterValue("THR_MIN", 74.0, "aircraft"), ParameterValue("TRIM_THROTTLE", 60.0, "file")]
+    >>> find_contradictions(values, [("THR_MIN", "TRIM_THROTTLE")])
     ('TRIM_THROTTLE 60 of the file is below THR_MIN 74 of the aircraft',)
     """
     value_by_name = {value.name: value for value in values}
@@ -226,7 +226,7 @@ class Autopilot(ABC):
         return StoredAutopilot()
 
     @classmethod
-    def of_flight_log(
+    def from_flight_log(
         cls, program: str, parameters: Mapping[str, float], source: str
     ) -> tuple[Self, tuple[str, ...]] | None:
         """Return the autopilot that wrote a flight log, and notes on logged parameters that cannot be used.

@@ -50,9 +50,9 @@ def nearest_release(versions: Sequence[_Version], release: tuple[int, int]) -> _
     >>> [nearest_release(("1.16", "1.17"), release) for release in ((1, 15), (1, 16), (1, 18))]
     ['1.16', '1.16', '1.17']
     """
-    known = [tuple(map(int, version.split("."))) for version in versions]
-    older = [version for version, numbers in zip(versions, known, strict=True) if numbers <= release]
-    return older[-1] if older else versions[0]
+    releases = [tuple(map(int, version.split("."))) for version in versions]
+    not_newer = [version for version, numbers in zip(versions, releases, strict=True) if numbers <= release]
+    return not_newer[-1] if not_newer else versions[0]
 
 
 def choose_release_for_file(
@@ -72,7 +72,8 @@ def choose_release_for_file(
     version = stated or nearest_release(versions, (major, minor))
     if version == found.release:
         return version, ()
-    because = "because it was named" if stated else "the nearest release that planfly has"
+    reason = "as requested" if stated else "the nearest available release"
     return version, (
-        f"{params} is of {title} {found.release} ({found.evidence}), but {version} is simulated, {because}",
+        f"{params} was written for {title} {found.release} ({found.evidence}), but {title} {version} is simulated,"
+        f" {reason}",
     )

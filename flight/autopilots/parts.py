@@ -137,13 +137,13 @@ class RateLimit(NamedTuple):
     name: str = ""
 
     @classmethod
-    def of_parameters(cls, **values: float) -> "RateLimit":
+    def from_parameters(cls, **values: float) -> "RateLimit":
         """Return the rate limit that the smallest of several parameters sets, m/s; 0 means no limit.
 
-        >>> RateLimit.of_parameters(FW_T_CLMB_R_SP=3.0, FW_T_CLMB_MAX=5.0)
+        >>> RateLimit.from_parameters(FW_T_CLMB_R_SP=3.0, FW_T_CLMB_MAX=5.0)
         RateLimit(rate=3.0, name='FW_T_CLMB_R_SP 3 m/s')
         """
-        name = min(values, key=lambda each: values[each] or math.inf)
+        name = min(values, key=lambda parameter_name: values[parameter_name] or math.inf)
         return cls(values[name], f"{name} {values[name]:g} m/s") if values[name] else cls()
 
 
@@ -367,7 +367,7 @@ class ReturnBehaviour:
     """Behaviour of an autopilot in an RTL; the defaults are ArduPlane's behaviour with its default parameters.
 
     rules: rules of the RTL's target, altitude, turn and loiter.
-    parameters_of: returns the autopilot's parameters, by name and in its units, for a scenario's settings of the RTL.
+    make_parameters: returns the autopilot's parameters, by name and in its units, for a scenario's settings of the RTL.
     after_link_loss: returns the reactions to the loss of a radio link, in order of time.  If the mission continues, it
         is the reaction "on" alone, or () for an autopilot without parameters.
     fly: simulates RTLs; None for an autopilot without an RTL, for which ArduPlane returns.
@@ -380,7 +380,7 @@ class ReturnBehaviour:
     """
 
     rules: ReturnRules = DEFAULT_RETURN_RULES
-    parameters_of: Callable[[RtlSettings], Mapping[str, float]] = _no_parameters
+    make_parameters: Callable[[RtlSettings], Mapping[str, float]] = _no_parameters
     after_link_loss: Callable[[LinkUse], tuple[LinkLossReaction, ...]] = _continue_mission
     fly: FlyReturns | None = None
     flies_without_engine: bool = False

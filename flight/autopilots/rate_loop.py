@@ -37,17 +37,17 @@ class RateGains(NamedTuple):
     d: float
 
 
-def rate_gains_fault(gains: RateGains, feed_forward_range: tuple[float, float], time_constant: float) -> str:
-    """Return "too low" or "too high" for gains that cannot control the attitude; "" for usable gains.
+def judge_rate_gains(gains: RateGains, feed_forward_range: tuple[float, float], time_constant: float) -> str:
+    """Judge the gains of a rate controller: "too low" or "too high" to control the attitude, or "" if usable.
 
     feed_forward_range: lowest and highest feed-forward gain that suits the aircraft; both are positive.
     time_constant: time constant of the attitude, s.
 
-    >>> rate_gains_fault(RateGains(0.345, 0.08, 0.15, 0.0), (0.345, 0.345), 0.5)
+    >>> judge_rate_gains(RateGains(0.345, 0.08, 0.15, 0.0), (0.345, 0.345), 0.5)
     ''
-    >>> rate_gains_fault(RateGains(1e-4, 1e-4, 1e-4, 0.0), (0.345, 0.345), 0.5)
+    >>> judge_rate_gains(RateGains(1e-4, 1e-4, 1e-4, 0.0), (0.345, 0.345), 0.5)
     'too low'
-    >>> rate_gains_fault(RateGains(6.0, 0.08, 0.15, 0.0), (0.345, 0.345), 0.5)
+    >>> judge_rate_gains(RateGains(6.0, 0.08, 0.15, 0.0), (0.345, 0.345), 0.5)
     'too high'
     """
     low, high = feed_forward_range

@@ -192,7 +192,7 @@ class CompiledModel:
     def _copy_contacts(self, centre: Sequence[float]) -> None:
         """Copy the contacts from JSBSim.
 
-        Raises UnsupportedModel if a contact is on the ground, because JSBSim does not state its friction.
+        Raises UnsupportedModel if a contact is on the ground, because JSBSim has no property for its friction forces.
 
         centre: center of gravity in JSBSim's structural frame, inches.
         """
@@ -214,7 +214,7 @@ class CompiledModel:
         scales = [command.above for command in self._fdm.aircraft.model.commands] + [1.0] * 3
         names = [*(command.name for command in self._fdm.aircraft.model.commands), *GUST]
         for k, (name, move, scale) in enumerate(zip(names, moves, scales, strict=True)):
-            # From a Gray code, so that few inputs move at a time and all combinations occur.
+            # A Gray code gives the signs: few inputs move at a time, and all combinations occur.
             sign = 1.0 if (round_number ^ (round_number >> 1)) >> k % 5 & 1 else -1.0
             register = self.properties[name]
             self.numbers[register] = initial_numbers[register] + sign * move * scale

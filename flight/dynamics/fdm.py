@@ -83,7 +83,7 @@ def load_model(
     copy: Path,
     aircraft: Aircraft,
     dt: float,
-    printed: Callable[[], str],
+    read_output: Callable[[], str],
     *,
     flat_earth: bool,
     is_tested: bool,
@@ -96,7 +96,7 @@ def load_model(
     instance: a JSBSim instance without a model, created for the folder ``copy``.
     copy: the empty folder.
     dt: time step, s.
-    printed: function that returns what JSBSim has printed so far.
+    read_output: function that returns the text that JSBSim has printed so far.
     flat_earth, is_tested, gear: see `Fdm`.
 
     Raises FlightError for a model that is missing, refused or not loadable.
@@ -134,7 +134,7 @@ def load_model(
         message = " ".join(str(error).split()).replace(str(folder), str(aircraft.model_file.parent))
         raise FlightError(f"{aircraft.model_file}: JSBSim: {message}", file=aircraft.model_file) from None
     if not loaded:
-        reason = jsbsim_reason(printed()) or "no reason is given"
+        reason = jsbsim_reason(read_output()) or "no reason is given"
         raise FlightError(f"{aircraft.model_file}: JSBSim cannot load this model: {reason}", file=aircraft.model_file)
     _check_mass(instance, aircraft)
 
@@ -153,7 +153,7 @@ def _check_mass(instance: Any, aircraft: Aircraft) -> None:
         raise FlightError(
             f"{file}: mass_kg = {aircraft.mass:g}: the model"
             f" {aircraft.model_file.name} has {mass:.5g} kg with its fuel; the two may differ by"
-            f" {100.0 * MASS_TOLERANCE:g} %",
+            f" at most {100.0 * MASS_TOLERANCE:g} %",
             file=file,
             field="mass_kg",
             value=aircraft.mass,
@@ -352,7 +352,7 @@ class Fdm:
         terrain_amsl: float = 0.0,
         commands: Sequence[float] = (0.0, 0.0, 0.0, 0.0),
     ) -> None:
-        """Start a flight without a trim, for example at rest on the ground, or thrown.
+        """Start a flight without a trim, for example at rest on the ground or at a hand launch.
 
         position: lat_deg, lon_deg (geodetic) and amsl (m).
         attitude: roll, pitch, yaw (true), rad.
@@ -455,7 +455,7 @@ class Fdm:
         return self.aircraft.max_elevator, self.aircraft.max_aileron, self.aircraft.max_rudder
 
     def first_guess(self) -> Floats:
-        """Return a trim vector from which an iteration can start, (8,): level flight at cruise."""
+        """Return the trim vector from which a trim search starts, (8,): approximate level flight at cruise."""
         return first_guess(self.aircraft.airspeed)
 
     def move_to(self, amsl: float) -> None:

@@ -216,7 +216,7 @@ def _check_property_names(readers: Sequence[_Reader], provided: Callable[[str], 
         for name, line in reader.used_names.items():
             if name in created_names or (has_parts and _PART_PROPERTIES.match(name)) or provided(name):
                 continue
-            message = f"{reader.file}:{line}: property {name} is read, and neither JSBSim nor the model defines it"
+            message = f"{reader.file}:{line}: the property {name} is read, but neither JSBSim nor the model defines it"
             raise FlightError(message, file=reader.file, field=name)
 
 
@@ -300,7 +300,7 @@ _MAX_REASON_LINES = 4
 
 
 def jsbsim_reason(printed: str) -> str:
-    r"""Return in one line why JSBSim did not load a model; "" if it printed no reason.
+    r"""Return JSBSim's reason for not loading a model as one line; "" if it printed no reason.
 
     >>> jsbsim_reason("JSBSim startup beginning ...\n\nIn file /tmp/a/m.xml: line 91\n Unknown engine type\n")
     'In file m.xml: line 91 Unknown engine type'

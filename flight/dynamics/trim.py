@@ -45,7 +45,7 @@ class Engine:
     """
 
     def __init__(self, fdm: Any, dt: float, getter: Callable[[str], Any], setter: Callable[[str], Any]) -> None:
-        """Store the means of settling an engine in a JSBSim instance."""
+        """Look up the JSBSim properties that hold the aircraft still and run its engine."""
         self._exec, self._dt = fdm, dt
         kinds = ("rate/rotational", "rate/translational", "position/rotational", "position/translational")
         names = [f"simulation/integrator/{kind}" for kind in kinds]
@@ -69,8 +69,8 @@ class Engine:
     def settle(self, *, spin: bool) -> None:
         """Let the engine speed settle at the present airspeed and throttle.
 
-        Without ``spin`` the engine keeps its speed. Then only quantities that depend on their own derivative settle,
-        such as the lift of a changing angle of attack.
+        spin: True to let the engine speed change, False to keep it. With False, only quantities that depend on their
+            own derivative settle, such as the lift of a changing angle of attack.
 
         A light propeller settles within milliseconds, and would oscillate with longer steps. A heavy propeller takes a
         minute. A step of the engine's time constant leads directly to the steady speed, as in Newton's method.
@@ -434,7 +434,7 @@ def air_velocity(course: float, climb: float, airspeed: float, wind: Floats) -> 
     if speed <= 0.0:
         raise FlightError(
             f"no progress along the course of {math.degrees(course):.0f} degrees:"
-            f" airspeed {airspeed:.1f} m/s in {float(np.hypot(wind[0], wind[1])):.1f} m/s of wind",
+            f" airspeed {airspeed:.1f} m/s is too low for a wind of {float(np.hypot(wind[0], wind[1])):.1f} m/s",
             field="airspeed",
             value=airspeed,
         )

@@ -111,7 +111,9 @@ def l1_angles(
 
 @inner
 def l1_integrate(aim_angle: float, integrator: float, gain: float, dt: float) -> float:
-    """Return the cross-track integrator (`_L1_xtrack_i` of AP_L1_Control) after one more tick, rad.
+    """Return the cross-track integrator of L1 (`_L1_xtrack_i` of AP_L1_Control) after one more tick, rad.
+
+    It integrates the angle between the leg and the direction to the L1 point.
 
     aim_angle: angle between the leg and the direction to the L1 point, rad, NaN while L1 aims at a waypoint.  The
         integrator changes only while the magnitude of this angle is below 5 degrees.
@@ -133,7 +135,7 @@ def l1_acceleration(angle: float, speed: float, l1_distance: float, damping: flo
 
 
 @inner
-def has_l1_reached(motion: Record, a: Record, b: Record, l1_distance: float, radius: float) -> bool:
+def has_reached_leg_end(motion: Record, a: Record, b: Record, l1_distance: float, radius: float) -> bool:
     """Return True if the aircraft has reached waypoint b, the end of the leg from a to b.
 
     The waypoint is reached within the turn distance, or past the line across the leg at b. A fly-over waypoint is

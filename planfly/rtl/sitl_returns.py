@@ -13,7 +13,7 @@ import numpy as np
 
 from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane_sitl.autopilot import ArduPlaneSitl
-from flight.autopilots.catalog import program_class_for
+from flight.autopilots.catalog import find_program_class
 from flight.autopilots.simulated_returns import (
     RETURN_ARRIVED,
     RETURN_GROUND_IMPACT,
@@ -154,7 +154,7 @@ class ProgramReturns:
 
 def check_is_arduplane(program: Path) -> None:
     """Raise ArgumentError for a program other than ArduPlane, whose returns planfly does not simulate."""
-    autopilot_class = program_class_for(program)
+    autopilot_class = find_program_class(program)
     if not issubclass(autopilot_class, ArduPlaneSitl):
         allowed = f"expected ArduPlane's program; returns of {autopilot_class.title} are not supported"
         raise ArgumentError.of_argument("autopilot", str(program), allowed)

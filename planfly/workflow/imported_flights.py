@@ -11,7 +11,7 @@ import numpy as np
 
 from aircraft.path_limits import Limits
 from flight.autopilots.autopilot import Autopilot
-from flight.autopilots.catalog import autopilot_of_log
+from flight.autopilots.catalog import autopilot_from_log
 from flight.autopilots.parameter_origin import TITLES
 from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from flight.dynamics.envelope_tables import load_envelope
@@ -105,7 +105,7 @@ def import_flight(path: Path, options: LogOptions) -> ImportedFlight:
     scenario, wind_source = _with_wind_of_log(fences.add_to_scenario(apply_options(scenario, options)), flight, options)
     aircraft_options = (options.get("aircraft"), options.get("scenario"), plan_scenario)
     aircraft_known = any(option is not None for option in aircraft_options)
-    logged_autopilot = autopilot_of_log(flight.raw.program, flight.raw.parameters, flight.raw.source)
+    logged_autopilot = autopilot_from_log(flight.raw.program, flight.raw.parameters, flight.raw.source)
     # A flight by an unknown autopilot is judged with planfly's guidance, which shows what the aircraft can fly.
     autopilot, autopilot_notes = logged_autopilot or (PlanflyGuidance(scenario.flight.steering.guidance), ())
     setup = _flight_setup(scenario, placed, mission, autopilot, flight)

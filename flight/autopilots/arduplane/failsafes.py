@@ -41,8 +41,8 @@ def failsafe_causes(
     ends_landed: True if the mission ends on the ground.
 
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
-    >>> made = ArduPilotParameters.defaults().changed(FS_LONG_ACTN=1, BATT_FS_LOW_ACT=1, BATT_LOW_VOLT=14)
-    >>> for cause in failsafe_causes(made, has_fence=False):
+    >>> parameters = ArduPilotParameters.defaults().changed(FS_LONG_ACTN=1, BATT_FS_LOW_ACT=1, BATT_LOW_VOLT=14)
+    >>> for cause in failsafe_causes(parameters, has_fence=False):
     ...     print(cause.name, cause.parameter, cause.value, cause.action)
     the pilot's RTL  0 return
     the mission's end  0 return
@@ -68,7 +68,7 @@ def failsafe_causes(
 
 
 def _remote_control_causes(parameters: ArduPilotParameters) -> list[Cause]:
-    """Return the failsafes of a lost remote control: the short one if it leaves AUTO, and the long one."""
+    """Return the long failsafe of a lost remote control, and before it the short failsafe if it leaves AUTO."""
     long_action, short_action = int(parameters.long_failsafe), int(parameters.short_failsafe)
     # THR_FAILSAFE 2 detects the loss, but starts no failsafe.
     if parameters.throttle_failsafe != 1.0:
@@ -85,7 +85,7 @@ def _remote_control_causes(parameters: ArduPilotParameters) -> list[Cause]:
 
 
 def _station_cause(parameters: ArduPilotParameters) -> Cause:
-    """Return the failsafe of a lost ground station."""
+    """Return ArduPlane's reaction to the loss of the ground station's heartbeats."""
     if parameters.station_failsafe <= 0.0:
         return Cause("station lost", "on", "FS_GCS_ENABL", 0)
     long_action = int(parameters.long_failsafe)
@@ -157,7 +157,7 @@ def battery_failsafes(parameters: ArduPilotParameters) -> tuple[BatteryFailsafe,
     (`AP_BattMonitor_Backend::update_failsafes`, `check_failsafe_types`).
 
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
-    >>> made = ArduPilotParameters.of_text("BATT_CAPACITY 8000\nBATT_LOW_MAH 1500\nBATT_FS_LOW_ACT 1\n", "mine.param")
+    >>> made = ArduPilotParameters.from_text("BATT_CAPACITY 8000\nBATT_LOW_MAH 1500\nBATT_FS_LOW_ACT 1\n", "mine.param")
     >>> [(failsafe.parameter, failsafe.used_charge) for failsafe in battery_failsafes(made)]
     [('BATT_LOW_MAH', 6500.0)]
     """

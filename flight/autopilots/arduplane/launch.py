@@ -29,7 +29,8 @@ def motor_start(acceleration: float, speed: float, incline: float, parameters: A
     speed: ground speed at the end of the rail, m/s.
     incline: pitch of the nose, rad.
 
-    On a rail of 6 m the aircraft reaches 20 m/s in 0.6 s at 33 m/s^2; for 10 m/s it needs 8.3 m/s^2.
+    On a rail of 6 m an aircraft reaches 20 m/s in 0.6 s with 33 m/s^2, and 10 m/s with 8.3 m/s^2. Only the first
+    acceleration exceeds TKOFF_THR_MINACC 15:
 
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
     >>> made = ArduPilotParameters.defaults().changed(TKOFF_THR_MINACC=15.0)

@@ -273,16 +273,16 @@ class ArduPilotParameters(ParameterSet):
     (90.0, 3.0)
     >>> default.changed(ROLL_LIMIT_DEG=30.0).roll_limit == math.radians(30.0)
     True
-    >>> ArduPilotParameters.of_text("LIM_ROLL_CD 3000\nFOO 1\n", "old.parm").unused
+    >>> ArduPilotParameters.from_text("LIM_ROLL_CD 3000\nFOO 1\n", "old.parm").unused
     ('FOO',)
-    >>> made = ArduPilotParameters.of_text("GLIDE_SLOPE_MIN 20\nCLIMB_SLOPE_HGT 30\n", "mine.param", "4.6")
+    >>> made = ArduPilotParameters.from_text("GLIDE_SLOPE_MIN 20\nCLIMB_SLOPE_HGT 30\n", "mine.param", "4.6")
     >>> made.altitude_slope_min, made.climb_slope_height, made.unused
     (20.0, 20.0, ('CLIMB_SLOPE_HGT',))
-    >>> ArduPilotParameters.of_text("TRIM_THROTTLE 60\nTHR_MAX 50", "mine.param").contradictions
+    >>> ArduPilotParameters.from_text("TRIM_THROTTLE 60\nTHR_MAX 50", "mine.param").contradictions
     ('THR_MAX 50 of the file is below TRIM_THROTTLE 60 of the file',)
-    >>> made, notes = ArduPilotParameters.of_log({"LIM_ROLL_CD": 4500.0, "WP_RADIUS": -5.0}, "a.BIN")
+    >>> made, notes = ArduPilotParameters.from_log({"LIM_ROLL_CD": 4500.0, "WP_RADIUS": -5.0}, "a.BIN")
     >>> made.by_origin("file"), notes
-    ({'ROLL_LIMIT_DEG': 45.0}, ('WP_RADIUS -5 of the log is not allowed: the default is used',))
+    ({'ROLL_LIMIT_DEG': 45.0}, ('WP_RADIUS -5 in the log is outside 0..32767: the default is used',))
 
     navl1_period: period of the L1 controller, s.
     navl1_xtrack_i: gain of the cross-track integrator, 1/s.
@@ -499,10 +499,10 @@ class ArduPilotParameters(ParameterSet):
         ]
         return [*known, ("default", _FIXED_IN_4_6)], tuple(name for name in stated_names if name in _FIXED_IN_4_6)
 
-    def in_release(self, version: ArduPlaneVersion) -> Self:
+    def with_release(self, version: ArduPlaneVersion) -> Self:
         """Return the same parameters for another ArduPlane release.
 
-        >>> ArduPilotParameters.defaults().in_release("4.6").climb_slope_height
+        >>> ArduPilotParameters.defaults().with_release("4.6").climb_slope_height
         20.0
         """
         sources: list[Stated] = [(origin, self.by_origin(origin)) for origin in ("file", "assumed", "aircraft")]

@@ -73,7 +73,7 @@ class AutopilotFlight(SitlFlight):
             self._apply_gnss_error()
             self._hold_during(self._preflight.identify(flight_parameters.values))
             program = _reported_program(self._link, digest, flight_parameters)
-            flown_autopilot = autopilot.in_release(simulated_release(program.version))
+            flown_autopilot = autopilot.with_release(simulated_release(program.version))
             self.setup = replace(setup, autopilot=replace(flown_autopilot, program=program))
             self._stack = stack.pop_all()
 

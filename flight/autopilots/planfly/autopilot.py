@@ -5,7 +5,7 @@ from typing import ClassVar, Self
 
 from aircraft.catalog import Aircraft
 from flight.autopilots.autopilot import AnswerName, Autopilot, StoredAutopilot
-from flight.autopilots.gust_height import height_in_gusts
+from flight.autopilots.gust_height import gust_displacement
 from flight.autopilots.parts import ControlLaw, Deviations, TurnRules
 from flight.autopilots.planfly.law import LAWS, planfly_loop, planfly_tick
 from flight.guidance.gains import GAINS_FILE, load_gains
@@ -80,4 +80,4 @@ class PlanflyGuidance(Autopilot):
 
         In updrafts the guidance dives and flies faster, so it gains no altitude.
         """
-        return Deviations(gust_sink=height_in_gusts)
+        return Deviations(gust_sink=gust_displacement)

@@ -17,7 +17,7 @@ from flight.guidance.inner_loops import follow_roll, steer_elevator, step_roll_m
 from flight.guidance.lateral_reference_laws import (
     DEFAULT_ACCEPTANCE_RADIUS_M,
     field_course,
-    has_l1_reached,
+    has_reached_leg_end,
     l1_acceleration,
     l1_angles,
     l1_integrate,
@@ -318,7 +318,7 @@ def _l1_bank_command(
     leg = memory.l1_leg
     start, end = waypoints[leg], waypoints[leg + 1]
     turn_distance = end.acceptance if end.acceptance > 0.0 else DEFAULT_ACCEPTANCE_RADIUS_M
-    if leg + 2 < waypoints.shape[0] and has_l1_reached(estimated, start, end, l1_distance, turn_distance):
+    if leg + 2 < waypoints.shape[0] and has_reached_leg_end(estimated, start, end, l1_distance, turn_distance):
         leg += 1
         memory.l1_leg = leg
     start, end = waypoints[leg], waypoints[leg + 1]

@@ -11,7 +11,7 @@ from aircraft.catalog import Aircraft
 from aircraft.tracking import TrackingError
 from flight.autopilots.autopilot import Autopilot, Origin, StoredAutopilot, StoredParameters
 from flight.autopilots.file_releases import choose_release_for_file, commented_release
-from flight.autopilots.gust_height import height_in_updrafts
+from flight.autopilots.gust_height import updraft_altitude_gain
 from flight.autopilots.parameter_files import MAX_BYTES
 from flight.autopilots.parts import (
     BatteryFailsafe,
@@ -108,12 +108,12 @@ _NEUTRAL = {
 }
 # Part of an RTL that is not simulated, by RTL_TYPE.
 _RTL_TYPES_NOT_FLOWN = {
-    2: "RTL_TYPE 2, a return along the mission to its landing or in reverse to home, is not simulated; RTL_TYPE 1 is "
-    "simulated instead, to the nearest rally point or home",
-    3: "RTL_TYPE 3, a return to the nearest of home, rally points and the mission's landing, is not simulated; "
-    "RTL_TYPE 0 is simulated instead, without the landing",
-    4: "RTL_TYPE 4, a return along the mission to its landing or in reverse to home, is not simulated; RTL_TYPE 1 is "
-    "simulated instead, to the nearest rally point or home",
+    2: "RTL_TYPE 2 (return along the mission to its landing, or in reverse to home) is not simulated: the return is "
+    "simulated with RTL_TYPE 1, to the nearest rally point or home",
+    3: "RTL_TYPE 3 (return to the nearest of home, rally points and the mission's landing) is not simulated: the "
+    "return is simulated with RTL_TYPE 0, which ignores the landing",
+    4: "RTL_TYPE 4 (return along the mission to its landing, or in reverse to home) is not simulated: the return is "
+    "simulated with RTL_TYPE 1, to the nearest rally point or home",
 }
 
 # Values of RTL_TYPE for an RTL along the mission.
@@ -161,9 +161,8 @@ _LEG_FIELDS = (
 class Px4(Autopilot):
     """Simulated PX4 for fixed wing: NPFG along the legs, TECS for altitude and airspeed.
 
-    >>> made = Px4(Px4Parameters.defaults("1.16"))
-    >>> made.turns.acceptance_radius, Px4(Px4Parameters.defaults("1.17")).turns.acceptance_radius
-    (33.6, 10.0)
+    >>> [Px4(Px4Parameters.defaults(release)).turns.acceptance_radius for release in ("1.16", "1.17")]
+    [33.6, 10.0]
     """
 
     name: ClassVar = "px4"
@@ -199,7 +198,7 @@ class Px4(Autopilot):
         stored = StoredParameters(parameters.values, parameters.unused, parameters.source)
         return StoredAutopilot(parameters=stored, version=parameters.version)
 
-    def in_release(self, version: Px4Version) -> Self:
+    def with_release(self, version: Px4Version) -> Self:
         """Return the same autopilot with the controllers of another PX4 release."""
         return replace(self, parameters=replace(self.parameters, version=version))
 
@@ -258,12 +257,12 @@ class Px4(Autopilot):
 
         by_program: True for a flight with the PX4 program, in which more settings have an effect.
         """
-        # `FeasibilityChecker` refuses a mission beyond GF_MAX_*, whatever GF_ACTION is.
+        # `FeasibilityChecker` refuses a mission beyond GF_MAX_* with any GF_ACTION.
         parameters, ending_names = self.parameters, ["COM_FLT_TIME_MAX", "GF_MAX_HOR_DIST", "GF_MAX_VER_DIST"]
         if parameters["COM_WIND_MAX_ACT"] > _WARN_OF_WIND and parameters["COM_WIND_MAX"] < mission.wind:
             ending_names += ["COM_WIND_MAX"]
         ending_texts = [
-            f"{name} {parameters[name]:g} ends a mission and is not judged"
+            f"{name} {parameters[name]:g} may end the mission, which is not judged"
             for name in ending_names
             if parameters[name] > 0.0
         ]
@@ -285,7 +284,8 @@ class Px4(Autopilot):
             yield f"MIS_COMMAND_TOUT {parameters['MIS_COMMAND_TOUT']:g} waits for the payload, which is not simulated"
         if parameters["FW_T_THR_LOW_HGT"] >= 0.0 and parameters["FW_LND_THRTC_SC"] != 1.0:
             scale_text = f"FW_LND_THRTC_SC {parameters['FW_LND_THRTC_SC']:g}"
-            yield f"{scale_text} below FW_T_THR_LOW_HGT {parameters['FW_T_THR_LOW_HGT']:g} m is not simulated"
+            height_text = f"FW_T_THR_LOW_HGT {parameters['FW_T_THR_LOW_HGT']:g} m"
+            yield f"{scale_text} changes the altitude control below {height_text}, which is not simulated"
         if mission.loiters_to_land and parameters["FW_LND_EARLYCFG"] != 0.0:
             yield "FW_LND_EARLYCFG 1 affects the loiter before the landing, but is not simulated"
         if not mission.returns:
@@ -312,7 +312,7 @@ class Px4(Autopilot):
         """Describe settings with which a part of an RTL is not simulated; see `_unsimulated_return_texts`."""
         parameters = self.parameters
         if parameters["RTL_TYPE"] != _TO_RALLY_POINT and rally_distance <= _RALLY_HOME_DISTANCE_M:
-            yield "PX4 ignores a rally point within 10 m of home, to which the return is simulated"
+            yield "PX4 ignores a rally point within 10 m of home, but the simulated return goes to it"
         if parameters["RTL_LAND_DELAY"] >= 0.0:
             yield f"RTL_LAND_DELAY {parameters['RTL_LAND_DELAY']:g} lands after the return, which is not simulated"
 
@@ -328,7 +328,8 @@ class Px4(Autopilot):
             limits = {"FD_FAIL_R": "FW_R_LIM", "FD_FAIL_P": "FW_P_LIM_MAX"}
             for name, limit in limits.items():
                 if 0.0 < parameters[name] <= round(math.degrees(parameters[limit]), 6):
-                    yield f"{name} {parameters[name]:g} terminates a flight within {limit}, which is not simulated"
+                    allowed_text = f"an angle that {limit} allows"
+                    yield f"{name} {parameters[name]:g} terminates a flight at {allowed_text}, which is not simulated"
 
     def _battery_failsafes(self) -> tuple[BatteryFailsafe, ...]:
         """Return the battery failsafe that ends a mission first; the PX4 program flies without it.
@@ -431,8 +432,8 @@ class Px4(Autopilot):
         )
 
     def _rate_limit(self, *names: str) -> RateLimit:
-        """Return the rate limit of the smallest of some parameters."""
-        return RateLimit.of_parameters(**{name: self.parameters[name] for name in names})
+        """Return the rate limit that the smallest of the named parameters sets."""
+        return RateLimit.from_parameters(**{name: self.parameters[name] for name in names})
 
     @property
     def returns(self) -> ReturnBehaviour:
@@ -512,9 +513,9 @@ class Px4(Autopilot):
         return_type = parameters["RTL_TYPE"]
         first_height, last_height = f"{parameters['RTL_RETURN_ALT']:g} m", f"{parameters['RTL_DESCEND_ALT']:g} m"
         return (
-            f"RTL_TYPE {return_type:g}: a return goes to {_DESTINATION_TEXTS[int(return_type)]}. Below RTL_RETURN_ALT"
-            f" ({first_height} above its destination) it first climbs to that height in a loiter. Then it flies level;"
-            f" over home or a rally point it descends in a loiter to RTL_DESCEND_ALT ({last_height})"
+            f"RTL_TYPE {return_type:g}: a return goes to {_DESTINATION_TEXTS[int(return_type)]}. An aircraft below"
+            f" RTL_RETURN_ALT ({first_height} above the destination) first climbs to this height in a loiter. Then it"
+            f" flies level. Over home or a rally point it descends in a loiter to RTL_DESCEND_ALT ({last_height})"
         )
 
     @property
@@ -573,7 +574,7 @@ class Px4(Autopilot):
         """
         return Deviations(
             tracking_error=self._tracking_error,
-            gust_rise=height_in_updrafts,
+            gust_rise=updraft_altitude_gain,
             altitude_miss_probability=partial(altitude_miss_probability, self.parameters["NAV_FW_ALT_RAD"]),
             altitude_parameter="NAV_FW_ALT_RAD",
             altitude_candidates=(*self._climb_candidates, *HEIGHT_CANDIDATES),
@@ -594,7 +595,7 @@ class Px4(Autopilot):
     def _tracking_error(
         self, airspeed: float, nav: Navigation, *, fly_over: bool = False, turbulence: Turbulence = "none"
     ) -> TrackingError | None:
-        """Return PX4's deviations from a plan; ``fly_over`` has no effect, because PX4 flies over no waypoint."""
+        """Return PX4's deviations from a plan; ``fly_over`` has no effect, because PX4 turns before each waypoint."""
         return tracking_error(self.parameters, airspeed, nav, turbulence=turbulence)
 
     def with_parameters(self, origin: Origin = "file", /, **values: float) -> "Px4":

@@ -65,7 +65,7 @@ def failsafe_causes(parameters: Px4Parameters, *, has_fence: bool) -> tuple[Caus
 
 
 def _link_cause(parameters: Px4Parameters, use: LinkUse) -> Cause:
-    """Return the failsafe of a lost radio link."""
+    """Return PX4's reaction to the loss of a radio link; for ``use`` see `link_loss_reactions`."""
     if use == "telemetry":
         name, parameter, exceptions = "station lost", "NAV_DLL_ACT", "COM_DLL_EXCEPT"
     else:

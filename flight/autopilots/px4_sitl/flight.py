@@ -75,7 +75,7 @@ class Px4Flight(SitlFlight):
                 else NEWEST_PX4
             )
             flown_autopilot = replace(
-                autopilot.in_release(version), program=_reported_program(link, digest, flight_parameters)
+                autopilot.with_release(version), program=_reported_program(link, digest, flight_parameters)
             )
             self.setup = replace(setup, autopilot=flown_autopilot)
             self._stack = stack.pop_all()

@@ -180,7 +180,7 @@ def test_the_coverage_has_the_margin_of_the_path_below_it(log: Path) -> None:
 def test_the_returns_from_an_outage_are_those_of_planfly_returns() -> None:
     """Judge each of ArduPlane's returns without the link as `planfly returns` judges it."""
     flight = example_log()
-    parameters = ArduPilotParameters.of_text("FS_GCS_ENABL 1\nFS_LONG_ACTN 1\n", "mine.param")
+    parameters = ArduPilotParameters.from_text("FS_GCS_ENABL 1\nFS_LONG_ACTN 1\n", "mine.param")
     origin = flight.setup.scenario.origin
     mission = replace(flight.setup.mission, home=Home(origin.lat_deg, origin.lon_deg, 0.0))
     setup = replace(flight.setup, autopilot=ArduPlane(parameters), mission=mission)

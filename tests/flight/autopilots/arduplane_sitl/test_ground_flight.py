@@ -76,7 +76,7 @@ def test_in_the_air_a_return_that_goes_on_to_land_is_sent_with_its_landing_seque
 
 def test_what_the_scenario_asks_of_its_returns_is_set() -> None:
     setup = circuit(RAIL, STRIP)
-    asked = setup.autopilot.with_parameters(**setup.autopilot.returns.parameters_of(RtlSettings(180.0, lands=True)))
+    asked = setup.autopilot.with_parameters(**setup.autopilot.returns.make_parameters(RtlSettings(180.0, lands=True)))
     assert load_user_parameters(replace(setup, autopilot=asked)) == {"RTL_ALTITUDE": 180.0, "RTL_AUTOLAND": 1.0}
 
 

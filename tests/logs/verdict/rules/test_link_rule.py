@@ -50,7 +50,7 @@ def with_home(setup: FlightSetup, autopilot: Autopilot) -> FlightSetup:
 
 
 def arduplane(text: str) -> ArduPlane:
-    return ArduPlane(ArduPilotParameters.of_text(text, "mine.param"))
+    return ArduPlane(ArduPilotParameters.from_text(text, "mine.param"))
 
 
 def test_a_scenario_without_a_link_has_no_finding() -> None:

@@ -133,7 +133,7 @@ def test_where_px4_flies_what_it_refuses_fails(case: str) -> None:
 
 def by_px4(text: str, *lines: str) -> list[Finding]:
     """The rule's findings where PX4 flies with a file of parameters, "" for none."""
-    made = Px4Parameters.of_text(text, "a.params") if text else Px4Parameters.defaults()
+    made = Px4Parameters.from_text(text, "a.params") if text else Px4Parameters.defaults()
     findings = judge_geometry(replace(setup_of(*lines), autopilot=Px4(made))).findings
     return [item for item in findings if item.rule == "mission"]
 
@@ -269,7 +269,10 @@ _AROUND = _fence(5003, 400, (0, 0))
         (_fence(5004, 100, (0, 101)), ""),
         # All inclusions, or with bit 1 of FENCE_OPTIONS any: `AC_PolyFence_loader::breached`.
         ((*_EAST, *_AROUND), "FENCE_ENABLE 1 prevents arming at home, which is outside an inclusion polygon"),
-        (_fence(5003, 1, (0, 0)), "FENCE_MARGIN 2 prevents arming, which needs at most the 1 m of an inclusion circle"),
+        (
+            _fence(5003, 1, (0, 0)),
+            "FENCE_MARGIN 2 prevents arming: ArduPlane requires at most the 1 m of an inclusion circle",
+        ),
     ],
 )
 def test_a_home_beyond_the_fence_leaves_the_verdict_open(fences: tuple[MissionItem, ...], words: str) -> None:
@@ -387,7 +390,7 @@ def test_a_take_off_inside_the_first_circle_is_no_fault() -> None:
         ({}, ()),
         ({"ALT_OFFSET": -120.0}, ("ALT_OFFSET -120",)),
         ({"SOAR_ENABLE": 1.0, "Q_ENABLE": 1.0}, ("SOAR_ENABLE 1", "Q_ENABLE 1")),
-        ({"FENCE_ENABLE": 1.0}, ("FENCE_ENABLE 1 prevents arming without a fence",)),
+        ({"FENCE_ENABLE": 1.0}, ("FENCE_ENABLE 1 prevents arming, because no fence",)),
         ({"FENCE_ENABLE": 1.0, "FENCE_TYPE": 2.0}, ("FENCE_TYPE 2",)),
         ({"FENCE_AUTOENABLE": 1.0, "FENCE_TYPE": 5.0}, ("FENCE_TYPE 5",)),
         ({"FENCE_ENABLE": 1.0, "FENCE_TYPE": 3.0, "FENCE_ACTION": 0.0}, ()),
@@ -530,8 +533,8 @@ def test_px4_1_16_may_keep_no_minimum_ground_speed() -> None:
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ("0 50 60", "DO_CHANGE_SPEED to 50 m/s with a throttle sets TRIM_THROTTLE"),
-        ("0 5 60", "DO_CHANGE_SPEED to 5 m/s with a throttle sets TRIM_THROTTLE"),
+        ("0 50 60", "DO_CHANGE_SPEED to 50 m/s is outside AIRSPEED_MIN"),
+        ("0 5 60", "DO_CHANGE_SPEED to 5 m/s is outside AIRSPEED_MIN"),
         ("0 15 60", ""),  # within AIRSPEED_MIN 9 to AIRSPEED_MAX 22: the airspeed, and no throttle
         ("0 50 -1", ""),
         ("1 50 60", ""),  # a minimum ground speed, and no throttle
