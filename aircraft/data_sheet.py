@@ -83,7 +83,7 @@ RANGES = {
     "top": ("top", "m/s", 9.0, 70.0, 1.0),
     "bank": ("bank", "degrees", 15.0, 60.0, math.pi / 180.0),
     "climb": ("climb", "degrees", 2.0, 35.0, math.pi / 180.0),
-    "motor": ("motor", "rpm a volt", 20.0, 5000.0, 1.0),
+    "motor": ("motor", "rpm per volt", 20.0, 5000.0, 1.0),
     "fuel": ("fuel", "kg", 0.05, 12.0, 1.0),
 }
 # Rounding tolerance for a conversion of units, as a ratio.
@@ -789,7 +789,7 @@ def _solve_engine(sheet: DataSheet, drag: Drag, target_fields: list[str]) -> tup
 
 
 def _thrust_error(motor: Motor, sheet: DataSheet, drag: Drag, field: str) -> float:
-    """Return the excess of a motor's thrust over the thrust that a field requires, relative to the latter.
+    """Return the relative thrust error of a motor: thrust divided by the thrust that a field requires, minus 1.
 
     field: field of the sheet. "top" requires its thrust at full throttle, "climb" at `DataSheet.climb_throttle`, and
         "trim_throttle" requires the drag at that throttle.
@@ -810,9 +810,11 @@ def _solve_for_factors(errors: Callable[[Sequence[float]], list[float]], count: 
     if not count:
         return []
     for size in (1.0, 0.6, 1.7):
-        x = _solve_by_newton(lambda x: np.array(errors(np.exp(x).tolist())), np.log([size, 1.0 / size][:count]))
-        if x is not None:
-            return np.exp(x).tolist()
+        solution = _solve_by_newton(
+            lambda logarithms: np.array(errors(np.exp(logarithms).tolist())), np.log([size, 1.0 / size][:count])
+        )
+        if solution is not None:
+            return np.exp(solution).tolist()
     raise _NoPropellerError
 
 
@@ -829,8 +831,8 @@ _THRUST_TOLERANCE_RATIO = 1e-7
 def _solve_by_newton(errors: Callable[[Floats], Floats], x: Floats) -> Floats | None:
     """Find a zero of the errors by Newton's method; return None if it does not converge.
 
-    errors: function that returns the errors for some numbers.
-    x: first guess of the numbers, which stay within `_SEARCH_BOUND`.
+    errors: function that returns n errors for n numbers.
+    x: first guess, (n,). The numbers stay between -`_SEARCH_BOUND` and `_SEARCH_BOUND`.
 
     A step that does not reduce the errors is halved.
     """
@@ -863,7 +865,7 @@ def _no_propeller_error(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -
     field = next((name for name in ("climb", "top", "motor") if getattr(stated_sheet, name)), "")
     if not field:
         reason = "no propeller of this size and pitch" if stated_sheet.propeller[0] else "no propeller"
-        allowed = f"{reason} carries {sheet.mass:g} kg at {sheet.cruise:g} m/s; state the climb, the top speed or both"
+        allowed = f"{reason} can fly {sheet.mass:g} kg at {sheet.cruise:g} m/s; state the climb, the top speed or both"
         return FlightError.of_argument("prop" if stated_sheet.propeller[0] else "cruise", None, allowed, shown="")
     option, unit, min_value, max_value, factor = RANGES[field]
     if field == "top":

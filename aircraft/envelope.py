@@ -151,8 +151,12 @@ class Envelope:
         )
         sine = math.sin(air_angle)
         min_sine, max_sine = -math.sin(descent), math.sin(climb)
-        if sine >= max_sine or sine <= min_sine or not min_sine < 0.0 < max_sine:
-            return full_throttle if sine >= max_sine else idle if sine <= min_sine else math.nan
+        if sine >= max_sine:
+            return full_throttle
+        if sine <= min_sine:
+            return idle
+        if not min_sine < 0.0 < max_sine:
+            return math.nan
         return (
             idle * sine * (sine - max_sine) / (min_sine * (min_sine - max_sine))
             + level * (sine - min_sine) * (sine - max_sine) / (min_sine * max_sine)
@@ -180,8 +184,8 @@ def ground_slope(air_angle: float, airspeed: float, tailwind: float, crosswind: 
 @compiled
 def ground_speed(airspeed: float, tailwind: float, crosswind: float) -> float:
     """Return the ground speed along a course in wind, m/s; NaN if the course cannot be held."""
-    speed2 = airspeed**2 - crosswind**2
-    speed_over_ground = math.sqrt(speed2) + tailwind if speed2 > 0.0 else -1.0
+    speed_along_2 = airspeed**2 - crosswind**2
+    speed_over_ground = math.sqrt(speed_along_2) + tailwind if speed_along_2 > 0.0 else -1.0
     return speed_over_ground if speed_over_ground > 0.0 else math.nan
 
 

@@ -185,7 +185,7 @@ def _check_name(name: object, file: str, key: str, error: type[PlanflyError] = F
 def uncertainty_text(uncertainty: Uncertainty) -> str:
     """Return an uncertainty as the text of an ``uncertainty.toml``."""
     lines = [
-        "# What is not known of this aircraft.  Each property is a factor in the model, 1 for the estimate.",
+        "# Uncertain properties of this aircraft.  Each property is a factor in the model; 1 is the estimate.",
         "",
         f'source = "{uncertainty.source}"',
         f"climb_sd_deg = {math.degrees(uncertainty.climb_sd):.2f}    # of the steepest climb at cruise, one standard"

@@ -30,7 +30,10 @@ _THINNING = 25
 
 
 def with_airspeed_scale(signals: Signals, flow: Flow) -> Signals:
-    """Scale the airspeed to fit the wind triangle; return the signals, the scale and its standard deviation."""
+    """Return the signals with the airspeed scaled to fit the wind triangle.
+
+    The fields ``airspeed_factor`` and ``airspeed_sd`` state the scale and its standard deviation.
+    """
     factor, sd = airspeed_scale(signals, flow)
     return replace(signals, airspeed=signals.airspeed * factor, airspeed_factor=factor, airspeed_sd=sd)
 
@@ -65,7 +68,7 @@ def airspeed_scale(signals: Signals, flow: Flow) -> tuple[float, float]:
         columns += [(indicator, 0.0 * indicator), (0.0 * indicator, indicator)]
     decay = float(np.exp(-1.0 / (_GUST_TIME_S * thinned.hertz)))
 
-    def innovations(values: Floats) -> Floats:
+    def whiten(values: Floats) -> Floats:
         """Whiten values (n,) for the correlation time `_GUST_TIME_S`, each record separately."""
         filtered = np.empty_like(values)
         for first, last in row_ranges:
@@ -76,8 +79,8 @@ def airspeed_scale(signals: Signals, flow: Flow) -> tuple[float, float]:
             filtered[first] = record_values[0] * np.sqrt(1.0 - decay * decay)
         return filtered
 
-    regressors = np.column_stack([np.concatenate([innovations(a), innovations(b)]) for a, b in columns])
-    targets = np.concatenate([innovations(north - north_air), innovations(east - east_air)])
+    regressors = np.column_stack([np.concatenate([whiten(a), whiten(b)]) for a, b in columns])
+    targets = np.concatenate([whiten(north - north_air), whiten(east - east_air)])
     sds = np.concatenate([[SCALE_SD, _HEADING_SD_RAD], np.full(2 * len(row_ranges), _WIND_SD_MPS)])
     blocks = np.concatenate([thinned.block, thinned.block + thinned.block.max() + 1])
     fit = fit_with_prior(regressors, targets, np.zeros(len(sds)), sds, blocks)
@@ -90,7 +93,8 @@ def _air_velocity(signals: Signals, flow: Flow) -> tuple[Floats, Floats]:
     u = signals.airspeed * np.cos(flow.alpha) * np.cos(flow.beta)
     v = signals.airspeed * np.sin(flow.beta)
     w = signals.airspeed * np.sin(flow.alpha) * np.cos(flow.beta)
-    below = v * np.sin(roll) + w * np.cos(roll)
-    across = v * np.cos(roll) - w * np.sin(roll)
-    along = u * np.cos(pitch) + below * np.sin(pitch)
-    return along * np.cos(yaw) - across * np.sin(yaw), along * np.sin(yaw) + across * np.cos(yaw)
+    # Components with wings level, then with wings and nose level.
+    wings_level_down = v * np.sin(roll) + w * np.cos(roll)
+    right = v * np.cos(roll) - w * np.sin(roll)
+    forward = u * np.cos(pitch) + wings_level_down * np.sin(pitch)
+    return forward * np.cos(yaw) - right * np.sin(yaw), forward * np.sin(yaw) + right * np.cos(yaw)

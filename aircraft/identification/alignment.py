@@ -96,17 +96,17 @@ class Signals:
             edges.append(edges[-1] + len(blocks[-1]))
         # Split into contiguous columns again, (n,) or (n, k).
         thinned_rows, column = np.concatenate(pieces), 0
-        own_columns: dict[str, Any] = {}
+        thinned_columns: dict[str, Any] = {}
         for name, values in columns.items():
             width = 1 if values.ndim == 1 else values.shape[1]
-            own_columns[name] = np.ascontiguousarray(
+            thinned_columns[name] = np.ascontiguousarray(
                 thinned_rows[:, column] if values.ndim == 1 else thinned_rows[:, column : column + width]
             )
             column += width
-        extra_columns = {name: own_columns.pop(name) for name in extra}
+        extra_columns = {name: thinned_columns.pop(name) for name in extra}
         return replace(
             self,
-            **own_columns,
+            **thinned_columns,
             edges=tuple(edges),
             block=np.concatenate(blocks),
             hertz=self.hertz / step,

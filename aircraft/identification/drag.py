@@ -132,14 +132,14 @@ class ForwardForces:
 def fit_drag(
     signals: Signals, base: BaseModel, values: Floats, flow: Flow, uncertainty: AlphaUncertainty | None = None
 ) -> tuple[Fit, Floats, Floats]:
-    """Fit the five parameters of drag and motor; return the fit, their values (5,) and covariance (5, 5).
+    """Fit the five parameters of drag and motor; return the fit, the values (5,) and their covariance (5, 5).
 
     values: (n,) values of all parameters, of which the parameters of lift are used.
     uncertainty: uncertainty of the lift curve; None for a default.
 
-    The fit also has nuisance parameters. The nuisance parameters of the aircraft are resistance, idle current, voltage
-    and drag of the elevator. They are folded into the five values: together with the nuisance parameters of the base
-    model, the five values give nearly the same forces and currents as the fit.
+    The fit also estimates nuisance parameters, some of which belong to the aircraft: resistance, idle current, voltage
+    and drag of the elevator. The returned five values replace these as well: used with the base model's resistance,
+    idle current, voltage and elevator drag, they give nearly the same forces and currents as the fit.
     """
     forces = forward_forces(signals, base, values, flow, AlphaUncertainty() if uncertainty is None else uncertainty)
     thinned = forces.signals
@@ -174,15 +174,15 @@ def drag_priors(*, with_current: bool) -> tuple[Floats, Floats]:
 
 
 def _fold_nuisances(forces: ForwardForces, unknown: Floats) -> tuple[Floats, Floats]:
-    """Fold the aircraft's nuisance parameters into the five parameters, by least squares.
+    """Change the five parameters so that they replace the aircraft's fitted nuisance parameters, by least squares.
 
     unknown: (p,) fitted values of the unknowns.
 
     The differences of force and current over the signals are minimised. Returns the values of the parameters (5,), and
     their derivatives with respect to the unknowns, (5, p).
     """
-    own_count = int(_IS_DRAG_PARAMETER.sum())
-    folded = own_count + np.flatnonzero(_IS_OF_AIRCRAFT)
+    parameter_count = int(_IS_DRAG_PARAMETER.sum())
+    folded = parameter_count + np.flatnonzero(_IS_OF_AIRCRAFT)
     scale = FORCE_FLOOR / _CURRENT_FLOOR_A
 
     def stack_force_and_current(force: Floats, current: Floats) -> Floats:
@@ -195,15 +195,19 @@ def _fold_nuisances(forces: ForwardForces, unknown: Floats) -> tuple[Floats, Flo
     for _ in range(_MAX_FOLDING_STEPS):
         columns = stack_force_and_current(*forces.slopes(folded_unknown))
         residual = target - stack_force_and_current(*forces.predict(folded_unknown))
-        folded_unknown[:own_count] += np.linalg.lstsq(columns[:, :own_count], residual, rcond=None)[0]
-    jacobian = np.zeros((own_count, len(unknown)))
-    jacobian[:, :own_count] = np.eye(own_count)
-    jacobian[:, folded] = np.linalg.lstsq(columns[:, :own_count], columns[:, folded], rcond=None)[0]
-    return folded_unknown[:own_count], jacobian
+        folded_unknown[:parameter_count] += np.linalg.lstsq(columns[:, :parameter_count], residual, rcond=None)[0]
+    jacobian = np.zeros((parameter_count, len(unknown)))
+    jacobian[:, :parameter_count] = np.eye(parameter_count)
+    jacobian[:, folded] = np.linalg.lstsq(columns[:, :parameter_count], columns[:, folded], rcond=None)[0]
+    return folded_unknown[:parameter_count], jacobian
 
 
 class _Measurement:
-    """Measured forward acceleration and, with the current, the current, (n,), low-passed."""
+    """Low-passed forward acceleration (m/s^2) and battery current (A) of a log, (n,); no current on request.
+
+    block: (n,) time block of each row.
+    floor: lower bound on the residual variance; see `aircraft.identification.regression.fit_with_prior`.
+    """
 
     def __init__(self, signals: Signals, *, with_current: bool) -> None:
         self.force = signals.smooth(signals.acceleration[:, 0], FORCE_CUTOFF_HZ)

@@ -64,9 +64,9 @@ def gyro_and_lateral_biases(signals: Signals) -> Floats:
             ]
         )
         north, east, down = np.gradient(signals.velocity[rows], 1.0 / signals.hertz, axis=0).T
-        ahead, across = north * np.cos(yaw) + east * np.sin(yaw), east * np.cos(yaw) - north * np.sin(yaw)
-        below = ahead * np.sin(pitch) + (down - GRAVITY) * np.cos(pitch)
-        right = across * np.cos(roll) + below * np.sin(roll)
+        forward, level_right = north * np.cos(yaw) + east * np.sin(yaw), east * np.cos(yaw) - north * np.sin(yaw)
+        pitched_down = forward * np.sin(pitch) + (down - GRAVITY) * np.cos(pitch)
+        right = level_right * np.cos(roll) + pitched_down * np.sin(roll)
         gyro_bias = (signals.rates[rows] - turning).mean(axis=0)
         biases.append(np.append(gyro_bias, (signals.acceleration[rows, 1] - right).mean()))
     return np.array(biases)

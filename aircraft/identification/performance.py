@@ -35,7 +35,7 @@ class Performance:
 
 
 def performance(base: BaseModel, values: Floats, airspeed: float, density: float, idle: float = 0.0) -> Performance:
-    """Return the performance of each of m draws.
+    """Compute climb, sink, drag, throttle and power of each of m draws of an aircraft.
 
     values: values of the n parameters in each draw, (m, n).
     airspeed: m/s, true.
@@ -105,8 +105,8 @@ def level_controls(base: BaseModel, values: Floats, airspeed: float, density: fl
     throttle = performance(base, rows, airspeed, density).throttle
     thrust, _ = _thrusts_and_currents(base, rows, airspeed, throttle, density)
     alpha, _ = _alpha_and_drag(base, rows, airspeed, density, thrust, np.zeros(1))
-    at_zero, per_alpha = _trimmed_elevator(base, rows)
-    return float(at_zero[0] + per_alpha[0] * alpha[0]), float(throttle[0])
+    elevator_at_zero, elevator_per_alpha = _trimmed_elevator(base, rows)
+    return float(elevator_at_zero[0] + elevator_per_alpha[0] * alpha[0]), float(throttle[0])
 
 
 def _trimmed_elevator(base: BaseModel, values: Floats) -> tuple[Floats, Floats]:

@@ -184,8 +184,8 @@ class Predictor:
     def _air_velocity(self, rows: Ints) -> Floats:
         """Return the measured velocity through the air in body axes, m/s, (n, 3), at the given rows (n,)."""
         speed, alpha, beta = self._signals.airspeed[rows], self._flow.alpha[rows], self._flow.beta[rows]
-        ahead = speed * np.cos(beta)
-        return np.column_stack([ahead * np.cos(alpha), speed * np.sin(beta), ahead * np.sin(alpha)])
+        symmetric_speed = speed * np.cos(beta)
+        return np.column_stack([symmetric_speed * np.cos(alpha), speed * np.sin(beta), symmetric_speed * np.sin(alpha)])
 
     def _required_accelerations(self) -> Floats:
         """Return the required aerodynamic moments divided by the moments of inertia, rad/s^2, (n, 3).
@@ -283,9 +283,9 @@ class Predictor:
         elevator, aileron, rudder = signals.surfaces[rows].T
         roll, pitch, yaw = (rates * np.array([base.span, base.chord, base.span])).T / (2.0 * airspeed)
         slope, zero = lift_curve(base, self._values)
-        from_alpha = zero + slope * flow.alpha
-        lift = from_alpha + c.lift_rate * pitch + c.lift_elevator * elevator
-        induced = c.drag_induced * self._values[INDEX["induced-drag"]] * np.square(from_alpha - c.lift_least_drag)
+        alpha_lift = zero + slope * flow.alpha
+        lift = alpha_lift + c.lift_rate * pitch + c.lift_elevator * elevator
+        induced = c.drag_induced * self._values[INDEX["induced-drag"]] * np.square(alpha_lift - c.lift_least_drag)
         drag = c.drag_zero * self._values[INDEX["zero-lift-drag"]] + induced + c.drag_elevator * elevator
         side = (
             c.side_beta * flow.beta
@@ -362,21 +362,21 @@ def predict_log(signals: Signals, models: Mapping[str, tuple[BaseModel, Floats]]
     measured = {
         horizon: _measured_quantities(signals, starts + round(horizon * signals.hertz)) for horizon in HORIZONS_S
     }
-    now = _measured_quantities(signals, starts)
-    constant = {horizon: _predict_constant_rates(now, horizon) for horizon in HORIZONS_S}
-    predictions = [Prediction("constant rates", _rms_errors(constant, measured))]
-    shown = constant[HORIZONS_S[1]]
+    start_values = _measured_quantities(signals, starts)
+    constant_rates = {horizon: _predict_constant_rates(start_values, horizon) for horizon in HORIZONS_S}
+    predictions = [Prediction("constant rates", _rms_errors(constant_rates, measured))]
+    shown_values = constant_rates[HORIZONS_S[1]]
     for name, (base, values) in models.items():
         predictor = Predictor(signals, base, values)
         predicted = predictor.predict(starts)
-        shown = predicted[HORIZONS_S[1]]
+        shown_values = predicted[HORIZONS_S[1]]
         predictions.append(Prediction(name, _rms_errors(predicted, measured), predictor.whiteness))
     return PredictedLog(
         tuple(predictions),
         len(starts),
         starts / signals.hertz + HORIZONS_S[1],
-        _in_units(measured[HORIZONS_S[1]]),
-        _in_units(shown),
+        _convert_units(measured[HORIZONS_S[1]]),
+        _convert_units(shown_values),
     )
 
 
@@ -394,12 +394,12 @@ def _predict_constant_rates(quantities: Floats, horizon: float) -> Floats:
     return predicted
 
 
-def _in_units(quantities: Floats) -> Floats:
+def _convert_units(quantities: Floats) -> Floats:
     """Convert quantities (n, 6) from rad, rad/s and m/s to `UNITS`."""
     return quantities * np.array([np.degrees(1.0)] * 5 + [1.0])
 
 
 def _rms_errors(predicted: Mapping[float, Floats], measured: Mapping[float, Floats]) -> dict[float, Floats]:
     """Return the root mean square errors (6,) in `UNITS`, by the predicted time."""
-    errors = {horizon: _in_units(predicted[horizon] - measured[horizon]) for horizon in HORIZONS_S}
+    errors = {horizon: _convert_units(predicted[horizon] - measured[horizon]) for horizon in HORIZONS_S}
     return {horizon: np.sqrt(np.square(error).mean(axis=0)) for horizon, error in errors.items()}

@@ -25,7 +25,7 @@ class ProgramFlight(RunningFlight, AbstractContextManager["ProgramFlight"]):
         """
 
     @abstractmethod
-    def keep_log(self, target: Path) -> bool:
+    def save_log(self, target: Path) -> bool:
         """End the program cleanly and move its log to a file; return True if there was a log."""
 
 

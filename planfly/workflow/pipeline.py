@@ -231,7 +231,7 @@ def _fly_with_program(task: _FlightTask, setup: FlightSetup, program: ProgramAut
             raise
         if task.log is not None:
             program_log = task.log.with_suffix(program.log_suffix)
-            flight.keep_log(program_log)
+            flight.save_log(program_log)
             judged_flight = replace(judged_flight, autopilot_log=program_log if judged_flight.log else None)
     return judged_flight
 

@@ -189,7 +189,7 @@ def test_the_slope_of_an_elliptic_wing() -> None:
         ({"fuel": 1.3}, "fuel 1.3 kg: allowed up to 60 % of the mass, 1.26 kg"),
         ({"fuel": 0.3, "motor": 900.0}, "fuel 0.3 kg: cannot be combined with --motor"),
         ({"top": 15.9, "climb": math.radians(30.0)}, "climb 30 degrees: allowed about 2.."),
-        ({"motor": 120.0, "volts": 7.4, "propeller": (0.2, 0.1)}, "motor 120 rpm a volt: allowed about "),
+        ({"motor": 120.0, "volts": 7.4, "propeller": (0.2, 0.1)}, "motor 120 rpm per volt: allowed about "),
     ],
 )
 def test_what_is_no_small_aircraft_is_refused(changed: dict[str, float], told: str) -> None:

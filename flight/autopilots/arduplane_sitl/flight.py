@@ -24,7 +24,7 @@ from flight.autopilots.arduplane_sitl.process import (
 from flight.autopilots.autopilot import AutopilotProgram
 from flight.autopilots.parts import Tick
 from flight.autopilots.program import ProgramAutopilot
-from flight.autopilots.sitl.conversation import Talk
+from flight.autopilots.sitl.conversation import ConversationStep
 from flight.autopilots.sitl.flight import SitlFlight
 from flight.autopilots.sitl.link import AutopilotLink, TcpLink
 from flight.autopilots.sitl.process import AutopilotProcess, check_binary
@@ -61,7 +61,7 @@ class AutopilotFlight(SitlFlight):
             setup, aircraft, servos, load_user_parameters(setup) if user_parameters is None else user_parameters
         )
         super().__init__(setup, aircraft, binary)
-        with contextlib.ExitStack() as stack, self._errors_name_program():
+        with contextlib.ExitStack() as stack, self._name_program_in_errors():
             port = stack.enter_context(contextlib.closing(PhysicsPort()))
             self._link = stack.enter_context(contextlib.closing(TcpLink()))
             heading = math.degrees(self._rail.yaw) % 360.0
@@ -93,7 +93,7 @@ class AutopilotFlight(SitlFlight):
         self._hold_during(self._wait_for_thrust())
         self._push()
 
-    def _wait_for_thrust(self) -> Talk:
+    def _wait_for_thrust(self) -> ConversationStep:
         """Wait until the motor has full thrust, if ArduPlane starts the motor before the launch."""
         take_off = self._ground_phases.take_off
         parameters = self.setup.autopilot.parameters
@@ -107,7 +107,11 @@ class AutopilotFlight(SitlFlight):
 
 
 def _reported_program(link: AutopilotLink, digest: str, parameters: ArduPlaneFlightParameters) -> AutopilotProgram:
-    """Return the description of the program that flew, from its messages."""
+    """Return version, checksum and parameters of the program that flew, from the messages that it sent.
+
+    digest: SHA-256 of the program's file.
+    parameters: parameters that the program was started with.
+    """
     reported = link.reported
     known = {RENAMED_IN_4_7.get(name, name) for name in reported.parameters}
     unknown = parameters.changed.keys() - known
@@ -141,5 +145,5 @@ def fly_autopilot(
         flight.prepare()
         simulated = fly_to_end(flight)
         if log is not None:
-            flight.keep_log(log)
+            flight.save_log(log)
         return simulated, flight.setup

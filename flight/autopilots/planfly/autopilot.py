@@ -33,10 +33,7 @@ class PlanflyGuidance(Autopilot):
 
     @classmethod
     def load(cls, table: FlightTable, aircraft: Aircraft, scenario: str) -> Self:
-        """Return the guidance that a [flight] table describes.
-
-        A table with parameters describes another autopilot.
-        """
+        """Return the guidance with the lateral law that a [flight] table states."""
         return cls(table.steering.guidance)
 
     @classmethod
@@ -54,7 +51,7 @@ class PlanflyGuidance(Autopilot):
         if (aircraft.folder / GAINS_FILE).exists():
             load_gains(aircraft)
             return []
-        return [f"{aircraft.folder / GAINS_FILE}: missing; {aircraft.name} does not fly without gains"]
+        return [f"{aircraft.folder / GAINS_FILE}: missing; planfly's guidance needs the gains of {aircraft.name}"]
 
     @property
     def control_law(self) -> ControlLaw:

@@ -243,11 +243,11 @@ def test_settings_that_depend_on_others(text: str, mission: MissionParts, expect
         ("ARMING_MIS_ITEMS 8\nARMING_SKIPCHK -1", ""),
         ("ARMING_MIS_ITEMS 8\nARMING_REQUIRE 0", ""),
         # `AP_Arming_Plane::pre_arm_checks`.
-        ("PTCH_LIM_MIN_DEG -2.9", "PTCH_LIM_MIN_DEG -2.9 prevents arming, which needs at most -3"),
+        ("PTCH_LIM_MIN_DEG -2.9", "PTCH_LIM_MIN_DEG -2.9 prevents arming: ArduPlane requires at most -3"),
         ("PTCH_LIM_MIN_DEG -3", ""),
-        ("PTCH_LIM_MAX_DEG 2.9", "PTCH_LIM_MAX_DEG 2.9 prevents arming, which needs at least 3"),
+        ("PTCH_LIM_MAX_DEG 2.9", "PTCH_LIM_MAX_DEG 2.9 prevents arming: ArduPlane requires at least 3"),
         ("PTCH_LIM_MAX_DEG 3", ""),
-        ("AIRSPEED_MIN 4.9", "AIRSPEED_MIN 4.9 prevents arming, which needs at least 5"),
+        ("AIRSPEED_MIN 4.9", "AIRSPEED_MIN 4.9 prevents arming: ArduPlane requires at least 5"),
         ("AIRSPEED_MIN 5", ""),
         ("AIRSPEED_MIN 4.9\nARMING_CHECK 0", ""),
         # Outputs: elevons on 77 and 78, a V-tail on 79 and 80, two motors on 73 and 74.
@@ -281,7 +281,7 @@ def test_landing_marks_without_a_landing_prevent_arming(mark: int) -> None:
     """`AP_Arming_Plane::mission_checks`: DO_LAND_START (189) and DO_RETURN_PATH_START (188) need RTL_AUTOLAND."""
     marked = IN_THE_AIR._replace(commands=frozenset({16, mark}))
     (text,) = said("RTL_AUTOLAND 0", marked)
-    assert text.startswith("RTL_AUTOLAND 0 prevents arming with DO_")
+    assert text.startswith("RTL_AUTOLAND 0 prevents arming, because the mission has DO_")
     assert said("RTL_AUTOLAND 1", marked) == said("RTL_AUTOLAND 0", IN_THE_AIR) == said("WP_RADIUS 60", marked) == []
     assert said("RTL_AUTOLAND 0\nARMING_CHECK 0", marked) == []
 
