@@ -297,7 +297,7 @@ def check_sheet(sheet: DataSheet) -> DataSheet:
         areas = f"{lift / LIFT_RANGE[1] * area:.3g}..{lift / LIFT_RANGE[0] * area:.3g} m2 at this stall speed"
         allowed = (
             f"allowed {min_stall:.3g}..{max_stall:.3g}"
-            f" m/s without flaps for {sheet.mass:g} kg on {area:g} m2, or {areas}"
+            f" m/s without flaps for {sheet.mass:g} kg on {area:g} m2, or a wing area of {areas}"
         )
         raise _range_error("stall", sheet.stall, allowed, "m/s")
     aspect = sheet.span**2 / area
@@ -348,7 +348,7 @@ def _wing_area(sheet: DataSheet) -> float:
 
 def _area_source(sheet: DataSheet) -> str:
     """Return a phrase on the source of the wing area, for a message."""
-    return "as stated" if sheet.area else "that carries this mass at this stall speed; state the area if you know it"
+    return "as stated" if sheet.area else "the area for this mass and stall speed; state the area if you know it"
 
 
 @dataclass(frozen=True, slots=True)
@@ -885,7 +885,7 @@ def _no_propeller_error(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -
     allowed = (
         f"allowed about {min(feasible_values):.3g}..{max(feasible_values):.3g} {unit} {condition}"
         if feasible_values
-        else f"no propeller {condition}"
+        else f"no propeller reaches it {condition}"
     )
     value = getattr(stated_sheet, field) / factor
     return FlightError.of_argument(option, value, allowed, shown=f"{value:.3g} {unit}")

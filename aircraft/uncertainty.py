@@ -192,14 +192,14 @@ def uncertainty_text(uncertainty: Uncertainty) -> str:
         " deviation",
         f"descent_sd_deg = {math.degrees(uncertainty.descent_sd):.2f}  # of the steepest descent",
         f"fastest_sd_mps = {uncertainty.max_speed_sd:.2f}  # of the fastest level flight",
-        f"power_sd = {uncertainty.power_sd:.3g}  # of the logarithm of the power that flight takes",
+        f"power_sd = {uncertainty.power_sd:.3g}  # of the logarithm of the power in flight",
     ]
     if uncertainty.climb_guessed:
         lines.append("climb_guessed = true  # state the true value with --climb")
     if uncertainty.bank_guessed:
         lines.append("bank_guessed = true  # of max_bank_deg; state the true value with --bank")
     if uncertainty.battery_guessed:
-        lines.append("battery_guessed = true  # no energy is judged until battery_wh is stated and this line is gone")
+        lines.append("battery_guessed = true  # to judge energy, state battery_wh and remove this line")
     for quantity in uncertainty.quantities:
         reason = quantity.reason.replace("\\", "/").replace('"', "'")
         lines += [

@@ -88,7 +88,7 @@ class GustFilter:
     gain: float
 
     def estimate(self, residual: Floats, signals: Signals) -> Floats:
-        """Estimate the process at each sample, (n,), from the earlier samples of a residual (n,)."""
+        """Estimate the unmodelled moment at each sample, (n,), from the earlier samples of a residual (n,)."""
         from scipy.signal import lfilter
 
         estimate = np.zeros_like(residual)

@@ -122,7 +122,7 @@ def _check_no_conflict(scenario: "Scenario", autopilot: "Autopilot", rtl_paramet
         stated_value = autopilot.stated_value(name)
         if stated_value is not None and not math.isclose(value, stated_value, rel_tol=1e-6, abs_tol=1e-6):
             source = "" if autopilot.parameters is None else autopilot.parameters.source
-            allowed = f"{source} states {name} {stated_value:g}"
+            allowed = f"{source} sets {name} to {stated_value:g}; the two values must be equal"
             raise ScenarioError.at(scenario.name, f"returns ({name})", value, allowed, shown=f"{value:g}")
 
 

@@ -64,10 +64,11 @@ def check_start_position(lat_deg: float, lon_deg: float, amsl: float, terrain_am
     """
     if abs(lat_deg) >= 90.0 or abs(lon_deg) > 180.0:
         field, value = ("latitude", lat_deg) if abs(lat_deg) >= 90.0 else ("longitude", lon_deg)
-        text = f"start at latitude {lat_deg}, longitude {lon_deg}: not within +-90 and +-180 degrees"
-        raise FlightError(text, field=field, value=value, allowed="not within +-90 and +-180 degrees")
+        allowed = "the latitude must be within +-90 degrees, the longitude within +-180 degrees"
+        text = f"start at latitude {lat_deg}, longitude {lon_deg}: {allowed}"
+        raise FlightError(text, field=field, value=value, allowed=allowed)
     if not terrain_amsl < amsl < 11000.0:
-        allowed = f"not between ground ({terrain_amsl} m) and 11000 m"
+        allowed = f"must be above the ground ({terrain_amsl} m) and below 11000 m"
         raise FlightError(f"start at {amsl} m above sea level: {allowed}", field="start", value=amsl, allowed=allowed)
 
 
@@ -298,7 +299,7 @@ class Fdm:
         wind = np.array(wind_ned, dtype=np.float64)
         numbers = (lat_deg, lon_deg, amsl, course, airspeed, climb_angle, *wind.tolist(), terrain_amsl)
         if len(numbers) != 10 or not all(math.isfinite(number) for number in numbers):
-            message = f"the start takes ten finite numbers, three of them the wind, and has {numbers}"
+            message = f"start: expected ten finite numbers, three of them the wind; found {numbers}"
             raise FlightError(message, field="start", value=numbers)
         check_start_position(lat_deg, lon_deg, amsl, terrain_amsl)
         velocity = air_velocity(course, climb_angle, airspeed, wind)
@@ -365,7 +366,7 @@ class Fdm:
         """
         numbers = (*position, *attitude, *velocity, *wind, terrain_amsl, *commands)
         if len(numbers) != 17 or not all(math.isfinite(number) for number in numbers):
-            raise FlightError(f"a release takes 17 finite numbers and has {numbers}", field="start", value=numbers)
+            raise FlightError(f"release: expected 17 finite numbers; found {numbers}", field="start", value=numbers)
         lat_deg, lon_deg, amsl = position
         # On the ground the aircraft's reference point may be at ground level: its contacts reach below it.
         check_start_position(lat_deg, lon_deg, amsl, min(terrain_amsl, amsl - 1.0))

@@ -183,7 +183,7 @@ def test_the_slope_of_an_elliptic_wing() -> None:
         # 2.1 kg on 0.8 m2 at lift coefficients of 2.4 and 0.5; or areas for those at 10 m/s.
         (
             {"area": 0.8},
-            "stall 10 m/s: allowed 4.18..9.17 m/s without flaps for 2.1 kg on 0.8 m2, or 0.14..0.672 m2 at this stall",
+            "stall 10 m/s: allowed 4.18..9.17 m/s without flaps for 2.1 kg on 0.8 m2, or a wing area of 0.14..0.672",
         ),
         ({"span": 0.8}, "span 0.8 m: allowed 0.82..2.59 m with a wing of 0.269 m2"),
         ({"fuel": 1.3}, "fuel 1.3 kg: allowed up to 60 % of the mass, 1.26 kg"),

@@ -179,4 +179,4 @@ def _describe_fence_faults(
     if has_mission_fence and is_on_at_home and mission.fence_at_home:
         name = "FENCE_ENABLE" if parameters.fence_enable > 0.0 else "FENCE_AUTOENABLE"
         value = parameters.fence_enable or parameters.fence_auto_enable
-        yield f"{name} {value:g} prevents arming at home, which is {mission.fence_at_home}"
+        yield f"{name} {value:g} prevents arming, because home is {mission.fence_at_home}"

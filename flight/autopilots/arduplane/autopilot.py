@@ -356,7 +356,7 @@ class ArduPlane(Autopilot):
         )
 
     def _unsimulated_return_text(self, mission: ReturnMission) -> str:
-        """Return "terrain" if an RTL follows the terrain, which is not simulated; otherwise ""."""
+        """Return the reason "terrain" if an RTL follows the terrain, which is not simulated; otherwise ""."""
         return "terrain" if self.parameters.rtl_follows_terrain else ""
 
     def _unjudged_return_texts(self, mission: ReturnMission) -> tuple[str, ...]:
@@ -689,12 +689,12 @@ def _simulated_landing(target: ReturnTarget, *, engine_out: bool) -> LandingStar
     return landing if landing and not landing.is_landing else None
 
 
-def _radius_growth(up: float) -> float:
+def _radius_growth(amsl: float) -> float:
     """Return the ratio of the loiter radius flown at an altitude (m AMSL) to the radius at sea level.
 
     The ratio is the square of the ratio of true to equivalent airspeed.
     """
-    return float(eas_to_tas_ratio(up)) ** 2
+    return float(eas_to_tas_ratio(amsl)) ** 2
 
 
 def _mission_notes(parameters: ArduPilotParameters) -> list[str]:

@@ -431,7 +431,8 @@ def _load_stage(stages: Records, index: int, waypoints: Records, estimated: Reco
     """Start the leg to the stage with the given index.
 
     The leg starts at the previous stage. It starts at the aircraft if there is no previous stage, or if the aircraft is
-    already past the leg's end. Waypoints 1 and 2 both become a copy of the stage.
+    already past the leg's end. Waypoints 1 and 2 both become a copy of the stage: once `navigate_legs` begins the leg
+    to waypoint 2, the stage is reached.
     """
     stage, is_previous_reached = stages[index], memory.leg > 0
     for k in range(1, 3):

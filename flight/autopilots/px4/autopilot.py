@@ -279,9 +279,10 @@ class Px4(Autopilot):
         """Describe settings that matter only for some missions or releases."""
         parameters = self.parameters
         if parameters["NPFG_EN_MIN_GSP"] == 0.0 and self.version == "1.16":
-            yield "NPFG_EN_MIN_GSP 0 keeps no minimum ground speed, which is not simulated"
+            yield "NPFG_EN_MIN_GSP 0 disables the minimum ground speed, which is not simulated"
         if mission.moves_payload and parameters["MIS_COMMAND_TOUT"] > 0.0:
-            yield f"MIS_COMMAND_TOUT {parameters['MIS_COMMAND_TOUT']:g} waits for the payload, which is not simulated"
+            wait_text = f"MIS_COMMAND_TOUT {parameters['MIS_COMMAND_TOUT']:g} s"
+            yield f"{wait_text} makes PX4 wait for the payload, which is not simulated"
         if parameters["FW_T_THR_LOW_HGT"] >= 0.0 and parameters["FW_LND_THRTC_SC"] != 1.0:
             scale_text = f"FW_LND_THRTC_SC {parameters['FW_LND_THRTC_SC']:g}"
             height_text = f"FW_T_THR_LOW_HGT {parameters['FW_T_THR_LOW_HGT']:g} m"
@@ -306,7 +307,7 @@ class Px4(Autopilot):
         if return_type in _ALONG_THE_MISSION:
             yield f"RTL_TYPE {return_type:g} returns along the mission, which is not simulated"
         if return_type == _TO_RALLY_POINT and math.isinf(rally_distance):
-            yield f"RTL_TYPE {return_type:g} without a rally point loiters where it begins, which is not simulated"
+            yield f"RTL_TYPE {return_type:g} without a rally point loiters where the RTL begins, which is not simulated"
 
     def _unjudged_return_texts(self, rally_distance: float) -> Iterator[str]:
         """Describe settings with which a part of an RTL is not simulated; see `_unsimulated_return_texts`."""
@@ -321,7 +322,7 @@ class Px4(Autopilot):
         parameters = self.parameters
         if mission.fence_at_home and parameters["GF_ACTION"] > 0.0:
             # `GeofenceChecks::checkAndReport`.
-            yield f"GF_ACTION {parameters['GF_ACTION']:g} prevents arming at home, which is {mission.fence_at_home}"
+            yield f"GF_ACTION {parameters['GF_ACTION']:g} prevents arming, because home is {mission.fence_at_home}"
         if mission.has_fence and parameters["GF_PREDICT"] > 0.0 and parameters["GF_ACTION"] > _WARN_OF_FENCE:
             yield "GF_PREDICT 1 leaves the mission before its fence is reached, which is not simulated"
         if parameters["CBRK_FLIGHTTERM"] != _NO_TERMINATION:
@@ -493,7 +494,10 @@ class Px4(Autopilot):
         return failsafe_causes(self.parameters, has_fence=mission.has_fence)
 
     def _unsimulated_returns(self, mission: ReturnMission) -> str:
-        """Return the reason why no RTL of a mission is simulated; "" if RTLs are simulated."""
+        """Return the reason why no RTL of a mission is simulated; "" if RTLs are simulated.
+
+        The reason "landing" means that the landing sequence begins with the landing itself.
+        """
         begins_with_landing = bool(mission.landings) and mission.landings[0].is_landing
         if begins_with_landing and self.parameters["RTL_TYPE"] in _TO_LANDING:
             return "landing"

@@ -103,7 +103,7 @@ def _describe_slew_rates(parameters: Px4Parameters) -> Iterator[str]:
     stated = parameters.by_origin("file")
     for name in SLEW_NAMES:
         if (value := stated.get(name, 0.0)) > 0.0:
-            yield f"{name} {value:g} slows an output, which is not simulated"
+            yield f"{name} {value:g} s slows an actuator output, which is not simulated"
 
 
 def _describe_connections(parameters: Px4Parameters) -> Iterator[str]:

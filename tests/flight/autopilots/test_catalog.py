@@ -78,7 +78,7 @@ def test_what_a_scenario_asks_of_its_returns_and_a_file_denies_is_refused(tmp_pa
         if not refused:
             assert arduplane(scenario).parameters.by_origin("file") == {"RTL_ALTITUDE": 180.0}
             continue
-        with pytest.raises(ScenarioError, match=r"tight: returns \(RTL_ALTITUDE\): 180: .*mine.parm states RTL_ALT"):
+        with pytest.raises(ScenarioError, match=r"tight: returns \(RTL_ALTITUDE\): 180: .*mine.parm sets RTL_ALT"):
             load_autopilot(scenario, AEROSONDE)
 
 

@@ -185,8 +185,12 @@ def test_required_items(text: str, mission: MissionParts, words: str) -> None:
         ("FENCE_ENABLE 1\nFENCE_ALT_MAX -1", FENCED, "FENCE_ALT_MIN -10 and FENCE_ALT_MAX -1 prevent arming"),
         ("FENCE_ENABLE 1\nFENCE_MARGIN -1", FENCED, "FENCE_MARGIN -1 prevents arming: ArduPlane requires at least 0"),
         # Breached where the aircraft is armed; FENCE_AUTOENABLE 1 and 2 wait for a take-off.
-        ("FENCE_ENABLE 1", FENCED._replace(fence_at_home="outside"), "FENCE_ENABLE 1 prevents arming at home, which"),
-        ("FENCE_AUTOENABLE 3", FENCED._replace(fence_at_home="outside"), "FENCE_AUTOENABLE 3 prevents arming at home"),
+        ("FENCE_ENABLE 1", FENCED._replace(fence_at_home="outside"), "FENCE_ENABLE 1 prevents arming, because home"),
+        (
+            "FENCE_AUTOENABLE 3",
+            FENCED._replace(fence_at_home="outside"),
+            "FENCE_AUTOENABLE 3 prevents arming, because",
+        ),
         ("FENCE_AUTOENABLE 1", FENCED._replace(fence_at_home="outside"), ""),
         ("FENCE_ENABLE 1\nFENCE_TYPE 1\nFENCE_ACTION 0", FENCED._replace(fence_at_home="outside"), ""),
         ("WP_RADIUS 60", FENCED._replace(fence_at_home="outside"), ""),

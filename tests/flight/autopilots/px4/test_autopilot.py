@@ -147,9 +147,9 @@ def test_what_px4s_own_program_flies_leaves_no_verdict_open() -> None:
         (
             {},
             "outside an inclusion polygon",
-            ["GF_ACTION 2 prevents arming at home, which is outside an inclusion polygon"],
+            ["GF_ACTION 2 prevents arming, because home is outside an inclusion polygon"],
         ),
-        ({"GF_ACTION": 1.0}, "outside", ["GF_ACTION 1 prevents arming at home, which is outside"]),
+        ({"GF_ACTION": 1.0}, "outside", ["GF_ACTION 1 prevents arming, because home is outside"]),
         ({"GF_ACTION": 0.0}, "outside", []),
         ({}, "", []),
     ],

@@ -89,8 +89,8 @@ def test_px4s_defaults_leave_nothing_open_stated_or_not(name: str) -> None:
         ),
         ("CA_AIRFRAME 1\nCA_SV_CS_COUNT 2\nCA_SV_CS0_TYPE 1\nCA_SV_CS1_TYPE 3\nCA_SV_CS1_TRQ_R 0", ""),
         # `ControlAllocation::applySlewRateLimit`.
-        ("CA_SV1_SLEW 0.5", "CA_SV1_SLEW 0.5 slows an output"),
-        ("CA_R0_SLEW 10", "CA_R0_SLEW 10 slows an output"),
+        ("CA_SV1_SLEW 0.5", "CA_SV1_SLEW 0.5 s slows an actuator"),
+        ("CA_R0_SLEW 10", "CA_R0_SLEW 10 s slows an actuator"),
         ("CA_SV1_SLEW 0\nCA_R0_SLEW 0", ""),
         # Functions of outputs: motors from 101, surfaces from 201.
         ("PWM_MAIN_FUNC1 101\nPWM_MAIN_FUNC2 0", "the output functions (PWM_MAIN_FUNC1 and others) connect no surface"),

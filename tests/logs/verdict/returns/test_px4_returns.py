@@ -188,7 +188,7 @@ def test_the_default_returns_to_the_landing_of_the_mission(tmp_path: Path) -> No
     [
         ("RTL_TYPE 2", BEHIND, "RTL_TYPE 2 returns along the mission, which is not simulated", False),
         ("RTL_TYPE 4", LANDING, "RTL_TYPE 4 returns along the mission, which is not simulated", False),
-        ("RTL_TYPE 5", BEHIND, "RTL_TYPE 5 without a rally point loiters where it begins", False),
+        ("RTL_TYPE 5", BEHIND, "RTL_TYPE 5 without a rally point loiters where the RTL begins", False),
         ("RTL_LAND_DELAY 0", BEHIND, "RTL_LAND_DELAY 0 lands after the return, which is not simulated", True),
         ("RTL_TYPE 1", LANDING.replace("\t189\t", "\t178\t"), "a landing without DO_LAND_START", True),
         (

@@ -264,11 +264,11 @@ _AROUND = _fence(5003, 400, (0, 0))
     ("fences", "words"),
     [
         (_AROUND, ""),
-        (_EAST, "FENCE_ENABLE 1 prevents arming at home, which is outside an inclusion polygon"),
-        (_fence(5004, 100, (0, 99)), "FENCE_ENABLE 1 prevents arming at home, which is inside an exclusion circle of"),
+        (_EAST, "FENCE_ENABLE 1 prevents arming, because home is outside an inclusion polygon"),
+        (_fence(5004, 100, (0, 99)), "FENCE_ENABLE 1 prevents arming, because home is inside an exclusion circle of"),
         (_fence(5004, 100, (0, 101)), ""),
         # All inclusions, or with bit 1 of FENCE_OPTIONS any: `AC_PolyFence_loader::breached`.
-        ((*_EAST, *_AROUND), "FENCE_ENABLE 1 prevents arming at home, which is outside an inclusion polygon"),
+        ((*_EAST, *_AROUND), "FENCE_ENABLE 1 prevents arming, because home is outside an inclusion polygon"),
         (
             _fence(5003, 1, (0, 0)),
             "FENCE_MARGIN 2 prevents arming: ArduPlane requires at most the 1 m of an inclusion circle",
