@@ -377,8 +377,8 @@ def size_aircraft(
     Raises FlightError for a stall speed or a sink rate out of range, and if no propeller gives the stated climb and top
     speed.
 
-    >>> made = size_aircraft(check_sheet(DataSheet(2.1, 1.6, 15.0, 10.0)))
-    >>> round(made.numbers.area, 3), made.guessed
+    >>> aircraft = size_aircraft(check_sheet(DataSheet(2.1, 1.6, 15.0, 10.0)))
+    >>> round(aircraft.numbers.area, 3), aircraft.guessed
     (0.269, ('area', 'top', 'bank', 'climb', 'volts', 'energy'))
     """
     aircraft_class = CLASSES[sheet.layout] if aircraft_class is None else aircraft_class
@@ -872,16 +872,16 @@ def _no_propeller_error(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -
         min_value, max_value = (ratio * sheet.cruise for ratio in TOP_RATIO_RANGE)
     feasible_values = []
     for value in np.geomspace(min_value, max_value, _RANGE_STEP_COUNT).tolist():
-        changed = {field: value * factor}
+        changed_field = {field: value * factor}
         with contextlib.suppress(_NoPropellerError):
-            _size_any_motor(replace(stated_sheet, **changed), replace(sheet, **changed), drag)
+            _size_any_motor(replace(stated_sheet, **changed_field), replace(sheet, **changed_field), drag)
             feasible_values.append(value)
-    others = [
+    other_conditions = [
         f"{title} of {getattr(stated_sheet, name) / RANGES[name][4]:.3g} {RANGES[name][1]}"
         for name, title in (("top", "a top speed"), ("motor", "a motor"))
         if name != field and getattr(stated_sheet, name)
     ]
-    condition = " and ".join([f"at {sheet.cruise:g} m/s", *others])
+    condition = " and ".join([f"at {sheet.cruise:g} m/s", *other_conditions])
     allowed = (
         f"allowed about {min(feasible_values):.3g}..{max(feasible_values):.3g} {unit} {condition}"
         if feasible_values

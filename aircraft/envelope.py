@@ -94,9 +94,9 @@ class Envelope:
 
         >>> tables = {name: np.full((1, 1), 0.2) for name in ("climb", "descent")}
         >>> edges = dict.fromkeys(("airspeed", "amsl", "level_speed_min", "level_speed_max"), np.ones(1))
-        >>> made = Envelope("mine", "", False, max_bank=0.5, climb_sd=0.1, descent_sd=0.2, **edges, **tables)
-        >>> made = made.with_margin()
-        >>> round(float(made.climb[0, 0]), 4), float(made.descent[0, 0]), made.climb_sd
+        >>> envelope = Envelope("mine", "", False, max_bank=0.5, climb_sd=0.1, descent_sd=0.2, **edges, **tables)
+        >>> envelope = envelope.with_margin()
+        >>> round(float(envelope.climb[0, 0]), 4), float(envelope.descent[0, 0]), envelope.climb_sd
         (0.0355, 0.0, 0.0)
         """
         if not (self.climb_sd or self.descent_sd or self.fastest_sd):

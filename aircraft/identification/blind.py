@@ -93,21 +93,21 @@ class Band:
     @property
     def inside(self) -> float:
         """Fraction of the known values that lie inside the band; NaN without known values."""
-        known = self._known
+        is_known = self._known
         is_inside = (self.flown >= self.low) & (self.flown <= self.high)
-        return float(is_inside[known].mean()) if known.any() else float("nan")
+        return float(is_inside[is_known].mean()) if is_known.any() else float("nan")
 
     @property
     def half_width(self) -> float:
         """Half of the width of the band, median over all values."""
-        known = self._known
-        return float(np.median(0.5 * (self.high - self.low)[known])) if known.any() else float("nan")
+        is_known = self._known
+        return float(np.median(0.5 * (self.high - self.low)[is_known])) if is_known.any() else float("nan")
 
     @property
     def known_fraction(self) -> float:
         """Fraction of the flight's known values at which the band is known, too; NaN without known values."""
-        flown = np.isfinite(self.flown)
-        return float(self._known[flown].mean()) if flown.any() else float("nan")
+        is_flown = np.isfinite(self.flown)
+        return float(self._known[is_flown].mean()) if is_flown.any() else float("nan")
 
     @property
     def is_informative(self) -> bool:
@@ -264,8 +264,8 @@ def _window_starts(signals: Signals, count: int, step: int) -> Ints:
     settling = round(_SETTLING_TIME_S * signals.hertz)
     return np.concatenate(
         [
-            np.arange(first + settling, last - count - 1, step)
-            for first, last in zip(signals.edges[:-1], signals.edges[1:], strict=True)
+            np.arange(start_row + settling, end_row - count - 1, step)
+            for start_row, end_row in zip(signals.edges[:-1], signals.edges[1:], strict=True)
         ]
     )
 

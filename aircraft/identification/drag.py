@@ -142,15 +142,15 @@ def fit_drag(
     idle current, voltage and elevator drag, they give nearly the same forces and currents as the fit.
     """
     forces = forward_forces(signals, base, values, flow, AlphaUncertainty() if uncertainty is None else uncertainty)
-    thinned = forces.signals
-    with_current = bool(np.isfinite(thinned.current).all())
+    thin_signals = forces.signals
+    with_current = bool(np.isfinite(thin_signals.current).all())
     means, sds = drag_priors(with_current=with_current)
     # First fit only the forces, then forces and current, because the first steps with the current would diverge.
-    fit = _fit_unknowns(forces, _Measurement(thinned, with_current=False), means, sds)
+    fit = _fit_unknowns(forces, _Measurement(thin_signals, with_current=False), means, sds)
     if with_current:
-        fit = _fit_unknowns(forces, _Measurement(thinned, with_current=True), means, sds, fit.estimate)
+        fit = _fit_unknowns(forces, _Measurement(thin_signals, with_current=True), means, sds, fit.estimate)
     force, _ = forces.predict(fit.estimate)
-    measured = thinned.smooth(thinned.acceleration[:, 0], FORCE_CUTOFF_HZ)
+    measured = thin_signals.smooth(thin_signals.acceleration[:, 0], FORCE_CUTOFF_HZ)
     explained = 1.0 - float((measured - force).var() / measured.var())
     drag_values, jacobian = _fold_nuisances(forces, fit.estimate)
     return (
@@ -182,7 +182,7 @@ def _fold_nuisances(forces: ForwardForces, unknown: Floats) -> tuple[Floats, Flo
     their derivatives with respect to the unknowns, (5, p).
     """
     parameter_count = int(_IS_DRAG_PARAMETER.sum())
-    folded = parameter_count + np.flatnonzero(_IS_OF_AIRCRAFT)
+    nuisance_indices = parameter_count + np.flatnonzero(_IS_OF_AIRCRAFT)
     scale = FORCE_FLOOR / _CURRENT_FLOOR_A
 
     def stack_force_and_current(force: Floats, current: Floats) -> Floats:
@@ -191,14 +191,16 @@ def _fold_nuisances(forces: ForwardForces, unknown: Floats) -> tuple[Floats, Flo
 
     target = stack_force_and_current(*forces.predict(unknown))
     folded_unknown = unknown.copy()
-    folded_unknown[folded] = 0.0
+    folded_unknown[nuisance_indices] = 0.0
     for _ in range(_MAX_FOLDING_STEPS):
         columns = stack_force_and_current(*forces.slopes(folded_unknown))
         residual = target - stack_force_and_current(*forces.predict(folded_unknown))
         folded_unknown[:parameter_count] += np.linalg.lstsq(columns[:, :parameter_count], residual, rcond=None)[0]
     jacobian = np.zeros((parameter_count, len(unknown)))
     jacobian[:, :parameter_count] = np.eye(parameter_count)
-    jacobian[:, folded] = np.linalg.lstsq(columns[:, :parameter_count], columns[:, folded], rcond=None)[0]
+    jacobian[:, nuisance_indices] = np.linalg.lstsq(
+        columns[:, :parameter_count], columns[:, nuisance_indices], rcond=None
+    )[0]
     return folded_unknown[:parameter_count], jacobian
 
 
@@ -252,19 +254,19 @@ def forward_forces(
     values, uncertainty: see `fit_drag`.
     """
     coefficients, (slope, zero) = base.coefficients, lift_curve(base, values)
-    thinned = signals.thin(FORCE_THINNING, {"alpha": flow.alpha})
-    alpha, pressure = thinned.extra["alpha"], dynamic_force(thinned, base)
+    thin_signals = signals.thin(FORCE_THINNING, {"alpha": flow.alpha})
+    alpha, pressure = thin_signals.extra["alpha"], dynamic_force(thin_signals, base)
     lift = slope * alpha + zero
     forward_pressure, lift_excess = -pressure * np.cos(alpha), lift - coefficients.lift_least_drag
     tilt = pressure * lift * np.cos(alpha)
     return ForwardForces(
-        signals=thinned,
+        signals=thin_signals,
         base=base,
-        known=pressure * (lift + rate_and_elevator_lift(thinned, base)) * np.sin(alpha),
+        known=pressure * (lift + rate_and_elevator_lift(thin_signals, base)) * np.sin(alpha),
         tilts=tilt
         * np.vstack([np.full(len(alpha), uncertainty.angle), uncertainty.by_lift * (lift - uncertainty.mean_lift)]),
         drags=forward_pressure
         * np.vstack([np.full(len(alpha), coefficients.drag_zero), coefficients.drag_induced * np.square(lift_excess)]),
-        elevator=forward_pressure * coefficients.drag_elevator * thinned.surfaces[:, 0],
-        volts=battery_voltage(thinned, base),
+        elevator=forward_pressure * coefficients.drag_elevator * thin_signals.surfaces[:, 0],
+        volts=battery_voltage(thin_signals, base),
     )

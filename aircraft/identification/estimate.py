@@ -129,23 +129,23 @@ def estimate_model(records: Sequence[FlightRecord], base: BaseModel, *, dynamics
     signals = make_aligned_signals(records, clocks, base)
     nominal = fit_parameters(signals, base, dynamics=dynamics)
     shifts = {}
-    for fixed in FIXED_PARAMETERS:
-        if fixed.applies(with_current=nominal.with_current):
-            shifted_signals, shifted_base = fixed.change(signals, base)
+    for fixed_parameter in FIXED_PARAMETERS:
+        if fixed_parameter.applies(with_current=nominal.with_current):
+            shifted_signals, shifted_base = fixed_parameter.change(signals, base)
             shifted_estimate = fit_parameters(
                 shifted_signals,
                 shifted_base,
-                level=fixed.tilt(shifted_signals),
+                level=fixed_parameter.tilt(shifted_signals),
                 dynamics=dynamics,
                 nominal=nominal.refinement,
             )
-            shifts[fixed.name] = shifted_estimate.values - nominal.values
+            shifts[fixed_parameter.name] = shifted_estimate.values - nominal.values
     shifts |= _lift_shifts(signals, base, nominal)
     if nominal.refinement is not None:
         for name, horizons in OTHER_HORIZONS_S.items():
-            other = refine_moments(signals, base, nominal.values, horizons, steps=2)
+            other_refinement = refine_moments(signals, base, nominal.values, horizons, steps=2)
             shifts[name] = np.zeros(len(PARAMETERS))
-            shifts[name][IS_MOMENT] = other.values - nominal.refinement.values
+            shifts[name][IS_MOMENT] = other_refinement.values - nominal.refinement.values
     # Noise in a regressor reduces its fitted slope. Doubling the noise shows this effect, which is then subtracted: the
     # linear extrapolation of Cook and Stefanski 1994.
     noise_bias = np.where(IS_MOMENT, shifts[ACCELEROMETER_NOISE], 0.0)

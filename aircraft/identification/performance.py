@@ -45,13 +45,16 @@ def performance(base: BaseModel, values: Floats, airspeed: float, density: float
     values = np.atleast_2d(values)
     count = len(values)
     level = np.zeros(count)
-    throttle, low, high = np.full(count, 0.5), np.zeros(count), np.ones(count)
+    throttle, min_throttle, max_throttle = np.full(count, 0.5), np.zeros(count), np.ones(count)
     for _ in range(40):
         thrust, _ = _thrusts_and_currents(base, values, airspeed, throttle, density)
         alpha, drag = _alpha_and_drag(base, values, airspeed, density, thrust, level)
         is_short = thrust * np.cos(alpha) < drag
-        low, high = np.where(is_short, throttle, low), np.where(is_short, high, throttle)
-        throttle = 0.5 * (low + high)
+        min_throttle, max_throttle = (
+            np.where(is_short, throttle, min_throttle),
+            np.where(is_short, max_throttle, throttle),
+        )
+        throttle = 0.5 * (min_throttle + max_throttle)
     _, current = _thrusts_and_currents(base, values, airspeed, throttle, density)
     return Performance(
         climb=_path_angle(base, values, airspeed, density, np.ones(count)),

@@ -92,9 +92,9 @@ class GustFilter:
         from scipy.signal import lfilter
 
         estimate = np.zeros_like(residual)
-        for first, last in zip(signals.edges[:-1], signals.edges[1:], strict=True):
+        for start_row, end_row in zip(signals.edges[:-1], signals.edges[1:], strict=True):
             numerator, denominator = [self.decay * self.gain], [1.0, -self.decay * (1.0 - self.gain)]
-            estimate[first + 1 : last] = lfilter(numerator, denominator, residual[first:last])[:-1]
+            estimate[start_row + 1 : end_row] = lfilter(numerator, denominator, residual[start_row:end_row])[:-1]
         return estimate
 
 
@@ -126,9 +126,11 @@ class Predictor:
             self._flow, signals.rates, signals.airspeed, np.arange(len(signals.airspeed))
         )
         self.trims = np.empty_like(modelled)
-        for first, last in zip(signals.edges[:-1], signals.edges[1:], strict=True):
-            offsets = (required[first:last] - modelled[first:last]).mean(axis=0) if trims is None else trims
-            self.trims[first:last] = offsets
+        for start_row, end_row in zip(signals.edges[:-1], signals.edges[1:], strict=True):
+            offsets = (
+                (required[start_row:end_row] - modelled[start_row:end_row]).mean(axis=0) if trims is None else trims
+            )
+            self.trims[start_row:end_row] = offsets
         residual = required - modelled - self.trims
         self.filters = (
             [_best_filter(residual[:, axis], signals) for axis in range(3)] if filters is None else list(filters)
@@ -173,9 +175,9 @@ class Predictor:
         for k in range(count):
             rows = starts + k
             # Heun's method, with disturbances held over a step.
-            first = self._state_derivatives(state, disturbances, rows)
-            second = self._state_derivatives(state + step * first, disturbances, rows + 1)
-            state = state + 0.5 * step * (first + second)
+            start_derivatives = self._state_derivatives(state, disturbances, rows)
+            end_derivatives = self._state_derivatives(state + step * start_derivatives, disturbances, rows + 1)
+            state = state + 0.5 * step * (start_derivatives + end_derivatives)
             if self._with_flow:
                 state[:, :3] = self._air_velocity(rows + 1)
             disturbances = disturbances * decays
@@ -345,8 +347,8 @@ def prediction_starts(signals: Signals, count: int = MAX_PREDICTIONS, horizon: f
     settling = round(_SETTLING_TIME_S * signals.hertz)
     rows = np.concatenate(
         [
-            np.arange(first + settling, last - longest - 1)
-            for first, last in zip(signals.edges[:-1], signals.edges[1:], strict=True)
+            np.arange(start_row + settling, end_row - longest - 1)
+            for start_row, end_row in zip(signals.edges[:-1], signals.edges[1:], strict=True)
         ]
     )
     return rows[np.unique(np.linspace(0, len(rows) - 1, min(count, len(rows))).astype(np.int64))]

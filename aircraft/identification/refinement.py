@@ -130,9 +130,11 @@ def remove_collinear_directions(slopes: Floats) -> Floats:
     [2, 1]
     """
     lengths = np.linalg.norm(slopes, axis=0) + 1e-300
-    left, singular, right = np.linalg.svd(slopes / lengths, full_matrices=False)
-    determined = singular * MAX_CONDITION_INDEX > singular[0]
-    return np.asarray((left[:, determined] * singular[determined]) @ right[determined] * lengths)
+    left_vectors, singular_values, right_vectors = np.linalg.svd(slopes / lengths, full_matrices=False)
+    is_determined = singular_values * MAX_CONDITION_INDEX > singular_values[0]
+    return np.asarray(
+        (left_vectors[:, is_determined] * singular_values[is_determined]) @ right_vectors[is_determined] * lengths
+    )
 
 
 def prediction_errors(

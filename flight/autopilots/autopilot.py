@@ -330,10 +330,10 @@ def describe_program(program: AutopilotProgram, aircraft: str, max_named: int = 
 
     max_named: maximum number of changed parameters that the description names; the number of others is appended.
     """
-    changed = [f"{name} {value:g}" for name, value in program.changed.items()]
-    remainder = f", +{len(changed) - max_named} more" if len(changed) > max_named else ""
+    changed_texts = [f"{name} {value:g}" for name, value in program.changed.items()]
+    remainder = f", +{len(changed_texts) - max_named} more" if len(changed_texts) > max_named else ""
     parameters_text = count_text(len(program.parameters), "parameter")
     return (
         f"{program.version} (sha256 {program.sha256[:8]}...), {parameters_text} set for"
-        f" {Path(aircraft).name}, changed: {', '.join(changed[:max_named]) or 'none'}{remainder}"
+        f" {Path(aircraft).name}, changed_texts: {', '.join(changed_texts[:max_named]) or 'none'}{remainder}"
     )

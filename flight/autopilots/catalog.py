@@ -145,8 +145,8 @@ def autopilot_from_log(
     program: name of the flown program in the log.
     source: the log's file.
     """
-    found = (kind.from_flight_log(program, parameters, source) for kind in autopilot_classes().values())
-    return next(filter(None, found), None)
+    candidates = (kind.from_flight_log(program, parameters, source) for kind in autopilot_classes().values())
+    return next(filter(None, candidates), None)
 
 
 def restore_autopilot(name: str | None, stored: "StoredAutopilot") -> "Autopilot":

@@ -259,15 +259,15 @@ def read_parameters_for(path: Path, autopilot: str) -> dict[str, Entry]:
 
 
 def refuse_unknown_parameters(
-    path: Path, autopilot: str, entries: Mapping[str, Entry], known: Mapping[str, float]
+    path: Path, autopilot: str, entries: Mapping[str, Entry], used_values: Mapping[str, float]
 ) -> None:
     """Raise ParameterError for a file of which the simulated autopilot uses no parameter.
 
     A file whose parameter names belong to this autopilot is accepted.
 
-    known: values of the file that the simulated autopilot uses.
+    used_values: values of the file that the simulated autopilot uses.
     """
-    if known or parameter_origin("", entries).autopilot == autopilot:
+    if used_values or parameter_origin("", entries).autopilot == autopilot:
         return
     names = ", ".join(list(entries)[:_SHOWN_NAMES])
     allowed = f"expected a parameter file of {TITLES[autopilot]}"

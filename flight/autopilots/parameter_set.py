@@ -101,9 +101,9 @@ class ParameterTable:
             if not definition.low <= value <= definition.high:
                 allowed = f"allowed {definition.low / unit_factor:g}..{definition.high / unit_factor:g}"
                 raise _value_error(entry.where, name, entry.value, allowed)
-            first = entry_by_present_name.setdefault(definition.name, entry)
+            first_entry = entry_by_present_name.setdefault(definition.name, entry)
             if not math.isclose(values.setdefault(definition.name, value), value, rel_tol=_SAME_VALUE_TOLERANCE):
-                first_text = f"{first.name} {first.value:g} on line {first.where.number}"
+                first_text = f"{first_entry.name} {first_entry.value:g} on line {first_entry.where.number}"
                 expected = values[definition.name] / unit_factor
                 allowed = f"expected {expected:g}, because {first_text} is the same parameter under its other name"
                 raise _value_error(entry.where, name, entry.value, allowed)
@@ -117,11 +117,11 @@ class ParameterTable:
         values: dict[str, float] = {}
         notes = []
         for name, definition in self.by_name.items():
-            old = definition.old
+            old_name = definition.old
             if name in logged:
                 value = logged[name]
-            elif old is not None and old[0] in logged:
-                value = logged[old[0]] * old[1]
+            elif old_name is not None and old_name[0] in logged:
+                value = logged[old_name[0]] * old_name[1]
             else:
                 continue
             value = float(f"{value:.{self.log_digits}g}")

@@ -343,6 +343,6 @@ def _interpolate(table: Floats, airspeed: float, amsl: float, aircraft: Record) 
     column = min(table.shape[1] - 1.0, max(0.0, amsl / aircraft.altitude_step))
     i, j = min(table.shape[0] - 2, int(row)), min(table.shape[1] - 2, int(column))
     row_fraction, column_fraction = row - i, column - j
-    low = (1.0 - column_fraction) * table[i, j] + column_fraction * table[i, j + 1]
-    high = (1.0 - column_fraction) * table[i + 1, j] + column_fraction * table[i + 1, j + 1]
-    return (1.0 - row_fraction) * low + row_fraction * high
+    lower_value = (1.0 - column_fraction) * table[i, j] + column_fraction * table[i, j + 1]
+    upper_value = (1.0 - column_fraction) * table[i + 1, j] + column_fraction * table[i + 1, j + 1]
+    return (1.0 - row_fraction) * lower_value + row_fraction * upper_value

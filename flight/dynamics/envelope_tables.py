@@ -122,7 +122,7 @@ def compute_tables(aircraft: Aircraft, motor_braking: bool) -> dict[str, Floats]
             if trim := idle_descent(fdm, airspeed, amsl, last_descent):
                 last_descent, descent[airspeed_index, altitude_index] = trim, -trim.climb
                 powers["power_idle"][airspeed_index, altitude_index] = _power(fdm, trim)
-            if trim := steady_flight(fdm, airspeed, amsl, near=level_trims[-1] if level_trims else None):
+            if trim := steady_flight(fdm, airspeed, amsl, initial_trim=level_trims[-1] if level_trims else None):
                 level_trims.append(trim)
                 powers["power_level"][airspeed_index, altitude_index] = _power(fdm, trim)
         min_level_speed[altitude_index], max_level_speed[altitude_index] = _level_speed_range(fdm, amsl, level_trims)

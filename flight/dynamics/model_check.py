@@ -158,9 +158,9 @@ def check_model(
     a property that the model reads but that neither JSBSim nor the model creates.
     """
     readers = {file.name: _read_model(file, main=True, remove_channels=shipped)}
-    pending = [readers[file.name]]
-    while pending:
-        reader = pending.pop()
+    pending_readers = [readers[file.name]]
+    while pending_readers:
+        reader = pending_readers.pop()
         for name, location in reader.included_files.items():
             path = _find_file(name, folders)
             if path is None:
@@ -168,7 +168,7 @@ def check_model(
                 raise FlightError(message, file=reader.file, field="file", value=name)
             if path.name not in readers:
                 readers[path.name] = _read_model(path, main=False, remove_channels=shipped)
-                pending.append(readers[path.name])
+                pending_readers.append(readers[path.name])
     if not shipped:
         _check_property_names(list(readers.values()), provided)
     return {name: reader.without_channels() for name, reader in readers.items()}

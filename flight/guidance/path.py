@@ -504,17 +504,17 @@ def _bearing_to_origin(item: MissionItem) -> float:
     return math.atan2(-item.lon_deg, -item.lat_deg / math.cos(math.radians(0.5 * item.lat_deg)))
 
 
-def _set_exit_bearing(waypoints: Records, last: int, items: dict[int, MissionItem]) -> None:
+def _set_exit_bearing(waypoints: Records, last_index: int, items: dict[int, MissionItem]) -> None:
     """Set the bearing at which ArduPlane leaves a loiter before an RTL, if there is such a loiter.
 
     It is the bearing of 0 N, 0 E, because the RTL item has no position, and ArduPlane reads this as 0 N, 0 E.
 
-    last: index of the last waypoint before the RTL.
+    last_index: index of the last waypoint before the RTL.
     """
-    item = items.get(int(waypoints["item"][last]))
+    item = items.get(int(waypoints["item"][last_index]))
     if item is not None and item.has_position and stated_loiter(item) is not None:
         bearing = _bearing_to_origin(item) % (2.0 * math.pi)
-        waypoints["exit_bearing"][waypoints["stop"] == waypoints["stop"][last]] = bearing or 2.0 * math.pi
+        waypoints["exit_bearing"][waypoints["stop"] == waypoints["stop"][last_index]] = bearing or 2.0 * math.pi
 
 
 def _set_landing(waypoints: Records, mission: Mission | None) -> None:
@@ -524,11 +524,11 @@ def _set_landing(waypoints: Records, mission: Mission | None) -> None:
     """
     if mission is None:
         return
-    flown = [item for item in mission.items if item.command in PLACES | TAKEOFFS | LANDINGS and item.has_position]
-    last_items = [item.seq for item, next_item in pairwise(flown) if next_item.command in LANDINGS]
+    flown_items = [item for item in mission.items if item.command in PLACES | TAKEOFFS | LANDINGS and item.has_position]
+    last_items = [item.seq for item, next_item in pairwise(flown_items) if next_item.command in LANDINGS]
     waypoints["precedes_landing"] = np.isin(waypoints["item"], last_items)
     first_seq = next((item.seq for item in mission.items if item.command == Command.DO_LAND_START), math.inf)
-    landing_items = [item for item in flown if item.seq > first_seq][1:]
+    landing_items = [item for item in flown_items if item.seq > first_seq][1:]
     plain_items = [item.seq for item in landing_items if item.command == Command.NAV_WAYPOINT]
     waypoints["ignores_altitude"] = np.isin(waypoints["item"], plain_items)
 

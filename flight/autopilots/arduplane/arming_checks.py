@@ -133,10 +133,10 @@ def _describe_battery_faults(
     `AP_BattMonitor_Backend::arming_checks`.
     """
     for unit in ("VOLT", "MAH"):
-        low, critical = (values[f"{monitor}_{level}_{unit}"] for level in ("LOW", "CRT"))
-        if 0.0 < low < critical:
-            limit_text = f"at least {monitor}_CRT_{unit} {critical:g}"
-            yield f"{monitor}_LOW_{unit} {low:g} prevents arming: ArduPlane requires {limit_text}"
+        low_threshold, critical_threshold = (values[f"{monitor}_{level}_{unit}"] for level in ("LOW", "CRT"))
+        if 0.0 < low_threshold < critical_threshold:
+            limit_text = f"at least {monitor}_CRT_{unit} {critical_threshold:g}"
+            yield f"{monitor}_LOW_{unit} {low_threshold:g} prevents arming: ArduPlane requires {limit_text}"
     capacity = values[f"{monitor}_CAPACITY"]
     for level in ("ARM", "LOW", "CRT"):
         charge, voltage = values[f"{monitor}_{level}_MAH"], values[f"{monitor}_{level}_VOLT"]

@@ -391,12 +391,12 @@ class ArduPlane(Autopilot):
         {'RTL_ALTITUDE': 180.0, 'RTL_AUTOLAND': 1.0, 'TECS_LAND_PMAX': -1.0}
         """
         values = {} if settings.altitude is None else {"RTL_ALTITUDE": settings.altitude}
-        stated = self.parameters.by_origin("file")
+        file_values = self.parameters.by_origin("file")
         if settings.autoland is not None:
             values["RTL_AUTOLAND"] = float(settings.autoland)
-        elif settings.lands and self.parameters.rtl_autoland == 0.0 and "RTL_AUTOLAND" not in stated:
+        elif settings.lands and self.parameters.rtl_autoland == 0.0 and "RTL_AUTOLAND" not in file_values:
             values["RTL_AUTOLAND"] = 1.0
-        if settings.lands and settings.field_depth > _LOW_FIELD_M and "TECS_LAND_PMAX" not in stated:
+        if settings.lands and settings.field_depth > _LOW_FIELD_M and "TECS_LAND_PMAX" not in file_values:
             values["TECS_LAND_PMAX"] = _NOSE_DOWN_DEG
         return values
 
@@ -409,11 +409,10 @@ class ArduPlane(Autopilot):
     def _return_rules(self) -> ReturnRules:
         """Rules of an RTL from RTL_*, FLIGHT_OPTIONS, LEVEL_ROLL_LIMIT, RALLY_*, TECS_* and the slope limits.
 
-        >>> made = ArduPlane(ArduPilotParameters.defaults().changed(RTL_ALTITUDE=-1, FLIGHT_OPTIONS=16, RTL_AUTOLAND=2))
-        >>> made.returns.rules.height, made.returns.rules.initial_climb, made.returns.rules.rally_limit
-        (nan, inf, 5000.0)
-        >>> made.returns.rules.landing_join
-        'straight'
+        >>> parameters = ArduPilotParameters.defaults().changed(RTL_ALTITUDE=-1, FLIGHT_OPTIONS=16, RTL_AUTOLAND=2)
+        >>> rules = ArduPlane(parameters).returns.rules
+        >>> rules.height, rules.initial_climb, rules.rally_limit, rules.landing_join
+        (nan, inf, 5000.0, 'straight')
         """
         parameters = self.parameters
         return ReturnRules(
@@ -489,11 +488,11 @@ class ArduPlane(Autopilot):
 
         The values end where another parameter becomes the limit.
         """
-        name, *others = self._max_pitch_parameters
+        name, *other_names = self._max_pitch_parameters
         higher_limits = (limit for limit in self._pitch_limits.values() if limit > self._max_pitch)
         max_tried = min(MAX_TRIED_PITCH_DEG, *map(math.degrees, higher_limits), math.inf)
         is_raised = max_tried > math.degrees(self._max_pitch)
-        return (Candidate(name, 1.0, max_tried, "deg", others=tuple(others)),) if is_raised else ()
+        return (Candidate(name, 1.0, max_tried, "deg", others=tuple(other_names)),) if is_raised else ()
 
     def with_parameters(self, origin: Origin = "file", /, **values: float) -> "ArduPlane":
         """Return a copy with the given parameters changed; also for an autopilot that runs the ArduPlane program."""

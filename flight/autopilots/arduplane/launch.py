@@ -33,10 +33,10 @@ def motor_start(acceleration: float, speed: float, incline: float, parameters: A
     acceleration exceeds TKOFF_THR_MINACC 15:
 
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
-    >>> made = ArduPilotParameters.defaults().changed(TKOFF_THR_MINACC=15.0)
-    >>> [round(motor_start(v * v / 12.0, v, 0.2, made), 2) for v in (20.0, 10.0)]
+    >>> parameters = ArduPilotParameters.defaults().changed(TKOFF_THR_MINACC=15.0)
+    >>> [round(motor_start(v * v / 12.0, v, 0.2, parameters), 2) for v in (20.0, 10.0)]
     [-0.4, inf]
-    >>> motor_start(0.0, 0.0, 0.0, ArduPilotParameters.defaults()), motor_start(0.0, 0.0, 0.0, made)
+    >>> motor_start(0.0, 0.0, 0.0, ArduPilotParameters.defaults()), motor_start(0.0, 0.0, 0.0, parameters)
     (-inf, inf)
     """
     min_acceleration, delay = parameters.takeoff_acceleration, parameters.takeoff_delay

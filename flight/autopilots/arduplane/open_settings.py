@@ -164,10 +164,10 @@ def describe_open_settings(parameters: ArduPilotParameters, mission: MissionPart
     by_program: True if the ArduPlane program flies.
 
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
-    >>> made = ArduPilotParameters.from_text("LAND_PF_ARSPD 11\nKFF_THR2PTCH 2\n", "mine.param")
-    >>> describe_open_settings(made, MissionParts(), by_program=False)
+    >>> parameters = ArduPilotParameters.from_text("LAND_PF_ARSPD 11\nKFF_THR2PTCH 2\n", "mine.param")
+    >>> describe_open_settings(parameters, MissionParts(), by_program=False)
     ['KFF_THR2PTCH 2 affects the flight, but is not simulated']
-    >>> describe_open_settings(made, MissionParts(lands=True), by_program=False)[1]
+    >>> describe_open_settings(parameters, MissionParts(lands=True), by_program=False)[1]
     'LAND_PF_ARSPD 11 affects the landing, but is not simulated'
     """
     is_flown = {Phase.FLIGHT: True, Phase.TAKE_OFF: mission.takes_off, Phase.LANDING: mission.lands}

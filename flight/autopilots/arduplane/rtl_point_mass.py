@@ -174,9 +174,15 @@ def _make_stages(
     stages: Records = np.zeros((target is not None) + len(stops), WAYPOINT)
     stages["airspeed"], stages["min_ground_speed"] = aircraft.record.airspeed, parameters.ground_speed_min
     if target is not None:
-        first = stages[0]
-        first.centre_east, first.centre_north, first.up, first.loiter_radius, first.slope_base = target
-        first.east, first.north, first.is_rtl = target.east, target.north, True
+        first_stage = stages[0]
+        (
+            first_stage.centre_east,
+            first_stage.centre_north,
+            first_stage.up,
+            first_stage.loiter_radius,
+            first_stage.slope_base,
+        ) = target
+        first_stage.east, first_stage.north, first_stage.is_rtl = target.east, target.north, True
     for stage, stop in zip(stages[len(stages) - len(stops) :], stops, strict=True):
         fill_stage(stage, stop, parameters)
         # The first leg of an RTL to a landing sequence follows no line, as after any mode change.
@@ -210,11 +216,11 @@ _STRAIGHT_LEG_LENGTH_M = 10_000.0
 
 def waypoint_ahead(start: Record) -> Records:
     """Return a waypoint far ahead on the present course and slope, as one `WAYPOINT` record, (1,)."""
-    ahead: Records = np.zeros(1, WAYPOINT)
+    waypoint: Records = np.zeros(1, WAYPOINT)
     ground_speed = max(1.0, math.hypot(start["velocity_east"], start["velocity_north"]))
     for axis, velocity in (("east", "velocity_east"), ("north", "velocity_north"), ("up", "velocity_up")):
-        ahead[axis] = start[axis] + _STRAIGHT_LEG_LENGTH_M * start[velocity] / ground_speed
-    return ahead
+        waypoint[axis] = start[axis] + _STRAIGHT_LEG_LENGTH_M * start[velocity] / ground_speed
+    return waypoint
 
 
 def rtl_timeout(start: Record, stages: Records, aircraft: PointMass) -> float:

@@ -113,16 +113,16 @@ def _reported_program(link: AutopilotLink, digest: str, parameters: ArduPlaneFli
     parameters: parameters that the program was started with.
     """
     reported = link.reported
-    known = {RENAMED_IN_4_7.get(name, name) for name in reported.parameters}
-    unknown = parameters.changed.keys() - known
+    known_names = {RENAMED_IN_4_7.get(name, name) for name in reported.parameters}
+    unknown_names = parameters.changed.keys() - known_names
     return AutopilotProgram(
         version=version_text(reported.texts, reported.version),
         sha256=digest,
         parameters={
             name: reported.parameters[name] for name in sorted(parameters.values) if name in reported.parameters
         },
-        changed={name: value for name, value in sorted(parameters.changed.items()) if name not in unknown},
-        unused=tuple(sorted({*parameters.unused, *unknown})),
+        changed={name: value for name, value in sorted(parameters.changed.items()) if name not in unknown_names},
+        unused=tuple(sorted({*parameters.unused, *unknown_names})),
     )
 
 

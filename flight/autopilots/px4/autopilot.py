@@ -176,12 +176,12 @@ class Px4(Autopilot):
         The simulated release is the first known of: the release that the table states, the release that wrote the file,
         the newest release.
         """
-        found = None
+        writer_release = None
         if table.params is not None:
             file = Path(table.params)
             text = utf8_text(read_small_file(file, MAX_BYTES, "parameter", ParameterError), file, ParameterError)
-            found = commented_release(text, "PX4")
-        version, notes = choose_release_for_file(_VERSIONS, table.px4_version, found, str(table.params), "PX4")
+            writer_release = commented_release(text, "PX4")
+        version, notes = choose_release_for_file(_VERSIONS, table.px4_version, writer_release, str(table.params), "PX4")
         return cls(Px4Parameters.load(aircraft, table.params, version, notes))
 
     @classmethod
@@ -338,8 +338,8 @@ class Px4(Autopilot):
         COM_LOW_BAT_ACT sets PX4's reaction at BAT_CRIT_THR and at BAT_EMERGEN_THR. `Battery::determineWarning` tests
         BAT_EMERGEN_THR first.
 
-        >>> made = Px4Parameters.defaults().changed(COM_LOW_BAT_ACT=3.0, BAT1_CAPACITY=5000.0, BAT_CRIT_THR=0.1)
-        >>> Px4(made).checks.battery_failsafes[0].used_charge
+        >>> parameters = Px4Parameters.defaults().changed(COM_LOW_BAT_ACT=3.0, BAT1_CAPACITY=5000.0, BAT_CRIT_THR=0.1)
+        >>> Px4(parameters).checks.battery_failsafes[0].used_charge
         4500.0
         """
         parameters = self.parameters
@@ -454,10 +454,12 @@ class Px4(Autopilot):
     @property
     def _return_trials(self) -> ReturnTrials:
         """Parameter changes to try for a safer RTL: RTL_RETURN_ALT, RTL_DESCEND_ALT, and RTL_TYPE."""
-        first, last = ({name: self.parameters[name]} for name in ("RTL_RETURN_ALT", "RTL_DESCEND_ALT"))
+        return_altitude, descend_altitude = (
+            {name: self.parameters[name]} for name in ("RTL_RETURN_ALT", "RTL_DESCEND_ALT")
+        )
         other_types = sorted({0.0, 1.0, 3.0} - {self.parameters["RTL_TYPE"]})
         return ReturnTrials(
-            (first, last | first),
+            (return_altitude, descend_altitude | return_altitude),
             tuple({"RTL_TYPE": value} for value in other_types),
             "RTL_RETURN_ALT, RTL_DESCEND_ALT, RTL_TYPE",
         )

@@ -79,18 +79,20 @@ def _describe_control_allocation(parameters: Px4Parameters) -> Iterator[str]:
     It is for another airframe, or it lacks ailerons, elevator or motor. Parameters without control allocation
     (SYS_CTRL_ALLOC 0) state no airframe.
     """
-    stated = parameters.by_origin("file")
+    file_values = parameters.by_origin("file")
     if parameters["CA_AIRFRAME"] != _FIXED_WING:
-        if "CA_AIRFRAME" in stated and parameters["SYS_CTRL_ALLOC"] != 0.0:
+        if "CA_AIRFRAME" in file_values and parameters["SYS_CTRL_ALLOC"] != 0.0:
             yield f"CA_AIRFRAME {parameters['CA_AIRFRAME']:g} is not a fixed wing, which is not simulated"
         return
-    if stated.get("CA_ROTOR_COUNT", 1.0) == 0.0:
+    if file_values.get("CA_ROTOR_COUNT", 1.0) == 0.0:
         yield "CA_ROTOR_COUNT 0 leaves no motor, which is not simulated"
-    names = [f"CA_SV_CS{surface}_TYPE" for surface in range(int(stated.get("CA_SV_CS_COUNT", 0.0)))]
-    if "CA_SV_CS_COUNT" in stated and stated.keys() >= set(names):
+    names = [f"CA_SV_CS{surface}_TYPE" for surface in range(int(file_values.get("CA_SV_CS_COUNT", 0.0)))]
+    if "CA_SV_CS_COUNT" in file_values and file_values.keys() >= set(names):
         for part, types in _SURFACES_BY_PART.items():
             torque = _TORQUE_BY_PART[part]
-            moved_types = {stated[name] for name in names if stated.get(name.replace("TYPE", torque), 1.0) != 0.0}
+            moved_types = {
+                file_values[name] for name in names if file_values.get(name.replace("TYPE", torque), 1.0) != 0.0
+            }
             if moved_types.isdisjoint(types):
                 yield f"CA_SV_CS_COUNT {len(names)} and CA_SV_CS*_TYPE leave no {part}, which is not simulated"
 
@@ -100,20 +102,20 @@ def _describe_slew_rates(parameters: Px4Parameters) -> Iterator[str]:
 
     Follows `ControlAllocation::applySlewRateLimit`.
     """
-    stated = parameters.by_origin("file")
+    file_values = parameters.by_origin("file")
     for name in SLEW_NAMES:
-        if (value := stated.get(name, 0.0)) > 0.0:
+        if (value := file_values.get(name, 0.0)) > 0.0:
             yield f"{name} {value:g} s slows an actuator output, which is not simulated"
 
 
 def _describe_connections(parameters: Px4Parameters) -> Iterator[str]:
     """Describe output functions in the user's file that lack a motor or any control surface."""
-    stated = parameters.by_origin("file")
-    functions = {stated[name] for name in OUTPUT_FUNCTION_NAMES if name in stated}
+    file_values = parameters.by_origin("file")
+    functions = {file_values[name] for name in OUTPUT_FUNCTION_NAMES if name in file_values}
     if not functions:
         return
-    for part, (first, last) in _OUTPUT_FUNCTIONS_BY_PART.items():
-        if not any(first <= function <= last for function in functions):
+    for part, (first_function, last_function) in _OUTPUT_FUNCTIONS_BY_PART.items():
+        if not any(first_function <= function <= last_function for function in functions):
             yield f"the output functions (PWM_MAIN_FUNC1 and others) connect no {part}, which is not simulated"
 
 

@@ -251,8 +251,8 @@ class Px4Parameters(ParameterSet):
     ('FW_R_LIM 30 (35..75)',)
     >>> Px4Parameters.from_text("FW_AIRSPD_TRIM 25", "mine.params").contradictions
     ('FW_AIRSPD_TRIM 25 of the file is above FW_AIRSPD_MAX 20 of the defaults',)
-    >>> made, notes = Px4Parameters.from_log({"NAV_ACC_RAD": -5.0, "FW_R_LIM": 45.0}, "a.ulg", "1.16")
-    >>> made.by_origin("file"), notes
+    >>> parameters, notes = Px4Parameters.from_log({"NAV_ACC_RAD": -5.0, "FW_R_LIM": 45.0}, "a.ulg", "1.16")
+    >>> parameters.by_origin("file"), notes
     ({'FW_R_LIM': 45.0}, ('NAV_ACC_RAD -5 in the log is outside 0.05..10000: the default is used',))
     """
 

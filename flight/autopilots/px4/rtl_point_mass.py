@@ -153,17 +153,21 @@ def _make_route(start: Record, target: ReturnTarget, parameters: Px4Parameters) 
     route = waypoint_column(2 if target.landing is None else len(stops) + 2)
     route["airspeed"], route["stop"] = parameters["FW_AIRSPD_TRIM"], np.arange(len(route))
     route[0].east, route[0].north, route[0].up = start["east"], start["north"], start["up"]
-    last = route[-1]
+    last_waypoint = route[-1]
     if target.landing is None:
-        last.centre_east, last.centre_north, last.up = last.east, last.north, last.up = target.position
-        last.loiter_radius, last.is_rtl = parameters["RTL_LOITER_RAD"], True
+        last_waypoint.centre_east, last_waypoint.centre_north, last_waypoint.up = (
+            last_waypoint.east,
+            last_waypoint.north,
+            last_waypoint.up,
+        ) = target.position
+        last_waypoint.loiter_radius, last_waypoint.is_rtl = parameters["RTL_LOITER_RAD"], True
         return route
     for waypoint, stop in zip(route[1:-1], stops, strict=True):
         _fill_stop(waypoint, stop, parameters)
         # A waypoint of a landing is reached at any altitude (`MissionBase::isLanding`), except the first one.
         waypoint.ignores_altitude = not stop.to_altitude and stop is not target.landing
     route[-2].precedes_landing = True
-    last.east, last.north, last.up = target.landing.landing or target.position
+    last_waypoint.east, last_waypoint.north, last_waypoint.up = target.landing.landing or target.position
     return route
 
 

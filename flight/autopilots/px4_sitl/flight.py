@@ -129,13 +129,13 @@ def _reported_program(link: AutopilotLink, digest: str, parameters: Px4FlightPar
     parameters: parameters that the program was started with.
     """
     reported = link.reported
-    unknown = parameters.changed.keys() - reported.parameters.keys()
+    unknown_names = parameters.changed.keys() - reported.parameters.keys()
     return AutopilotProgram(
         version=version_text(reported.version),
         sha256=digest,
         parameters={
             name: reported.parameters[name] for name in sorted(parameters.values) if name in reported.parameters
         },
-        changed={name: value for name, value in sorted(parameters.changed.items()) if name not in unknown},
-        unused=tuple(sorted({*parameters.unused, *unknown})),
+        changed={name: value for name, value in sorted(parameters.changed.items()) if name not in unknown_names},
+        unused=tuple(sorted({*parameters.unused, *unknown_names})),
     )

@@ -78,19 +78,19 @@ def autopilot_tick(block: Floats, heights: Heights) -> int:
         return NOT_A_NUMBER
     place_on_path(work.true, path.piece[: settings.pieces], path.node[: settings.nodes], memory)
     memory.speed_command = path.waypoint[memory.leg].airspeed
-    last = path.waypoint[settings.waypoints - 1]
-    previous = path.waypoint[settings.waypoints - 2]
-    if last.is_rtl and settings.on_last_leg:
-        update_rtl_loiter(work.true, last, memory, work.timing.dt)
-    elif settings.on_last_leg and previous.loiter_radius != 0.0 and previous.loiter_time == math.inf:
-        update_endless_loiter(work.true, previous, memory, work.timing.dt)
-    elif settings.on_last_leg and last.is_mission_end:
+    last_waypoint = path.waypoint[settings.waypoints - 1]
+    previous_waypoint = path.waypoint[settings.waypoints - 2]
+    if last_waypoint.is_rtl and settings.on_last_leg:
+        update_rtl_loiter(work.true, last_waypoint, memory, work.timing.dt)
+    elif settings.on_last_leg and previous_waypoint.loiter_radius != 0.0 and previous_waypoint.loiter_time == math.inf:
+        update_endless_loiter(work.true, previous_waypoint, memory, work.timing.dt)
+    elif settings.on_last_leg and last_waypoint.is_mission_end:
         update_end_loiter(work.true, memory, work.timing.dt)
     elif settings.on_last_leg:
         cross_track, distance_past = distances_from_route_end(work.true, path.waypoint[: settings.waypoints])
         memory.is_finished = distance_past >= 0.0
         # An aircraft that loiters at the mission's end has not missed the route, at any distance from the center.
-        memory.is_in_rtl = previous.loiter_radius != 0.0 and previous.stop == last.stop
+        memory.is_in_rtl = previous_waypoint.loiter_radius != 0.0 and previous_waypoint.stop == last_waypoint.stop
         if memory.is_finished:
             memory.cross_track = cross_track
     return end_tick(work, block)

@@ -92,8 +92,8 @@ def _make_unchanged_mission(setup: FlightSetup, ground_phases: GroundPhases) -> 
     for item in mission.items:
         p1, p2, p3, p4 = (0.0 if math.isnan(value) else value for value in item.params)
         items.append(replace(item, params=(p1, p2, p3, p4)))
-    last = next(number for number, item in enumerate(items, 1) if item.seq == ground_phases.approach.item)
-    return UploadedMission(home, _renumber(items), mission.rally, last)
+    last_number = next(number for number, item in enumerate(items, 1) if item.seq == ground_phases.approach.item)
+    return UploadedMission(home, _renumber(items), mission.rally, last_number)
 
 
 def _item_with_position(
@@ -122,7 +122,9 @@ def _item_with_position(
     lat, lon = item.lat_deg, item.lon_deg
     if not item.has_position:
         center_item = next(
-            other for other in reversed(earlier_items) if other.has_position and is_navigation(other.command)
+            earlier_item
+            for earlier_item in reversed(earlier_items)
+            if earlier_item.has_position and is_navigation(earlier_item.command)
         )
         lat, lon = center_item.lat_deg, center_item.lon_deg
     p1, p2, p3, p4 = (0.0 if math.isnan(value) else value for value in item.params)
@@ -171,7 +173,7 @@ def _renumber(items_in_order: list[MissionItem]) -> tuple[MissionItem, ...]:
         params = item.params
         if item.command == Command.DO_JUMP:
             target = next(
-                (candidate for candidate, other in enumerate(items_in_order, 1) if other.seq >= params[0]),
+                (candidate for candidate, later_item in enumerate(items_in_order, 1) if later_item.seq >= params[0]),
                 len(items_in_order),
             )
             params = (float(target), *params[1:])
