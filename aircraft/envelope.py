@@ -176,6 +176,9 @@ def ground_slope(air_angle: float, airspeed: float, tailwind: float, crosswind: 
     """Convert a climb angle relative to the air to the path angle over the ground, rad.
 
     The result is NaN if the aircraft cannot make progress over the ground.
+
+    air_angle: rad.
+    airspeed, tailwind, crosswind: m/s.
     """
     speed_over_ground = ground_speed(airspeed * math.cos(air_angle), tailwind, crosswind)
     return math.atan2(airspeed * math.sin(air_angle), speed_over_ground)
@@ -183,7 +186,10 @@ def ground_slope(air_angle: float, airspeed: float, tailwind: float, crosswind: 
 
 @compiled
 def ground_speed(airspeed: float, tailwind: float, crosswind: float) -> float:
-    """Return the ground speed along a course in wind, m/s; NaN if the course cannot be held."""
+    """Return the ground speed along a course in wind, m/s; NaN if the course cannot be held.
+
+    airspeed, tailwind, crosswind: m/s.
+    """
     speed_along_2 = airspeed**2 - crosswind**2
     speed_over_ground = math.sqrt(speed_along_2) + tailwind if speed_along_2 > 0.0 else -1.0
     return speed_over_ground if speed_over_ground > 0.0 else math.nan

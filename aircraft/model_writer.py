@@ -461,6 +461,9 @@ def _separation_table(stall_alpha: float, sharpness: float) -> str:
     """Return the rows of a JSBSim table of the separated fraction of the flow by angle of attack (rad).
 
     The fraction follows Beard and McLain, eq. 4.10, and is exactly 0 in attached flow.
+
+    stall_alpha: angle of attack of the stall, rad.
+    sharpness: M of the textbook; a larger value gives a sharper stall.
     """
     width = 10.0 / sharpness
     steps = [stall_alpha - width + 0.02 * k for k in range(math.ceil(2.0 * width / 0.02) + 1)]

@@ -241,7 +241,10 @@ def _read_only(values: Floats) -> Floats:
 
 @inlined
 def wind_speed_at(table: PerformanceTable, amsl: float) -> float:
-    """Return the mean wind speed at an altitude, m/s."""
+    """Return the mean wind speed at an altitude, m/s.
+
+    amsl: altitude, m.
+    """
     return mean_wind_speed(table.wind_speed, table.wind_gradient, table.wind_reference_amsl, amsl)
 
 

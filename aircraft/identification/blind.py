@@ -271,7 +271,11 @@ def _window_starts(signals: Signals, count: int, step: int) -> Ints:
 
 
 def _measured_quantities(signals: Signals, starts: Ints, count: int) -> Floats:
-    """Return the measured `QUANTITIES` in windows, (w, k, q); power is NaN for a log without current."""
+    """Return the measured `QUANTITIES` in windows, (w, k, q); power is NaN for a log without current.
+
+    starts: first row of each window, (w,).
+    count: number of samples in a window.
+    """
     rows = starts[:, np.newaxis] + np.arange(count + 1)
     return _stack_quantities(
         signals.attitude[rows, :2],

@@ -65,6 +65,8 @@ class ElectricMotor:
 
         throttle: 0..1.
         voltage: battery voltage, V.
+        airspeed: m/s, (n,).
+        density: kg/m^3, (n,).
         """
         q2, q1, q0 = self._torque_coefficients(airspeed, density)
         kv = self.back_voltage

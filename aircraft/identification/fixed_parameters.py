@@ -53,7 +53,10 @@ def _move_one_sd(value: float, relative_sd: float, min_sd: float) -> float:
 
 
 def _coefficient_change(name: str, relative_sd: float, min_sd: float = 0.0) -> Callable[[Signals, BaseModel], Changed]:
-    """Return a function that changes a coefficient by one standard deviation, as `_move_one_sd` does."""
+    """Return a function that changes a coefficient by one standard deviation, as `_move_one_sd` does.
+
+    name: name of the coefficient in `aircraft.identification.base_model.Coefficients`.
+    """
 
     def change(signals: Signals, base: BaseModel) -> Changed:
         """Return the signals, and the model with the changed coefficient."""

@@ -103,7 +103,11 @@ def max_level_speeds(base: BaseModel, values: Floats, density: float) -> Floats:
 
 
 def level_controls(base: BaseModel, values: Floats, airspeed: float, density: float) -> tuple[float, float]:
-    """Return the elevator (rad) and the throttle (0..1) in level flight for parameter values (n,)."""
+    """Return the elevator (rad) and the throttle (0..1) in level flight for parameter values (n,).
+
+    airspeed: m/s.
+    density: kg/m^3.
+    """
     rows = np.atleast_2d(values)
     throttle = performance(base, rows, airspeed, density).throttle
     thrust, _ = _thrusts_and_currents(base, rows, airspeed, throttle, density)
@@ -126,7 +130,12 @@ def _trimmed_elevator(base: BaseModel, values: Floats) -> tuple[Floats, Floats]:
 
 
 def _path_angle(base: BaseModel, values: Floats, airspeed: float, density: float, throttle: Floats) -> Floats:
-    """Return the flight-path angle of each draw at a throttle (m,), rad, (m,)."""
+    """Return the flight-path angle of each draw at a throttle (m,), rad, (m,).
+
+    values: values of the n parameters in each draw, (m, n).
+    airspeed: m/s.
+    density: kg/m^3.
+    """
     thrust, _ = _thrusts_and_currents(base, values, airspeed, throttle, density)
     angle = np.zeros(len(values))
     for _ in range(12):
@@ -142,6 +151,8 @@ def _alpha_and_drag(
 
     thrust: N, (m,).
     angle: flight-path angle, rad, (m,).
+    airspeed: m/s.
+    density: kg/m^3.
     """
     c = base.coefficients
     pressure = 0.5 * density * airspeed * airspeed * base.area
@@ -166,7 +177,13 @@ def _alpha_and_drag(
 def _thrusts_and_currents(
     base: BaseModel, values: Floats, airspeed: Floats | float, throttle: Floats, density: float
 ) -> tuple[Floats, Floats]:
-    """Return the thrust (N) and the battery current (A) of each draw, two arrays (m,)."""
+    """Return the thrust (N) and the battery current (A) of each draw, two arrays (m,).
+
+    values: values of the n parameters in each draw, (m, n).
+    airspeed: m/s.
+    throttle: 0..1, (m,).
+    density: kg/m^3.
+    """
     # Arrays over the draws replace the motor's constants: its formulas accept them unchanged.
     thrust, speed, torque = (values[:, INDEX[name]] for name in ("thrust", "motor-speed", "propeller-torque"))
     motors = base.motor.with_factors(thrust, speed, torque)  # type: ignore[arg-type]

@@ -304,6 +304,11 @@ def _electric_power(
     """Return the electric power (W) for a specific excess power (m/s), by the parabola of `Envelope.power`.
 
     The power is constant below the excess power at idle, and above the excess power at full throttle.
+
+    excess_table: specific excess power, see `PointMass`.
+    power: electric power, see `PointMass`.
+    airspeed: m/s.
+    amsl: altitude, m.
     """
     if not aircraft.has_power:
         return 0.0
@@ -325,7 +330,12 @@ def _electric_power(
 
 @inner
 def excess_power(excess_table: Floats, throttle: float, airspeed: float, amsl: float, aircraft: Record) -> float:
-    """Return the specific excess power in straight flight at a throttle, airspeed and altitude, m/s."""
+    """Return the specific excess power in straight flight at a throttle, airspeed and altitude, m/s.
+
+    throttle: 0..1.
+    airspeed: m/s.
+    amsl: altitude, m.
+    """
     grid_position = min(1.0, max(0.0, throttle)) * (excess_table.shape[0] - 1)
     row = min(excess_table.shape[0] - 2, int(grid_position))
     lower_power = _interpolate(excess_table[row], airspeed, amsl, aircraft)

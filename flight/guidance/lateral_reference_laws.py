@@ -129,6 +129,9 @@ def l1_acceleration(angle: float, speed: float, l1_distance: float, damping: flo
     """Return the acceleration to the right that L1 demands (`_latAccDem` of AP_L1_Control), m/s^2.
 
     angle: angle from the direction to the L1 point to the ground velocity, rad, positive to the right.
+    speed: ground speed, m/s.
+    l1_distance: L1 distance, m.
+    damping: NAVL1_DAMPING.
     """
     angle = min(0.5 * math.pi, max(-0.5 * math.pi, angle))
     return -4.0 * damping * damping * speed * speed / l1_distance * math.sin(angle)
@@ -144,6 +147,7 @@ def has_reached_leg_end(motion: Record, a: Record, b: Record, l1_distance: float
     motion: a record of `flight.guidance.navigation_error.MOTION`.
     a, b: start and end of the leg, records of `WAYPOINT`.
     radius: turn distance for a turn of 90 degrees, m; smaller turns start later.
+    l1_distance: L1 distance, m, the upper limit of the turn distance.
     """
     leg_east, leg_north = b.east - a.east, b.north - a.north
     to_b_east, to_b_north = b.east - motion.east, b.north - motion.north

@@ -131,6 +131,10 @@ def _describe_battery_faults(
 
     A threshold prevents arming if a full battery does not meet it, or if it is below the critical threshold. Follows
     `AP_BattMonitor_Backend::arming_checks`.
+
+    monitor: prefix of the monitor's parameters, such as "BATT2".
+    full_voltage: voltage of the full battery, V.
+    has_current: True if the monitor measures the current.
     """
     for unit in ("VOLT", "MAH"):
         low_threshold, critical_threshold = (values[f"{monitor}_{level}_{unit}"] for level in ("LOW", "CRT"))

@@ -297,6 +297,9 @@ class ArduPlane(Autopilot):
         """Return the true airspeed on the landing glide, m/s, by TECS_LAND_ARSPD and LAND_WIND_COMP.
 
         ``cruise`` is not used. Without TECS_LAND_ARSPD the airspeed follows from AIRSPEED_CRUISE and AIRSPEED_MIN.
+
+        tail_wind: m/s, negative for a head wind.
+        amsl: altitude of the landing point, m.
         """
         return landing_airspeed(self.parameters, tail_wind) * self.speeds.true_airspeed_factor(amsl)
 
@@ -401,7 +404,10 @@ class ArduPlane(Autopilot):
         return values
 
     def _landing_glide(self, height: float, run: float, tail_wind: float, amsl: float) -> LandingGlide:
-        """Return the landing glide that ArduPlane flies, by LAND_FLARE_*, LAND_WIND_COMP and TECS_LAND_*."""
+        """Return the landing glide that ArduPlane flies, by LAND_FLARE_*, LAND_WIND_COMP and TECS_LAND_*.
+
+        Arguments as for `flight.autopilots.parts.GroundRules.glide`.
+        """
         airspeed = self._landing_airspeed(0.0, tail_wind, amsl)
         return landing_glide(height, run, airspeed + tail_wind, self.parameters)
 
@@ -681,6 +687,8 @@ def _simulated_landing(target: ReturnTarget, *, engine_out: bool) -> LandingStar
     The RTL joins the sequence after its loiter, or flies straight to it. The landing itself is not simulated, so an RTL
     whose sequence begins with the landing ends at its loiter. After an engine failure, an RTL ends at its loiter or at
     the start of the sequence.
+
+    engine_out: True after an engine failure.
     """
     landing = target.landing
     if engine_out:

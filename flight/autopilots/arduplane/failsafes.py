@@ -132,6 +132,8 @@ def _battery_causes(parameters: ArduPilotParameters, *, has_landing: bool) -> li
     """Return ArduPlane's reactions to a low and to a critical battery, for each battery monitor that is on.
 
     The reaction is "never" if there is no monitor, or no threshold that the monitor can measure.
+
+    has_landing: True if the mission has a landing sequence; without one the reaction "land" is an RTL.
     """
     monitors, causes = monitored_batteries(parameters), []
     for monitor in dict.fromkeys(["BATT", *monitors]):

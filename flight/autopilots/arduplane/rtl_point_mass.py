@@ -267,6 +267,8 @@ def fly_stages(
     climb_parameters: control parameters during the climb at the start, which the `CLIMB` record ``climb`` describes.
     min_clearance, min_distance: height above ground and distance outside spheres, m, below which the flight is aborted.
     positions: array (t, 3), m, to fill with one position per second until it is full.
+    excesses, power, field: tables of a `flight.autopilots.point_mass.PointMass`.
+    engine_out: True if the engine failed at the start; the aircraft first flies on for `ENGINE_FAILURE_REACTION_S`.
     """
     spaced, progress_records = np.zeros(6, WAYPOINT), np.zeros(1, LOITER_PROGRESS)  # Spaced as in `waypoint_column`.
     waypoints, loiter = spaced[::2], progress_records[0]
@@ -517,7 +519,12 @@ def _update_demands(
     is_gliding: bool,
     dt: float,
 ) -> None:
-    """Update the demands for bank, altitude, throttle and pitch on the leg to ``waypoints[1]``."""
+    """Update the demands for bank, altitude, throttle and pitch on the leg to ``waypoints[1]``.
+
+    excess_table: specific excess power, see `flight.autopilots.point_mass.PointMass`.
+    eas2tas: ratio of true to equivalent airspeed.
+    is_gliding: True while the aircraft flies its RTL without an engine.
+    """
     target = waypoints[1]
     navigate_legs(estimated, waypoints[: 2 if target.loiter_radius != 0.0 else 3], parameters, memory, eas2tas, dt)
     if memory.reached_loiter_target and not target.is_rtl:
@@ -551,6 +558,8 @@ def _demand_throttle_and_pitch(
     In six of eight ArduPlane flights, the aircraft held its airspeed in this way and lost 55 m in the turn back. In the
     other two, which had been sinking before, it held its altitude, slowed down, and lost half as much. The worse case
     is simulated.
+
+    is_gliding: True while the aircraft flies its RTL without an engine.
     """
     seb_integrator, ske_integrator = memory.seb_integrator, memory.ske_integrator
     update_tecs(state, estimated, parameters, memory, airspeed_demand * eas2tas, eas2tas, dt)

@@ -142,6 +142,10 @@ def _measure_corners(
 
     For each corner, search for the acceptance radius with the smallest excursion. With ``fly_over`` there is nothing to
     choose, and one turn is simulated.
+
+    airspeed: equivalent airspeed, m/s.
+    turn_angles: rad.
+    ground_speeds: m/s.
     """
     for i in range(turn_angles.size):
         for j in range(ground_speeds.size):
@@ -181,6 +185,12 @@ def _fly_corner(
 
     The excursion is the maximum distance from the nearer leg. The settling distance is measured along the second leg;
     beyond it the aircraft stays close to the leg. The first leg leads north to the origin; the turn is a right turn.
+
+    airspeed: equivalent airspeed, m/s.
+    turn_angle: rad.
+    ground_speed: m/s.
+    acceptance: acceptance radius, m.
+    fly_over: True if the aircraft flies over the corner before it turns.
     """
     motions, memories = np.zeros(1, MOTION), np.zeros(1, ARDUPILOT_MEMORY)
     estimated, memory = motions[0], memories[0]

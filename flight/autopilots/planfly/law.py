@@ -292,6 +292,9 @@ def _unexplained_acceleration(
     """Return the smoothed acceleration to the right that is caused neither by lift nor by ailerons, m/s^2.
 
     The estimate starts at the second tick, because it needs the previous velocity.
+
+    speed: ground speed, m/s.
+    crab: cosine of the angle between heading and ground course.
     """
     if memory.last_velocity_east != 0.0 or memory.last_velocity_north != 0.0:
         change_east = estimated.velocity_east - memory.last_velocity_east
@@ -415,6 +418,9 @@ def _max_upward_acceleration(
     slowly, or descend, to regain speed. Near the stall the measured airspeed, gusts included, replaces the filtered
     airspeed, because a gust can stall the aircraft within a second. In a steep turn this protection starts at a higher
     airspeed, because the stall speed grows with the square root of the load factor.
+
+    airspeed: m/s.
+    rate_gain: acceleration per error of the climb rate, 1/s.
     """
     climb_rate = estimated.velocity_up
     if memory.last_airspeed < 0.0:

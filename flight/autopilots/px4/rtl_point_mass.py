@@ -225,6 +225,7 @@ def fly_rtl(
     transit_altitude: altitude to which an RTL to a landing sequence climbs first, m AMSL.
     min_clearance, min_distance: height above ground and distance outside spheres, m, below which the RTL is aborted.
     positions: array (t, 3), m, to fill with one position per second until it is full.
+    excesses, power, field: tables of a `flight.autopilots.point_mass.PointMass`.
     """
     motions, states, memories = np.zeros(1, MOTION), np.zeros(1, STATE), np.zeros(1, PX4_MEMORY)
     progress_records = np.zeros(1, LOITER_PROGRESS)
@@ -276,6 +277,9 @@ def _update_arrival(
     An RTL to a loiter arrives over its destination; an RTL to a landing arrives when it begins the leg to the landing.
 
     radius: distance from the loiter's center within which the aircraft has arrived, m.
+    lands: True for an RTL to a landing sequence.
+    has_begun_sequence: True once the aircraft flies this sequence.
+    time: time since the start, s.
     """
     if lands:
         has_arrived = has_begun_sequence and memory.leg + 2 >= waypoints.shape[0]
@@ -303,6 +307,10 @@ def _steer(
     """Set the setpoints of bank, pitch and throttle for one tick.
 
     Return True once an RTL to a landing flies the landing sequence instead of the climb before it.
+
+    transit_altitude: altitude to which an RTL to a landing sequence climbs first, m AMSL.
+    lands: True for an RTL to a landing sequence.
+    has_begun_sequence: True once the aircraft flies this sequence.
     """
     wind_east, wind_north = state.wind_east, state.wind_north
     eas_to_tas = eas_to_tas_ratio(estimated.up)
@@ -334,6 +342,8 @@ def _begin_sequence(
 
     After a climb the leg begins at the center of the loiter in which the aircraft climbed. Without a climb PX4 has no
     previous setpoint. The leg then begins at the aircraft's position, and at the altitude of the leg's end.
+
+    transit_altitude: altitude to which the RTL climbs first, m AMSL.
     """
     begin, first_stop = waypoints[0], waypoints[1]
     has_climbed = begin.up < transit_altitude - parameters.altitude_acceptance_radius

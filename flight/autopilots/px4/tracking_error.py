@@ -157,7 +157,12 @@ def _measure_corners(
     corners: Records,
     waypoints: Records,
 ) -> None:
-    """Fill the `CORNER_TRACKING` record of each corner, by turn angle (rows) and ground speed (columns)."""
+    """Fill the `CORNER_TRACKING` record of each corner, by turn angle (rows) and ground speed (columns).
+
+    airspeed: equivalent airspeed, m/s.
+    turn_angles: rad.
+    ground_speeds: m/s.
+    """
     for i in range(turn_angles.size):
         for j in range(ground_speeds.size):
             corner = corners[i, j]
@@ -180,6 +185,7 @@ def _fly_corner(
 
     turn: rad, to the right.
     speed: ground speed, m/s.
+    airspeed: equivalent airspeed, m/s.
     """
     motions, memories = np.zeros(1, MOTION), np.zeros(1, PX4_MEMORY)
     estimated, memory = motions[0], memories[0]
