@@ -69,7 +69,7 @@ def airspeed_scale(signals: Signals, flow: Flow) -> tuple[float, float]:
     decay = float(np.exp(-1.0 / (_GUST_TIME_S * thin_signals.hertz)))
 
     def whiten(values: Floats) -> Floats:
-        """Whiten values (n,) for the correlation time `_GUST_TIME_S`, each record separately."""
+        """Remove the autocorrelation of gusts (`_GUST_TIME_S`) from values (n,), in each record separately."""
         filtered = np.empty_like(values)
         for start_row, end_row in row_ranges:
             record_values = values[start_row:end_row]

@@ -335,5 +335,5 @@ def describe_program(program: AutopilotProgram, aircraft: str, max_named: int = 
     parameters_text = count_text(len(program.parameters), "parameter")
     return (
         f"{program.version} (sha256 {program.sha256[:8]}...), {parameters_text} set for"
-        f" {Path(aircraft).name}, changed_texts: {', '.join(changed_texts[:max_named]) or 'none'}{remainder}"
+        f" {Path(aircraft).name}, changed: {', '.join(changed_texts[:max_named]) or 'none'}{remainder}"
     )

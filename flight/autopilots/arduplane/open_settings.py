@@ -264,7 +264,8 @@ def _describe_position_estimate(values: Mapping[str, float]) -> Iterator[str]:
     if values["GPS_AUTO_SWITCH"] == 0.0:
         type_names = type_names[int(values["GPS_PRIMARY"] != 0.0) :][:1]
     if not any(values[name] for name in type_names):
-        yield f"{' and '.join(type_names)} 0 leave no GPS, and so no position, which is not simulated"
+        verb = "leave" if len(type_names) > 1 else "leaves"
+        yield f"{' and '.join(type_names)} 0 {verb} no GPS, and so no position, which is not simulated"
     estimator, height_source = values["AHRS_EKF_TYPE"], values["EK3_SRC1_POSZ"]
     # `AP_AHRS::init` replaces EKF2 by EKF3.
     enabling = {_EKF2: "", _EKF3: "EK3_ENABLE", _EXTERNAL_AHRS: "EAHRS_TYPE"}

@@ -92,9 +92,7 @@ def describe_renamed(names: Iterable[str], used: Iterable[str], version: ArduPla
     used_names = set(used)
     renamed = {name: new_name for name in names if (new_name := name_in_release(name, version)) != name}
     texts = []
-    if read_texts := [
-        f"{name} is read_texts as {new_name}" for name, new_name in renamed.items() if name in used_names
-    ]:
+    if read_texts := [f"{name} is read as {new_name}" for name, new_name in renamed.items() if name in used_names]:
         texts.append(f"{', '.join(read_texts)}, its name in ArduPlane {version}")
     if unused_texts := [f"{name} (now {new_name})" for name, new_name in renamed.items() if name not in used_names]:
         texts.append(

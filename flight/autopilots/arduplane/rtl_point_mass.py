@@ -264,11 +264,9 @@ def fly_stages(
     """Simulate the flight from stage to stage for up to ``timeout`` s; fill the `RETURN_RESULT` ``result``.
 
     stages: successive targets, (n,) of `flight.guidance.lateral_reference_laws.WAYPOINT`; the last loiter is flown on.
-    climb_parameters: control parameters during the climb at the start, which the `CLIMB` record ``climb`` describes.
+    climb, climb_parameters: the climb at the start and its parameters. engine_out: True if the engine failed there.
     min_clearance, min_distance: height above ground and distance outside spheres, m, below which the flight is aborted.
-    positions: array (t, 3), m, to fill with one position per second until it is full.
-    excesses, power, field: tables of a `flight.autopilots.point_mass.PointMass`.
-    engine_out: True if the engine failed at the start; the aircraft first flies on for `ENGINE_FAILURE_REACTION_S`.
+    positions: array (t, 3), m, to fill, one position a second. excesses, power, field: tables of a `PointMass`.
     """
     spaced, progress_records = np.zeros(6, WAYPOINT), np.zeros(1, LOITER_PROGRESS)  # Spaced as in `waypoint_column`.
     waypoints, loiter = spaced[::2], progress_records[0]

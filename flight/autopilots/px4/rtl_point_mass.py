@@ -220,8 +220,7 @@ def fly_rtl(
 ) -> None:
     """Simulate an RTL for up to ``timeout`` s, and fill the `RETURN_RESULT` ``result``.
 
-    waypoints: start of the RTL, then the loiter at its end; or the start, the stops of a landing sequence, and the
-        landing.
+    waypoints: the start, then the loiter at the RTL's end, or the stops of a landing sequence and the landing.
     transit_altitude: altitude to which an RTL to a landing sequence climbs first, m AMSL.
     min_clearance, min_distance: height above ground and distance outside spheres, m, below which the RTL is aborted.
     positions: array (t, 3), m, to fill with one position per second until it is full.

@@ -221,7 +221,7 @@ def test_settings_that_depend_on_others(text: str, mission: MissionParts, expect
         ("GPS_TYPE 0", "GPS1_TYPE and GPS2_TYPE 0 leave no GPS"),
         ("GPS_TYPE 0\nGPS_TYPE2 9", ""),
         ("GPS1_TYPE 0\nGPS2_TYPE 9", ""),
-        ("GPS1_TYPE 0\nGPS2_TYPE 9\nGPS_AUTO_SWITCH 0", "GPS1_TYPE 0 leave no GPS"),
+        ("GPS1_TYPE 0\nGPS2_TYPE 9\nGPS_AUTO_SWITCH 0", "GPS1_TYPE 0 leaves no GPS"),
         ("GPS1_TYPE 0\nGPS2_TYPE 9\nGPS_AUTO_SWITCH 0\nGPS_PRIMARY 1", ""),
         ("AHRS_GPS_USE 0", "AHRS_GPS_USE 0"),
         ("AHRS_EKF_TYPE 0", "AHRS_EKF_TYPE 0 estimates the position without EKF3"),
@@ -237,7 +237,7 @@ def test_settings_that_depend_on_others(text: str, mission: MissionParts, expect
         # A fixed wing takes its heading from its course where it has no compass.
         ("COMPASS_ENABLE 0", ""),
         # Arming: bits 3 and 6 require a take-off and a return.
-        ("ARMING_MIS_ITEMS 8", "ARMING_MIS_ITEMS 8 prevents arming without NAV_TAKEOFF"),
+        ("ARMING_MIS_ITEMS 8", "ARMING_MIS_ITEMS 8 prevents arming, because the mission has no NAV_TAKEOFF"),
         ("ARMING_MIS_ITEMS 64", ""),
         ("ARMING_MIS_ITEMS 8\nARMING_CHECK 0", ""),
         ("ARMING_MIS_ITEMS 8\nARMING_SKIPCHK -1", ""),

@@ -180,7 +180,7 @@ def test_every_renamed_parameter_is_read_or_not_used_and_named_in_one_line(tmp_p
         file.write_text(f"{old} 7\nWP_RADIUS 60\n", encoding="utf-8")
         (note,) = choose_release("4.7", str(file)).notes[1:]
         new = name_in_release(old, "4.7")
-        said = f"{old} is read as {new}, its name in ArduPlane 4.7" if old in read else f"not used: {old} ({new})"
+        said = f"{old} is read as {new}, its name in ArduPlane 4.7" if old in read else f"not used: {old} (now {new})"
         assert note == f"{file}: {said}"
 
 
