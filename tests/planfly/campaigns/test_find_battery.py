@@ -218,7 +218,7 @@ def test_a_higher_return_of_px4_needs_a_larger_battery(tmp_path: Path) -> None:
     assert rows[650].return_energy - rows[450].return_energy > 11.0 * 9.81 * 200.0 / 3600.0
     lines = battery_lines(battery_result(base, [energy_row(80.0)] * 20, own=888.0))
     assert "returns to launch are simulated by PX4's control laws flying a point mass" in lines
-    assert any("RTL_RETURN_ALT (650 m above its destination)" in line for line in lines)
+    assert any("RTL_RETURN_ALT (650 m above the destination)" in line for line in lines)
     assert not any("ArduPlane" in line for line in lines)
 
 

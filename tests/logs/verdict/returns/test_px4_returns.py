@@ -215,7 +215,7 @@ def test_its_own_words_are_px4s(tmp_path: Path) -> None:
     found = judged(tmp_path, "RTL_RETURN_ALT 450\nNAV_DLL_ACT 2")
     lines = [*describe_causes(found.causes), *describe_landing(found)]
     assert "station lost (NAV_DLL_ACT 2)" in lines[0]
-    assert "RTL_RETURN_ALT (450 m above its destination)" in lines[-1]
+    assert "RTL_RETURN_ALT (450 m above the destination)" in lines[-1]
     assert (found.autoland, found.stands_in) == (None, False)
 
 
