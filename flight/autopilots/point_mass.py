@@ -243,7 +243,7 @@ def wind_at(position: Record, seconds: float, aircraft: Record, field: Floats) -
     position: a record with `east`, `north` and `up`, m.
     seconds: time after take-off, s.
     aircraft: a record of `POINT_MASS`.
-    field: as in `PointMass`.
+    field: packed wind field, as in `PointMass`; empty for none.
     """
     if not field.size:
         speed = mean_wind_speed(aircraft.wind_speed, aircraft.wind_gradient, aircraft.wind_reference, position.up)
@@ -273,7 +273,7 @@ def advance_point_mass(
     path_angle: climb angle relative to the air, rad.
     aircraft: a record of `POINT_MASS`.
     excess_table, power: tables of a `PointMass`.
-    field: as in `PointMass`.
+    field: packed wind field, as in `PointMass`; empty for none.
 
     The wind in the state is updated to the new time and position.
     """
