@@ -34,7 +34,7 @@ def count_failures(flights: Iterable[Iterable[tuple[str, Place]]]) -> tuple[Rule
     """
     counts: Counter[str] = Counter()
     places: dict[str, Counter[Place]] = {}
-    # Flights fail at different corners of a loiter, which is one place; the first of them stands for it.
+    # Flights fail at different corners of a loiter, which is one place; the first corner found stands for all.
     first_places: dict[Place, Place] = {}
     for flight in flights:
         failed_findings = list(flight)
@@ -78,7 +78,7 @@ def failures_document(by_rule: Iterable[RuleFailures]) -> list[dict[str, Any]]:
 def failure_lines(by_rule: Iterable[RuleFailures], mission_fault: str = "") -> list[str]:
     """Return a line for each failed rule: number of failed flights, and the three most frequent places.
 
-    mission_fault: text for failures of the mission as a whole, which have no place; "" if it is not known.
+    mission_fault: text for failures of the mission as a whole, which have no place; "" if there is none.
     """
     lines = []
     for failures in by_rule:

@@ -111,7 +111,7 @@ class Bar:
     """Bar of the tornado chart, for one quantity.
 
     title: title of the quantity.
-    index: first-order index, 0 to 1.
+    index: fraction of the margin's variance that the quantity explains (first-order index), 0 to 1.
     slope: rank correlation of the quantity with the margin, -1 to 1.
     """
 
@@ -279,7 +279,9 @@ def draw_clearance_fan(
             band = np.full((2, stations), np.nan)
             band[:, has_data] = np.nanquantile(clearance[:, has_data], (lower_quantile, upper_quantile), axis=0)
             label = (
-                "all flights" if lower_quantile == 0.0 else f"{100 * (upper_quantile - lower_quantile):.0f} % of them"
+                "all flights"
+                if lower_quantile == 0.0
+                else f"{100 * (upper_quantile - lower_quantile):.0f} % of flights"
             )
             upper_axes.fill_between(
                 distance_km, band[0], band[1], color=PLANNED, alpha=alpha + 0.15, linewidth=0.0, label=label
@@ -349,7 +351,7 @@ def draw_crossings(crossings: Floats, has_failed: NDArray[np.bool_]) -> Figure:
             half_size = _panel_half_size(points)
             if is_reached.sum() > 2:
                 ellipse = covariance_ellipse(points[is_reached])
-                # Its extents are in metres until it is added to axes.
+                # The ellipse's extents are in metres until it is added to axes.
                 half_size = max(half_size, 1.05 * float(np.abs(ellipse.get_extents().get_points()).max()))
                 axes.add_patch(ellipse)
             axes.set_title(f"waypoint {waypoint}", fontsize=8.5, pad=3.0)
@@ -358,7 +360,7 @@ def draw_crossings(crossings: Floats, has_failed: NDArray[np.bool_]) -> Figure:
             axes.tick_params(labelsize=7)
         title = "Where flights crossed each waypoint, m right of and above it, with the ellipse of 95 %"
         figure.text(0.07, 1.0 - 0.3 / height, title, fontsize=11, color=INK_COLOUR)
-        figure.text(0.98, 1.0 - 0.3 / height, "dots flyable, crosses not", fontsize=8, color=QUIET_COLOUR, ha="right")
+        figure.text(0.98, 1.0 - 0.3 / height, "dot: flyable, cross: not", fontsize=8, color=QUIET_COLOUR, ha="right")
     return figure
 
 
@@ -600,7 +602,7 @@ def narrow_figure(figure: Figure) -> Figure:
     panels = [axes for axes in figure.axes if axes.axison]
     legends = [*figure.legends, *(legend for axes in panels if (legend := axes.get_legend()) is not None)]
     legend_height = _LEGEND_LINE_IN * sum(-(-len(legend.get_texts()) // 2) for legend in legends)
-    # Height of the figure's own texts, in from the top.
+    # Distance of the next text of the figure from the top, in.
     text_height = _EDGE_IN
     texts = []
     for text in figure.texts:

@@ -7,7 +7,7 @@ from world.scenario import Scenario
 
 # Step of the lengths that are suggested, m.
 _LENGTH_STEP_M = 10.0
-# What helps against the failures of a rule; rules with a length to suggest are in `_measured_remedies`.
+# Change that helps against the failures of a rule; `_measured_remedies` handles the rules with a length to suggest.
 _REMEDIES = {
     "energy": "a larger battery or a shorter mission",
     "fence": "more distance to the fence",

@@ -51,12 +51,14 @@ _BARO_ERROR_M = 1.0
 _CLIMB_SLOPE_RAD = math.radians(45.0)
 # Height of the arc from this slope to level flight, in v^2 / g (LBA, FOCA: 0.3, which is 1 - cos 45 degrees rounded).
 _LEVEL_OFF_FACTOR = 0.3
-# Least width of the flight geography, in characteristic dimensions (LBA).
+# Minimum width of the flight geography, in characteristic dimensions of the aircraft (LBA).
 _MIN_GEOGRAPHY_DIMENSIONS = 3.0
 
 
 def min_geography_half_width(dimension: float) -> float:
     """Return half of the minimum width of a flight geography, m.
+
+    dimension: largest dimension of the aircraft, m.
 
     >>> min_geography_half_width(2.9)
     4.35
@@ -144,6 +146,9 @@ class ContingencyFormula:
 def one_to_one_buffer(height: float, dimension: float) -> float:
     """Return the width of the ground risk buffer by the 1:1 rule, S_GRB = H_CV + CD / 2, m (Annex A, LBA, FOCA).
 
+    height: height of the operational volume above ground, H_CV, m.
+    dimension: largest dimension of the aircraft, CD, m.
+
     >>> one_to_one_buffer(150.0, 3.0)
     151.5
     """
@@ -153,7 +158,9 @@ def one_to_one_buffer(height: float, dimension: float) -> float:
 def ballistic_buffer(height: float, dimension: float, speed: float) -> float:
     """Return the width of the ground risk buffer by a fall without drag, S_GRB = v sqrt(2 H_CV / g) + CD / 2, m.
 
-    Annex A, LBA and FOCA use it for rotorcraft only.
+    Annex A, LBA and FOCA use this formula for rotorcraft only.
+    height, dimension: H_CV and CD as for `one_to_one_buffer`, m.
+    speed: highest speed of the aircraft, v, m/s.
 
     >>> round(ballistic_buffer(78.48, 2.0, 25.0), 6)
     101.0
@@ -163,6 +170,9 @@ def ballistic_buffer(height: float, dimension: float, speed: float) -> float:
 
 def glide_buffer(height: float, glide_ratio: float) -> float:
     """Return the width of the ground risk buffer by a glide without power, S_GRB = E H_CV, m (Annex A, LBA).
+
+    height: height of the operational volume above ground, H_CV, m.
+    glide_ratio: best glide ratio of the aircraft, E.
 
     >>> glide_buffer(150.0, 12.0)
     1800.0
