@@ -91,7 +91,7 @@ class FirstMessageBounded(_UnknownConnection, WebSocketsSansIOProtocol):
 
     def _limit_messages(self, max_size: int) -> None:
         """Set the maximum size of a received message, bytes."""
-        # The first name is that of websockets 16 and later, the second that of earlier versions.
+        # websockets 16 and later use the first name, earlier versions the second.
         for name in ("max_message_size", "max_size"):
             if hasattr(self.conn, name):
                 setattr(self.conn, name, max_size)

@@ -195,7 +195,7 @@ class Jobs:
         ends = [session.item_position(index) for index in (message.first, message.last)]
         if message.first >= message.last:
             raise MissionError(
-                f"{session.document.name}: of the two items to plan between, the second must come later in the mission",
+                f"{session.document.name}: the second item to plan between must come after the first in the mission",
                 field="last",
             )
         return replace(request, ends=(ends[0], ends[1]))
@@ -252,7 +252,7 @@ class Jobs:
             reason = "the mission was changed while its path was planned, so the path is not used: plan again"
             return [self._stopped_message("plan"), {"kind": "fault", "text": reason}]
         result = self._result_message(task, answer.value, session)
-        # The task that follows begins before it reports progress.
+        # Send the message of a follow-up task, which may not report progress for a while.
         return [result, *(following.message for following in [self._active.get(worker)] if following is not None)]
 
     def _stopped_message(self, name: str) -> Json:
@@ -297,7 +297,7 @@ class Jobs:
                 self.fly(session)
             return {"kind": "tried", "rev": task.rev, "job": task.name, "findings": findings}
         if task.name == "plan":
-            # Until then the paths of an earlier search can be chosen, also if this one is stopped.
+            # The paths of an earlier search can be chosen until a new search has finished.
             session.plans = ([front_plan.plan for front_plan in value], task.item_range)
             return {"kind": "ways", "rev": task.rev, "ways": paths_json(value), "at_once": self._uses_first_path}
         message = {"kind": task.name, "rev": task.rev, **value}
