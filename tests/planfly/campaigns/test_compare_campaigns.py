@@ -81,7 +81,7 @@ def test_other_draws_are_other_samples(base: CampaignBase, tmp_path: Path) -> No
     assert found.pairs == 0
     (hint,) = [line for line in comparison_lines(found) if line.startswith("  paired  no: ")]
     assert hint.endswith(
-        "; with the same --seed and --spread they are compared in pairs, which shows smaller differences"
+        ". Campaigns with the same --seed and --spread are compared in pairs, which shows smaller differences"
     )
     assert [round(bound, 4) for bound in found.difference.interval] == [0.0524, 0.3339]
     assert found.answer == "more likely"
