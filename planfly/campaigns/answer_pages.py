@@ -56,7 +56,8 @@ def window_page(result: WindowResult, figure: Figure, command: str) -> AnswerPag
 def battery_page(result: BatteryResult, figure: Figure, command: str) -> AnswerPage:
     """Return the page of a battery: chart of the capacities, deciding parts of the flight, and energy of each leg.
 
-    The arguments are as for `window_page`.
+    figure: chart of the capacities.
+    command: command line that repeats the search; "" if there is none.
     """
     goal = result.goal
     return AnswerPage(

@@ -46,12 +46,17 @@ def count_failures(flights: Iterable[Iterable[tuple[str, Place]]]) -> tuple[Rule
 
 
 def deciding_rule(by_rule: Sequence[RuleFailures]) -> str:
-    """Return the rule that fails the most flights, in a tie the most urgent; "" without failures."""
+    """Return the rule that fails the most flights, in a tie the most urgent; "" without failures.
+
+    by_rule: failures by rule, the most urgent rule first.
+    """
     return next(iter(deciding_rules(by_rule)), "")
 
 
 def deciding_rules(by_rule: Sequence[RuleFailures]) -> tuple[str, ...]:
     """Return the rules that fail the most flights (ties included), most urgent first; () without failures.
+
+    by_rule: failures by rule, the most urgent rule first.
 
     >>> flights = [[("slope", Place("leg", 1)), ("turn", Place("waypoint", 1))], [("clearance", Place("leg", 2))]]
     >>> deciding_rules(count_failures([*flights, *flights[1:]])), deciding_rules(count_failures(flights[:1]))

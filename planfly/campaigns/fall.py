@@ -29,7 +29,7 @@ def plate_drag(aircraft: Aircraft) -> float:
 
 
 def impact_points(
-    position: Floats, velocity: Floats, drag: float, wind_at: Callable[[Floats], Floats], terrain: Terrain
+    position: Floats, velocity: Floats, drag: float, find_wind: Callable[[Floats], Floats], terrain: Terrain
 ) -> Floats:
     """Return the positions (east, north) at which falls hit the ground, m, (n, 2).
 
@@ -37,7 +37,7 @@ def impact_points(
 
     position, velocity: position, m, and ground velocity, m/s, at the start of each fall, (n, 3).
     drag: drag per mass and square of the airspeed, 1/m.
-    wind_at: function from positions, m, (n, 3), to the wind there, m/s, (n, 2) east and north.
+    find_wind: function from positions, m, (n, 3), to the wind there, m/s, (n, 2) east and north.
     """
     positions, velocities = position.astype(np.float64), velocity.astype(np.float64)
     start_ground = terrain.height(positions[:, 0], positions[:, 1])
@@ -48,7 +48,7 @@ def impact_points(
         rows = np.flatnonzero(is_falling)
         if not rows.size:
             break
-        wind_velocity = np.column_stack([wind_at(positions[rows]), np.zeros(rows.size)])
+        wind_velocity = np.column_stack([find_wind(positions[rows]), np.zeros(rows.size)])
         # Apply half of the step's gravity, then the exact solution for drag alone, then the other half of the gravity.
         air_velocity = velocities[rows] - wind_velocity - half_step_gravity
         slowed_velocity = air_velocity / (1.0 + drag * np.linalg.norm(air_velocity, axis=1)[:, None] * _TIME_STEP_S)

@@ -148,11 +148,11 @@ def fly_for_excursions(
     # Falls use the wind of the forecast at half the flight's duration.
     half_time = 0.5 * float(flown_mission.track.time[-1])
 
-    def wind_at(places: Floats) -> Floats:
+    def find_wind(places: Floats) -> Floats:
         """Return the wind at places, m, (n, 3), at half the flight's duration, m/s, (n, 2)."""
         return setup.scenario.wind_velocities(places, np.full(len(places), half_time))
 
-    falls = _fall_areas(sampled, uav, wind_at, terrain)
+    falls = _fall_areas(sampled, uav, find_wind, terrain)
     glides = shapely.buffer([shapely.LineString(glide_path[:, :2]) for glide_path in paths.glides], 1.0)
     fallen_area = shapely.union_all([flown_area, *falls, *glides])
     height = _largest_height(positions, terrain)
@@ -161,7 +161,7 @@ def fly_for_excursions(
         row,
         duration=float(flown_mission.track.time[-1]),
         deviation=deviation,
-        turn_deviation=max([deviation, *(_reach(area, path) for area in turns)]),
+        turn_deviation=max([deviation, *(_distance_beyond(area, path) for area in turns)]),
         height=height,
         return_height=max([height, *(_largest_height(each, terrain) for each in paths.returns)]),
         ground_speed=float(np.hypot(velocities[:, 0], velocities[:, 1]).max()),
@@ -294,16 +294,16 @@ def areas_between(paths: list[Floats]) -> list[BaseGeometry]:
 
 
 def _fall_areas(
-    sampled: list[tuple[Floats, Floats]], aircraft: Aircraft, wind_at: Callable[[Floats], Floats], terrain: Terrain
+    sampled: list[tuple[Floats, Floats]], aircraft: Aircraft, find_wind: Callable[[Floats], Floats], terrain: Terrain
 ) -> list[BaseGeometry]:
     """Return for each path the area in which an aircraft can fall from it.
 
     The area is the union of hulls; each contains a piece of the path and the impact points of falls from that piece.
     sampled: positions, m, and ground velocities, m/s, of each path, (n, 3) each.
-    wind_at: see `impact_points`.
+    find_wind: see `impact_points`.
     """
     positions, velocities = (np.concatenate(values) for values in zip(*sampled, strict=True))
-    impacts = [impact_points(positions, velocities, drag, wind_at, terrain) for drag in (0.0, plate_drag(aircraft))]
+    impacts = [impact_points(positions, velocities, drag, find_wind, terrain) for drag in (0.0, plate_drag(aircraft))]
     points = np.stack([positions[:, :2], *impacts], axis=1)
     ends = np.cumsum([len(each) for each, _ in sampled])[:-1]
     areas = []
@@ -565,9 +565,9 @@ def make_volumes(
         deviation=deviation,
         height=height,
         contingency_width=max(0.0, max(row.turn_deviation for row in rows) - half_width),
-        return_distance=_reach(flown_area, geography),
+        return_distance=_distance_beyond(flown_area, geography),
         contingency_height=max(row.return_height for row in rows),
-        buffer_width=_reach(fallen_area, flown_area),
+        buffer_width=_distance_beyond(fallen_area, flown_area),
     )
     speed = goal.speed or aircraft.airspeed_max
     formula = ContingencyFormula(speed, height)
@@ -590,6 +590,6 @@ def _without_filled_holes(area: BaseGeometry, footprint: BaseGeometry) -> BaseGe
     return shapely.union_all([area, *(hole for hole in holes if footprint.covers(hole))])
 
 
-def _reach(outer: BaseGeometry, inner: BaseGeometry) -> float:
+def _distance_beyond(outer: BaseGeometry, inner: BaseGeometry) -> float:
     """Return the largest distance by which an area extends beyond another area, m; 0 for an empty area."""
     return float(shapely.distance(shapely.points(shapely.get_coordinates(outer)), inner).max(initial=0.0))

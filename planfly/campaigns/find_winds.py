@@ -307,7 +307,7 @@ class _Search:
         self.directions = [
             Direction(goal.most, goal.target, drawn_numbers, goal.confidence) for _ in range(goal.directions)
         ]
-        self.open = list(range(goal.directions))
+        self.open_directions = list(range(goal.directions))
         # Number of flights of each direction at which it is checked next.
         self._next_check = [MIN_FLIGHTS_PER_DIRECTION] * goal.directions
         self.flown: list[tuple[int, float, bool]] = []
@@ -319,10 +319,12 @@ class _Search:
 
     def next_round(self) -> list[RequestedFlight]:
         """Return the requests of the next round; empty if the search is complete or all flights are used."""
-        self.open = [number for number in self.open if self._is_open(number)]
-        flights_each = max(_MIN_FLIGHTS_EACH, min(_MAX_FLIGHTS_EACH, _FLIGHTS_PER_ROUND // max(1, len(self.open))))
+        self.open_directions = [number for number in self.open_directions if self._is_open(number)]
+        flights_each = max(
+            _MIN_FLIGHTS_EACH, min(_MAX_FLIGHTS_EACH, _FLIGHTS_PER_ROUND // max(1, len(self.open_directions)))
+        )
         requests: list[RequestedFlight] = []
-        for number in self.open:
+        for number in self.open_directions:
             for speed, draw in next_flights(self.directions[number], flights_each):
                 requests.append(RequestedFlight(len(self.flown) + len(requests), number, speed, draw))
         return requests[: max(0, self.goal.flights - len(self.flown))]
@@ -364,7 +366,9 @@ class _Search:
 
     def min_remaining_flights(self) -> int:
         """Return the number of flights still needed to reach the minimum number in each open direction."""
-        remaining = sum(max(0, MIN_FLIGHTS_PER_DIRECTION - len(self.directions[number].speeds)) for number in self.open)
+        remaining = sum(
+            max(0, MIN_FLIGHTS_PER_DIRECTION - len(self.directions[number].speeds)) for number in self.open_directions
+        )
         return min(remaining, self.goal.flights - len(self.flown))
 
     def result(self) -> WindsResult:
@@ -449,8 +453,8 @@ def _fly_in_calm_air(pool: WorkerPool, goal: WindsGoal) -> list[FlightRow]:
 
         None if a flight was flyable or could not be flown, or if all flights are requested.
         """
-        has_none_flyable = not any(row.outcome in ("flyable", "lost") for row in rows.values())
-        draw = next(draws, None) if has_none_flyable else None
+        can_disprove_target = not any(row.outcome in ("flyable", "lost") for row in rows.values())
+        draw = next(draws, None) if can_disprove_target else None
         return None if draw is None else FlightRequest(draw, GivenWind(0.0, 0.0))
 
     for request, row in pool.fly(next_request):
@@ -552,7 +556,7 @@ class _ProgressReport:
             return
         search, flights_per_second = self._search, self._rate.flights_per_second(flight_count)
         remaining = len(search.flown) + search.min_remaining_flights() - flight_count
-        settled_count, total = search.goal.directions - len(search.open), search.goal.directions
+        settled_count, total = search.goal.directions - len(search.open_directions), search.goal.directions
         remark = (
             f"{settled_count} of {total} directions settled, {count_text(flight_count, 'flight')},"
             f" {60.0 * flights_per_second:.0f} a minute"

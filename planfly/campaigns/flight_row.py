@@ -268,7 +268,7 @@ def scale_margin(rule: str, margin: MinimumMargin) -> float | None:
 
 
 def _column_fields() -> dict[str, Column]:
-    """Return the columns of `FlightRow` in order, keyed by field name."""
+    """Return the `Column` with which each stored field of `FlightRow` is annotated, keyed by field name, in order."""
     hints = get_type_hints(FlightRow, include_extras=True)
     hint_args = {name: get_args(hint) for name, hint in hints.items()}
     return {name: args[-1] for name, args in hint_args.items() if args and isinstance(args[-1], Column)}

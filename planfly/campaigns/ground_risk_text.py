@@ -147,7 +147,7 @@ def table_rows(result: GroundRiskResult) -> list[tuple[str, str, str]]:
     """Return the rows of the table for an application: quantity, value and source; cells in bold begin with "**"."""
     flown, goal = result.flown, result.goal
     span = result.aircraft.wing_span
-    flown_by = _share_text(result)
+    share_text = _share_text(result)
     return [
         ("**aircraft**", "", ""),
         ("aircraft", result.aircraft.title, ""),
@@ -155,8 +155,8 @@ def table_rows(result: GroundRiskResult) -> list[tuple[str, str, str]]:
         ("highest speed v", f"{result.speed:g} m/s", "stated" if goal.speed else "highest airspeed of the model"),
         ("take-off mass", f"{result.aircraft.mass:g} kg", ""),
         ("**flight geography**", "", ""),
-        ("half width", f"{result.half_width:.1f} m", f"{flown_by}: {flown.deviation:.1f} m; at least 1.5 CD"),
-        ("height H_FG above ground", f"{flown.height:.1f} m", flown_by),
+        ("half width", f"{result.half_width:.1f} m", f"{share_text}: {flown.deviation:.1f} m; at least 1.5 CD"),
+        ("height H_FG above ground", f"{flown.height:.1f} m", share_text),
         *_contingency_rows(result),
         ("**ground risk buffer**", "", ""),
         (

@@ -426,7 +426,12 @@ def draw_go_no_go(
     name: str,
     wind: tuple[float, float] | None,
 ) -> Figure:
-    """Draw a polar chart, north up, of the winds in which a mission is flyable, up to `max_speed`, m/s.
+    """Draw a polar chart, north up, of the winds in which a mission is flyable.
+
+    max_speed: strongest wind of the chart, m/s.
+    target: required probability of a flyable flight.
+    confidence: confidence of the intervals, for the legend.
+    name: name of the mission, for the title.
 
     wind: speed, m/s, and direction, degrees, of the scenario's wind, which is drawn as a star; or None.
     """

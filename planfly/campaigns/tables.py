@@ -98,12 +98,12 @@ def make_flight_row(index: int, values: Mapping[str, Any]) -> FlightRow:
 
 
 def is_same_flight(first: FlightRow, second: FlightRow) -> bool:
-    """Return True if two rows describe the same flight, ignoring the machine and its speed."""
+    """Return True if two rows describe the same flight; columns that depend on the machine are ignored."""
     return first.draw.index == second.draw.index and not differing_columns(first, second)
 
 
 def differing_columns(first: FlightRow, second: FlightRow) -> list[str]:
-    """Return the names of the columns in which two rows differ, except those of the machine and its speed."""
+    """Return the names of the columns in which two rows differ, except columns that depend on the machine."""
     first_values, second_values = (row_values(replace(row, made_of="")) for row in (first, second))
     return [
         name for name in ROW_COLUMNS if name not in RUN_DEPENDENT_COLUMNS and first_values[name] != second_values[name]
@@ -268,7 +268,7 @@ class LockedTable:
         report_line(f"{self.path}: {examination.describe()}")
 
     def _last_number(self) -> int:
-        """Return the largest flight number that can be read from either end of the table; -1 without any."""
+        """Return the largest flight number that can be read from either end of a damaged table; -1 without any."""
         last_number = -1
         for order in ("", " DESC"):
             with suppress(sqlite3.Error, UnicodeDecodeError):
@@ -375,7 +375,7 @@ def check_not_locked(path: Path) -> None:
         connection.execute("BEGIN EXCLUSIVE")
     except sqlite3.Error as error:
         if getattr(error, "sqlite_errorcode", sqlite3.SQLITE_NOTADB) & 0xFF in LOCKED_CODES:
-            raise StoreError(f"{path}: is held by another process", file=path) from error
+            raise StoreError(f"{path}: is locked by another process", file=path) from error
     finally:
         connection.close()
 
@@ -407,7 +407,7 @@ class convert_errors:
                 errno.ENOSPC, "no space left; finished flights are kept: continue with --resume", str(self._path)
             )
         if code is not None and code & 0xFF in LOCKED_CODES:
-            raise StoreError(f"{self._path}: is held by another process", file=self._path) from error
+            raise StoreError(f"{self._path}: is locked by another process", file=self._path) from error
         raise StoreError(f"{self._path}: {error}", file=self._path) from error
 
 

@@ -227,7 +227,7 @@ def restore_settings(
     flight = spec.get("flight", {})
     is_other_autopilot = flight.get("autopilot") != new_spec.get("flight", {}).get("autopilot")
     if file_autopilot and "autopilot_from" in flight and is_other_autopilot:
-        replaced += _take_entries(new_spec, spec, "flight", _AUTOPILOT_KEYS)
+        replaced += _replace_entries(new_spec, spec, "flight", _AUTOPILOT_KEYS)
     saved_parameters = data.get("parameters") or asdict(ChangedParameters())
     parameters = ChangedParameters(
         dict(saved_parameters["values"]),
@@ -262,11 +262,11 @@ def _apply_options(saved_spec: Json, opened_spec: Json, options: MissionOptions)
         saved, opened = saved_spec.setdefault(table, {}), opened_spec.get(table, {})
         if option == "aircraft" and not _is_same_value(saved.get("aircraft"), opened.get("aircraft")):
             keys = (*keys, *_AIRCRAFT_KEYS)
-        replaced += _take_entries(saved_spec, opened_spec, table, keys)
+        replaced += _replace_entries(saved_spec, opened_spec, table, keys)
     return replaced
 
 
-def _take_entries(saved_spec: Json, opened_spec: Json, table: str, keys: tuple[str, ...]) -> list[str]:
+def _replace_entries(saved_spec: Json, opened_spec: Json, table: str, keys: tuple[str, ...]) -> list[str]:
     """Replace entries in a table of a saved scenario by the entries of the opened scenario.
 
     Returns a text with both values for each entry that was different.

@@ -45,7 +45,7 @@ class _UnknownConnection:
         self.transport.abort()
 
 
-class ShortLived(_UnknownConnection, H11Protocol):
+class ShortLivedHttpProtocol(_UnknownConnection, H11Protocol):
     """HTTP protocol that closes its connection after `HTTP_LIFETIME_S`.
 
     Otherwise idle connections would accumulate.
@@ -63,7 +63,7 @@ class ShortLived(_UnknownConnection, H11Protocol):
             transport.abort()
 
 
-class FirstMessageBounded(_UnknownConnection, WebSocketsSansIOProtocol):
+class BoundedWebSocketProtocol(_UnknownConnection, WebSocketsSansIOProtocol):
     """Websocket protocol that limits the size of messages until the token is given.
 
     The limit is `MAX_FIRST_MESSAGE_CHARACTERS`.

@@ -53,16 +53,16 @@ class BinaryLink(Protocol):
     """Link function; all methods take predictors in an array of any shape and return the same shape."""
 
     def log_cdf(self, x: Floats) -> Floats:
-        """Return the logarithm of the probability of failure."""
+        """Return the logarithm of the probability of failure at the linear predictor x."""
 
     def log_survival(self, x: Floats) -> Floats:
-        """Return the logarithm of the probability of success."""
+        """Return the logarithm of the probability of success at the linear predictor x."""
 
     def survival(self, x: Floats) -> Floats:
         """Return the probability of success at the linear predictor x."""
 
     def density(self, x: Floats) -> Floats:
-        """Return the derivative of the probability of failure."""
+        """Return the derivative of the probability of failure by the linear predictor x."""
 
     def information(self, x: Floats, width: float = 0.0) -> Floats:
         """Return the Fisher information of a flight about its predictor.
@@ -72,26 +72,26 @@ class BinaryLink(Protocol):
         """
 
     def derivatives(self, x: Floats, has_failed: Bools) -> tuple[Floats, Floats]:
-        """Return first and second derivative of the log-probability of the outcome."""
+        """Return first and second derivative of the log-probability of the outcome by the linear predictor x."""
 
     def log_density(self, x: Floats) -> Floats:
         """Return the logarithm of `density`."""
 
     def density_derivatives(self, x: Floats) -> tuple[Floats, Floats]:
-        """Return first and second derivative of `log_density`."""
+        """Return first and second derivative of `log_density` by the linear predictor x."""
 
 
 class _Probit:
     """Link of a normally distributed threshold."""
 
     def log_cdf(self, x: Floats) -> Floats:
-        """Return the logarithm of the normal probability of failure."""
+        """Return the logarithm of the normal probability of failure at the linear predictor x."""
         from scipy.special import log_ndtr
 
         return log_ndtr(x)
 
     def log_survival(self, x: Floats) -> Floats:
-        """Return the logarithm of the normal probability of success."""
+        """Return the logarithm of the normal probability of success at the linear predictor x."""
         return self.log_cdf(-x)
 
     def survival(self, x: Floats) -> Floats:
@@ -101,7 +101,7 @@ class _Probit:
         return ndtr(-x)
 
     def density(self, x: Floats) -> Floats:
-        """Return the standard normal density."""
+        """Return the standard normal density at the linear predictor x."""
         return np.exp(-0.5 * x * x) / np.sqrt(2.0 * np.pi)
 
     def information(self, x: Floats, width: float = 0.0) -> Floats:
@@ -120,7 +120,7 @@ class _Probit:
         return end_information + np.maximum(pass_information, 0.0)
 
     def derivatives(self, x: Floats, has_failed: Bools) -> tuple[Floats, Floats]:
-        """Return first and second derivative of the log-probability of each outcome."""
+        """Return first and second derivative of the log-probability of each outcome by the linear predictor x."""
         from scipy.special import log_ndtr
 
         sign = np.where(has_failed, 1.0, -1.0)
@@ -130,11 +130,11 @@ class _Probit:
         return sign * ratio, -ratio * (z + ratio)
 
     def log_density(self, x: Floats) -> Floats:
-        """Return the logarithm of the standard normal density."""
+        """Return the logarithm of the standard normal density at the linear predictor x."""
         return -0.5 * x * x - 0.5 * np.log(2.0 * np.pi)
 
     def density_derivatives(self, x: Floats) -> tuple[Floats, Floats]:
-        """Return first and second derivative of `log_density`."""
+        """Return first and second derivative of `log_density` by the linear predictor x."""
         return -x, np.full_like(x, -1.0)
 
 
@@ -171,7 +171,7 @@ class _ComplementaryLogLog:
         return failure_information + pass_information + upper_rate * upper_rate * np.exp(-upper_rate)
 
     def derivatives(self, x: Floats, has_failed: Bools) -> tuple[Floats, Floats]:
-        """Return first and second derivative of the log-probability of each outcome."""
+        """Return first and second derivative of the log-probability of each outcome by the linear predictor x."""
         rate = np.exp(np.clip(x, -_MAX_EXPONENT, 0.5 * _MAX_EXPONENT))
         first = _rate_ratio(rate)
         second = first * (1.0 - rate - first)
@@ -182,7 +182,7 @@ class _ComplementaryLogLog:
         return x - np.exp(np.minimum(x, _MAX_EXPONENT))
 
     def density_derivatives(self, x: Floats) -> tuple[Floats, Floats]:
-        """Return first and second derivative of `log_density`."""
+        """Return first and second derivative of `log_density` by the linear predictor x."""
         rate = np.exp(np.minimum(x, 0.5 * _MAX_EXPONENT))
         return 1.0 - rate, -rate
 

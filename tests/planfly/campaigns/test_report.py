@@ -311,10 +311,10 @@ def test_the_summary_comes_back_and_no_process_stays(base: CampaignBase, tmp_pat
         estimate = Estimator(GOAL).estimate(store.tally())
     children = multiprocessing.active_children()
     # The made flights come out otherwise when they are flown: the error of the other process is this one's.
-    with pytest.raises(Exception, match="flight 0 has a different outcome"):
+    with pytest.raises(Exception, match="flight 0 differs from the stored flight"):
         finish_campaign(base, GOAL, estimate, tmp_path, "planfly campaign x")
     assert multiprocessing.active_children() == children
-    with open_store(base, GOAL, tmp_path, resume=True) as store, pytest.raises(StoreError, match="held by another"):
+    with open_store(base, GOAL, tmp_path, resume=True) as store, pytest.raises(StoreError, match="locked by another"):
         finish_campaign(base, GOAL, estimate, tmp_path, "planfly campaign x")
 
 

@@ -246,7 +246,7 @@ def test_too_few_flights_show_no_sensitivities(base: CampaignBase, tmp_path: Pat
         assert [entry.rule for entry in summary.deciding] == ["clearance"]
         assert summary.deciding[0].sensitivities == ()
         assert (
-            "; at least 20 judged flights are needed to find what the margin depends on" in campaign_lines(summary)[-1]
+            ". At least 20 judged flights are needed to find what the margin depends on" in campaign_lines(summary)[-1]
         )
         assert "What the smallest margin depends on" not in campaign_page(base, summary, store, "").decode()
 
