@@ -426,12 +426,9 @@ def draw_go_no_go(
     name: str,
     wind: tuple[float, float] | None,
 ) -> Figure:
-    """Draw a polar chart, north up, of the winds in which a mission is flyable.
+    """Draw a polar chart, north up, of the winds in which a mission is flyable, up to `max_speed`, m/s.
 
-    max_speed: strongest wind of the chart, m/s.
-    target: required probability of a flyable flight.
-    confidence: confidence of the intervals, for the legend.
-    name: name of the mission, for the title.
+    target, confidence: required probability of a flyable flight, and confidence of the boundaries' intervals.
 
     wind: speed, m/s, and direction, degrees, of the scenario's wind, which is drawn as a star; or None.
     """
@@ -443,11 +440,10 @@ def draw_go_no_go(
         _draw_wind_areas(axes, directions, max_speed)
         for direction in directions:
             if direction.is_judged and direction.is_beyond_search:
-                marker = (3, 0, -direction.from_deg)
                 axes.plot(
                     np.radians(direction.from_deg),
                     max_speed,
-                    marker=marker,
+                    marker=(3, 0, -direction.from_deg),
                     color=QUIET_COLOUR,
                     markersize=7,
                     linewidth=0.0,

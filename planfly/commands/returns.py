@@ -33,8 +33,8 @@ def add_returns_parser(command_line: LineParser) -> None:
     """Add the parser of ``planfly returns``."""
     parser = command_line.add_command(
         "returns",
-        "simulate a return to launch from points all along the route: is each safe, where does it end and why; and"
-        " what can the aircraft reach without its engine",
+        "simulate a return to launch from points all along the route, state where each return ends and if it is safe,"
+        " and find what the aircraft can reach without its engine",
         "planfly returns mission.waypoints --terrain jacksboro --wind 5,250",
         "planfly returns flight.mcap --every 5 --out pictures",
         "planfly returns flight.mcap --sitl ./arduplane --points 5",

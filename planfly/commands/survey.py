@@ -26,7 +26,7 @@ def add_survey_parser(command_line: LineParser) -> None:
     """Add the parser of ``planfly survey``."""
     parser = command_line.add_command(
         "survey",
-        "fly a survey: how much of each photo line can be used, and what would help the lines that are lost",
+        "fly a survey, state how much of each photo line can be used, and suggest changes for the lines that are lost",
         "planfly survey field.plan --terrain dem.tif --aircraft x8 --autopilot ardupilot --wind 5,250",
         "planfly survey field.waypoints --suggest --out better",
     )

@@ -178,7 +178,7 @@ def test_a_flight_that_failed_by_an_unknown_margin_counts_as_beyond_the_limit(
         summary = summary_of_margins(base, tmp_path / name, flights)
         line = campaign_lines(summary)[-1]
         assert (
-            line == f"  decides slopes: {text}; none of the varied quantities has a significant effect on this margin"
+            line == f"  decides slopes: {text}. None of the varied quantities has a significant effect on this margin"
         )
         data = json.loads(summary_json(summary))
         assert (data["margin_of_one_in_twenty"], data["margin_unit"]) == (low_margin, "deg")
