@@ -366,8 +366,8 @@ def quantile_of_capacities(rows: tuple[EnergyRow, ...], goal: BatteryGoal) -> tu
     """Return the capacity that keeps the reserve with the goal's probability, Wh, and its confidence interval.
 
     The capacity is a quantile of the capacities that the flights need; its interval follows from order statistics.
-    Capacity or bound are inf if no battery is enough.  All are NaN if too few flights have a known energy to reach the
-    goal's probability.
+    The capacity or a bound is inf if no battery is enough.  All three are NaN if too few flights have a known energy to
+    reach the goal's probability.
     """
     from scipy import stats
 

@@ -368,7 +368,7 @@ def find_minimum_margins(findings: tuple[Finding, ...]) -> tuple[tuple[str, Mini
 
 
 def _missile_distance(findings: Iterable[Finding]) -> float | None:
-    """Return the smallest distance of a flight outside a missile's sphere, m; None if no finding states one."""
+    """Return the smallest distance of a flight outside the sphere of a missile's kill radius, m; None if unknown."""
     distances = (finding.nearest for finding in findings if finding.rule == "threat" and finding.nearest is not None)
     return min(distances, default=None)
 

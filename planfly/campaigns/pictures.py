@@ -429,7 +429,6 @@ def draw_go_no_go(
     """Draw a polar chart, north up, of the winds in which a mission is flyable, up to `max_speed`, m/s.
 
     target, confidence: required probability of a flyable flight, and confidence of the boundaries' intervals.
-
     wind: speed, m/s, and direction, degrees, of the scenario's wind, which is drawn as a star; or None.
     """
     with clean_style():

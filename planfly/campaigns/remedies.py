@@ -43,12 +43,12 @@ def _measured_remedies(rule: str, low_margin: float | None, scenario: Scenario) 
     shortfall = 0.0 if low_margin is None else max(0.0, -low_margin)
     if rule == "touchdown":
         # The strip is longer at both ends.
-        longer = _LENGTH_STEP_M * math.ceil(2.0 * shortfall / _LENGTH_STEP_M)
-        texts = [f"a strip that is {longer:.0f} m longer" if longer else "a longer strip"]
+        added_length = _LENGTH_STEP_M * math.ceil(2.0 * shortfall / _LENGTH_STEP_M)
+        texts = [f"a strip that is {added_length:.0f} m longer" if added_length else "a longer strip"]
         if scenario.landing is not None and scenario.landing.height_sd is None:
             texts.insert(0, "a survey of the strip's height ([landing] height_sd_m)")
         return [*texts, "another approach ([landing] course_deg, approach_m, slope_deg)"]
     if rule in _HEIGHT_RULES:
-        higher = f"{math.ceil(shortfall)} m higher" if shortfall else "higher"
-        return [f"a path that is {higher} above ground (plan with a larger [limits] min_clearance_m)"]
+        height_text = f"{math.ceil(shortfall)} m higher" if shortfall else "higher"
+        return [f"a path that is {height_text} above ground (plan with a larger [limits] min_clearance_m)"]
     return [_REMEDIES[rule]] if rule in _REMEDIES else []

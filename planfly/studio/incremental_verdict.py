@@ -157,9 +157,9 @@ def _judge_window(setup: FlightSetup, first: int, last: int, start: int) -> Wind
 
 
 def _is_in_window(finding: Finding, first: int, last: int) -> bool:
-    """Return True if a finding is on a leg or corner between two waypoints.
+    """Return True if a finding is on a leg or corner between two waypoints, or on any violated threat or zone.
 
-    The result is also True for any violated threat or zone.
+    first, last: numbers of the two waypoints in the judged part of the route.
     """
     place = finding.place
     if finding.ok is False and place.kind in ("missile", "exclusion", "inclusion"):

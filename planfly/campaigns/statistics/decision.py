@@ -147,7 +147,7 @@ class StoppingBound:
 
     @property
     def min_flights(self) -> int:
-        """Number of flights that reach the target without a failure."""
+        """Number of flights without a failure that reach the target."""
         return math.ceil((self._required_evidence + _MIXTURE_LOSS) / -math.log(self.target))
 
     @property
@@ -190,7 +190,10 @@ class StoppingBound:
         return _log_mixture(self.parts, successes, failures) - likelihood
 
     def excludes(self, successes: int, failures: int, p: float, *, above: bool) -> bool:
-        """Return True if p is excluded and lies below the fraction of successes; above it if `above` is False."""
+        """Return True if the success probability is proven to be above p, or below p if `above` is False.
+
+        p: tested success probability, 0 to 1.
+        """
         fraction = successes / max(1, successes + failures)
         is_beyond = fraction > p if above else fraction < p
         return is_beyond and self.evidence(successes, failures, p) >= self._required_evidence
@@ -308,7 +311,7 @@ class Estimator:
 
     @property
     def min_flights(self) -> int:
-        """Smallest number of flights that may decide."""
+        """Smallest number of flights that may decide the goal."""
         return self._bound.min_flights if self._bound is not None else self._goal.flights
 
     def decides(self, tally: Tally) -> bool:
@@ -332,7 +335,7 @@ class Estimator:
         too_few, enough = tally.flown, 2 * tally.flown
 
         def decides(flights: int) -> bool:
-            """Return True if this number of flights decides the target; rounding counts against a decision."""
+            """Return True if this number of flights decides the target; numbers are rounded against a decision."""
             is_above = target is not None and share >= target
             flyable = math.floor(share * flights + 1e-9) if is_above else math.ceil(share * flights - 1e-9)
             undecided = min(flights - flyable, math.ceil(flights * tally.undecided / tally.flown))

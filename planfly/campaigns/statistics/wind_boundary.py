@@ -464,7 +464,7 @@ class _ExpectedPosterior:
         return self._fit.weight * expected_gains
 
     def include_flight(self, row: Floats) -> None:
-        """Update the covariances with the information expected from a flight that is not flown yet.
+        """Update the covariances as if a flight with its expected information had been flown.
 
         row: terms of the flight, (2 + d,).
         """
