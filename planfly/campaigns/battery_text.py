@@ -156,11 +156,11 @@ def _mass_lines(result: BatteryResult) -> list[str]:
     if not math.isfinite(result.capacity):
         return []
     limit_text = (
-        f"; the assumed mass is at least {MIN_MASS_FACTOR:g} times this mass"
+        f"; the flights assume at least {MIN_MASS_FACTOR:g} times the present mass"
         if result.mass_factor == MIN_MASS_FACTOR
         else ""
     )
     return [
-        f"with this battery of {result.goal.specific_energy:g} Wh/kg the aircraft weighs"
-        f" {result.mass * result.mass_factor:.2f} kg (now {result.mass:.2f} kg{limit_text})"
+        f"at {result.goal.specific_energy:g} Wh/kg the aircraft weighs {result.mass * result.mass_factor:.2f} kg with"
+        f" this battery, instead of {result.mass:.2f} kg{limit_text}"
     ]

@@ -181,9 +181,7 @@ def _notes(tables: list[dict[str, NDArray[Any]]], settings: list[dict[str, Any]]
             " have"
         )
     if undecided_count := sum(table["outcome"].tolist().count("undecided") for table in tables):
-        notes.append(
-            f"{count_text(undecided_count, 'flight')} not judged in full: the difference counts them as not flyable"
-        )
+        notes.append(f"the difference counts {count_text(undecided_count, 'flight')} not judged in full as not flyable")
     if any(setting.get("stops") or setting.get("changed") for setting in settings):
         notes.append(
             "the number of flights of a campaign was not fixed beforehand, so the interval of the difference is only"

@@ -287,7 +287,8 @@ def _parse_quantity(quantity: Quantity, quantity_table: Any, name: str) -> Varyi
     if not fraction >= MIN_FRACTION_INSIDE:
         allowed = (
             f"only {100.0 * fraction:.1f} % of the distribution lies within {quantity.low:g}..{quantity.high:g}"
-            f" {quantity.unit or 'times the nominal value'}; at least {100.0 * MIN_FRACTION_INSIDE:.0f} % must"
+            f" {quantity.unit or 'times the nominal value'}; at least {100.0 * MIN_FRACTION_INSIDE:.0f} % must lie"
+            " there"
         )
         raise SpreadError.at(name, quantity.name, _call_text(varying), allowed)
     return varying

@@ -186,9 +186,9 @@ class WindsResult:
             elif is_calm or not needs_more_flights(boundary, count, BOUNDARY_ACCURACY_MPS, MIN_FLIGHTS_PER_DIRECTION):
                 reasons.append("")
             elif count < MIN_FLIGHTS_PER_DIRECTION:
-                reasons.append(f"{count_text(count, 'flight')} of at least {MIN_FLIGHTS_PER_DIRECTION}")
+                reasons.append(f"{count} of at least {count_text(MIN_FLIGHTS_PER_DIRECTION, 'flight')}")
             else:
-                reasons.append(f"an interval of {boundary.width:.2f} m/s; at most {max_width:g} m/s is required")
+                reasons.append(f"interval {boundary.width:.2f} m/s wide; at most {max_width:g} m/s is required")
         return tuple(reasons)
 
     @property

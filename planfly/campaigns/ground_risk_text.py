@@ -118,7 +118,7 @@ def _flight_lines(result: GroundRiskResult) -> list[str]:
         )
     spread = result.base.dispersions.name
     setup = result.base.nominal_setup()
-    returns_text = f"; returns to launch by {returning_title(setup)}'s rules every {result.goal.interval:g} s"
+    returns_text = f"; a return to launch by {returning_title(setup)}'s rules starts every {result.goal.interval:g} s"
     if setup.mission.home is None:
         returns_text = ", without returns to launch"
     lines.append(f"{count_text(len(result.rows), 'flight')} with {spread}, seed {result.base.seed}{returns_text}")

@@ -194,7 +194,7 @@ def draw_probability(bins: Sequence[SpeedBin], target: float | None) -> Figure:
         axes.set_xlabel("mean wind at the start's height (m/s)")
         axes.set_ylabel("share of flyable flights")
         axes.set_title(
-            "Probability against wind speed: line, share of flyable flights; band, Wilson interval; numbers, flights"
+            "Probability against wind speed (line: share of flyable flights; band: Wilson interval; numbers: flights)"
         )
         _style_axes(axes)
     return figure
@@ -358,7 +358,7 @@ def draw_crossings(crossings: Floats, has_failed: NDArray[np.bool_]) -> Figure:
             axes.set_xlim(-half_size, half_size)
             axes.set_ylim(-half_size, half_size)
             axes.tick_params(labelsize=7)
-        title = "Where flights crossed each waypoint, m right of and above it, with the ellipse of 95 %"
+        title = "Flights at each waypoint, m to the right and above, with the 95 % ellipse"
         figure.text(0.07, 1.0 - 0.3 / height, title, fontsize=11, color=INK_COLOUR)
         figure.text(0.98, 1.0 - 0.3 / height, "dot: flyable, cross: not", fontsize=8, color=QUIET_COLOUR, ha="right")
     return figure

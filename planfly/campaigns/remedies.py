@@ -16,7 +16,7 @@ _REMEDIES = {
     "slope": "gentler legs (smaller values of [limits] max_climb_deg and max_dive_deg)",
     "speed": "a lower cruise airspeed",
     "stall": "a higher cruise airspeed",
-    "threat": "more distance to missiles (plan with larger kill radii than the flight is judged with)",
+    "threat": "more distance to missiles (plan with larger kill radii than those that judge the flight)",
     "turn": "gentler turns (a smaller value of [limits] max_turn_deg) or fewer waypoints",
 }
 # Rules whose margin is a height above ground, m.

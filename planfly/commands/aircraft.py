@@ -207,7 +207,7 @@ def _print_parameters(args: argparse.Namespace) -> None:
     values_text = ", ".join(stated.texts.values()) or "no value differs from its default"
     print(f"  params   {args.params}: {values_text}")
     if overridden := overridden_texts(vars(args), stated):
-        print(f"  params   the data sheet applies instead of {', '.join(overridden)}")
+        print(f"  params   the data sheet overrides {', '.join(overridden)}")
 
 
 def _identify(args: argparse.Namespace) -> int:
@@ -280,7 +280,10 @@ def _print_uncertain_properties(result: "planfly.IdentifiedAircraft") -> None:
     if not result.estimate.dynamics:
         print("  performance only: moments need at least 10 rows of inertial sensors and of outputs per second")
     for log in result.slow:
-        print(f"  rows     {log.source}: {log.hertz:.1f} a second of sensors or outputs; {log.setting} records more")
+        print(
+            f"  rows     {log.source}: {log.hertz:.1f} rows of sensors or outputs per second;"
+            f" {log.setting} records more"
+        )
     if result.conflict is not None:
         print(f"  conflict {result.conflict.text}")
     for wide_number in result.wide:

@@ -232,7 +232,7 @@ def _repeat_flight(args: argparse.Namespace, folder: Path) -> int:
                 f"{option}: cannot be combined with --refly, which flies a single flight", field=option, value=target
             )
     flight = call_api(planfly.campaign_flight, args, index=args.refly, out=folder)
-    print(f"flight {args.refly}: {flight.row.outcome}, ended: {flight.row.ended}, as in the table")
+    print(f"flight {args.refly}: {flight.row.outcome}, ended: {flight.row.ended} (as in the campaign's table)")
     if flight.row.undecided_text:
         print(f"  Not judged: {flight.row.undecided_text}")
     for rule, place in flight.row.failures:

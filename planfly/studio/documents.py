@@ -301,7 +301,7 @@ def _format_losses(context: EditContext, mission: Mission, text: str, name: str,
     threats, zones = len(context.scenario.threats), len(context.scenario.zones)
     world_contents = [count_text(count, noun) for count, noun in ((threats, "threat"), (zones, "zone")) if count]
     if world_contents:
-        losses.append(f"the scenario's {' and '.join(world_contents)}: planfly export writes a fence of them")
+        losses.append(f"the scenario's {' and '.join(world_contents)}: planfly export writes them as a fence")
     return tuple(losses)
 
 
@@ -347,7 +347,7 @@ def _saved_plan(name: str, context: EditContext, judged_mission: JudgedMission) 
     has_changed_items = (
         not context.planned or planned_mission(new_plan, context.uav).items != judged_mission.mission.items
     )
-    losses = ["the items: a plan stores only positions, and its mission is made from them"] if has_changed_items else []
+    losses = ["the items, because a plan stores only positions"] if has_changed_items else []
     if new_plan.failures:
         losses.append(f"the plan is not feasible: {new_plan.failures[0]}")
     elif new_plan.unmet_margins:

@@ -126,7 +126,7 @@ def test_undecided_flights_fail_no_rule_and_are_noted(base: CampaignBase, tmp_pa
     found = planfly.compare_campaigns(first, tmp_path / "b")
     assert found.second.tally == Tally(17, 0, 0, 3)
     assert found.rules == []
-    assert "3 flights not judged in full: the difference counts them as not flyable" in found.notes
+    assert "the difference counts 3 flights not judged in full as not flyable" in found.notes
 
 
 def _made(folder: Path) -> Path:

@@ -129,7 +129,7 @@ def test_a_direction_in_which_every_flight_fails_does_not_fail_the_mission_in_ca
     found = search.result()
     assert found.calm is None
     assert found.answer == "not judged"
-    assert found.reasons[2] == "10 flights of at least 150"
+    assert found.reasons[2] == "10 of at least 150 flights"
     lines = wind_lines(found)
     assert lines[0].startswith("not judged: 4 of 4 directions have too few flights (6 to 10 flights)")
     assert lines[1] == (

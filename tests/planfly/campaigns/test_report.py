@@ -208,7 +208,7 @@ def test_the_rule_that_decides_is_named_for_each_direction(base: CampaignBase, t
     assert rules == [[("clearance", 3), ("slope", 4)], [("slope", 3)], [("clearance", 3), ("slope", 3)], []]
     assert directions[1]["failed_by_rule"][0]["places"][0]["where"] == "leg 4"
     page = (tmp_path / "winds.html").read_text()
-    cells = re.findall(r'<td class="n">([a-z]*)</td><td class="n">no: [^<]* of at least 150</td></tr>', page)
+    cells = re.findall(r'<td class="n">([a-z]*)</td><td class="n">no: [^<]* of at least 150 flights</td></tr>', page)
     assert cells == ["slopes", "slopes", "clearance", ""]
 
 
@@ -237,7 +237,7 @@ def test_directions_for_which_flights_did_not_last_are_said() -> None:
     assert wind_lines(fewer)[0].startswith("not judged: 1 of 1 direction has too few flights")
     flights = (*settled.flights, *((1, *flight[1:]) for flight in settled.flights))
     wide = replace(settled, boundaries=(boundary, WindBoundary(7.0, 6.5, 7.5, False)), flights=flights)
-    assert wide.reasons == ("", "an interval of 1.00 m/s; at most 0.5 m/s is required")
+    assert wide.reasons == ("", "interval 1.00 m/s wide; at most 0.5 m/s is required")
     assert (wide.judged, wide.answer) == ((True, False), "not judged in full")
     assert repr(wide) == "<WindsResult 2 directions, 1 of them not judged, 7.0 m/s the lowest; 300 flights>"
     assert wind_lines(wide)[0].startswith("not judged in full: 1 of 2 directions has too few flights")
@@ -251,7 +251,7 @@ def test_the_cases_of_continuous_integration_are_the_answer_and_each_direction()
     assert [(case.name, case.result) for case in directions] == [
         (f"from {angle}°", "skipped") for angle in (0, 90, 180, 270)
     ]
-    assert directions[0].message == "not judged: 2 flights of at least 150"
+    assert directions[0].message == "not judged: 2 of at least 150 flights"
     settled = tuple((k, 5.0, True) for k in range(4) for _ in range(MIN_FLIGHTS_PER_DIRECTION))
     narrow = tuple(WindBoundary(5.0, 4.9, 5.1, False) for _ in range(4))
     judged = winds_suite("m", replace(FOUND, flights=settled, boundaries=narrow))
@@ -279,8 +279,8 @@ def test_data_picture_and_page(base: CampaignBase, tmp_path: Path) -> None:
     assert data["directions"][3]["beyond"] is True
     assert (data["answer"], data["reason"]) == ("not judged", wind_lines(FOUND)[0])
     assert [(one["judged"], one["reason"]) for one in data["directions"]] == [
-        (False, "2 flights of at least 150"),
-        *[(False, "1 flight of at least 150")] * 3,
+        (False, "2 of at least 150 flights"),
+        *[(False, "1 of at least 150 flights")] * 3,
     ]
     assert data["lost"] == [1]
     assert (tmp_path / "winds.png").read_bytes()[:4] == b"\x89PNG"

@@ -184,7 +184,7 @@ def test_what_one_threat_and_a_map_lack_is_said_in_the_singular(
     session, _ = open_session("m.waypoints", MissionOptions(scenario="s.toml"))
     session.edit(messages.Raise(kind="raise", rev=session.rev, by=10.0))
     losses = session.save("waypoints").losses
-    assert losses == ("the scenario's 1 threat: planfly export writes a fence of them",)
+    assert losses == ("the scenario's 1 threat: planfly export writes them as a fence",)
     assert session.save("kml").losses == (
         "the commands, speeds and frames of the items, because the file is only a map",
     )
