@@ -86,14 +86,14 @@ def mission_findings(setup: FlightSetup) -> list[Finding]:
     ]
 
 
-# Remark of a check: verdict, item (None for the whole mission), and reason.  A refusal by PX4 is a verdict only
-# if PX4 is to fly.
+# Remark of a check: result, item (None for the whole mission), and reason.  The result "refused" fails if PX4 is to
+# fly; otherwise it is undecided.
 REFUSED: Literal["refused"] = "refused"
 _Remark = tuple[bool | Literal["refused"] | None, int | None, str | Message]
 
 
 def _universal_findings(remarks_by_check: list[list[_Remark]]) -> list[Finding]:
-    """Return a finding for each of PX4's checks that fails for every autopilot, without PX4's name for it.
+    """Return a finding for each check that fails for every autopilot; the finding does not name PX4's function.
 
     Items that only PX4 refuses are left out, because they do not concern a mission that ArduPlane flies.
     """
@@ -120,13 +120,14 @@ def _universal_findings(remarks_by_check: list[list[_Remark]]) -> list[Finding]:
 
 
 def _check_finding(check: str, remarks: list[_Remark], refuses: bool) -> Finding:
-    """Merge the remarks of a check into one finding.
+    """Merge the remarks of a check into one finding, with the reason of the gravest remark.
 
-    refuses: True if PX4 is to fly: items that it refuses then fail.
+    check: name of PX4's function.
+    refuses: True if PX4 is to fly; items that it refuses then fail.
     """
     refusal_result = False if refuses else None
     sorted_remarks = [(refusal_result if ok == REFUSED else ok, item, reason) for ok, item, reason in remarks]
-    # A failure comes first, then PX4's refusals, then mere remarks.
+    # Failures come first, then undecided remarks, then mere notes.
     sorted_remarks.sort(key=lambda remark: {False: 0, None: 1, True: 2}[remark[0]])
     ok, item, reason = sorted_remarks[0] if sorted_remarks else (True, None, "no objections")
     first_message = reason if isinstance(reason, Message) else message(reason)
@@ -144,7 +145,7 @@ def _check_finding(check: str, remarks: list[_Remark], refuses: bool) -> Finding
 
 
 def _arduplane_refusal_findings(setup: FlightSetup) -> list[Finding]:
-    """Return a finding on items that ArduPlane refuses at upload but PX4 accepts; [] for other autopilots."""
+    """Return one finding on the items that ArduPlane refuses at upload but PX4 accepts; [] for other autopilots."""
     refused_items = [
         item
         for item in setup.mission.items
@@ -185,7 +186,8 @@ def _unjoined_finding(setup: FlightSetup) -> Finding:
     more_text = f" (+{len(other_stops)} more)" if other_stops else ""
     fault = message(
         reason,
-        f": {autopilot} flies {('it anyway' if first_stop.is_circle else 'there')}, which is not judged{more_text}",
+        f": {autopilot} flies {('it anyway' if first_stop.is_circle else 'there')}, on a path that is not judged"
+        f"{more_text}",
     )
     return make_finding(
         "mission",
@@ -264,7 +266,7 @@ def _unsimulated_findings(setup: FlightSetup) -> Iterator[Finding]:
             remarks += [
                 (
                     item.seq,
-                    "the ground speed that DO_CHANGE_SPEED sets is not used in returns to launch: they are judged with"
+                    "the ground speed that DO_CHANGE_SPEED sets is not used in returns to launch; they are judged with"
                     " the parameter MIN_GROUNDSPEED",
                 )
                 for item in setup.mission.items
@@ -287,7 +289,7 @@ def _unsimulated_findings(setup: FlightSetup) -> Iterator[Finding]:
         texts = [*texts, unflown_radius]
     settings = [(None, text) for text in texts]
     for seq, text in [*remarks, *settings]:
-        # What can be done about it is not part of the headline.
+        # The text after "; " is an explanation, which is not part of the headline.
         brief, separator, explanation = text.partition("; ")
         yield make_finding(
             "mission",
@@ -315,7 +317,9 @@ def _mission_parts(setup: FlightSetup) -> MissionParts:
         has_return_path=C.DO_RETURN_PATH_START in commands,
         takes_off=procedures.take_off is not None,
         lands=procedures.approach is not None,
-        loiters_to_land=any(a.command == C.NAV_LOITER_TO_ALT and b.command in LANDINGS for a, b in pairs),
+        loiters_to_land=any(
+            item.command == C.NAV_LOITER_TO_ALT and next_item.command in LANDINGS for item, next_item in pairs
+        ),
         has_fence=bool(setup.mission.fences),
         fence_at_home=_home_fence_violation(setup),
         smallest_inclusion=min(
@@ -350,7 +354,7 @@ def _rally_distance(mission: Mission) -> float:
 
 
 def _home_fence_violation(setup: FlightSetup) -> str:
-    """Describe how home violates the mission's fence, such as "inside an exclusion polygon"; else return ""."""
+    """Describe how home violates the mission's fence, such as "inside an exclusion polygon"; "" if it does not."""
     mission, checks = setup.mission, setup.autopilot.checks
     if mission.home is None or not mission.fences:
         return ""
@@ -360,7 +364,7 @@ def _home_fence_violation(setup: FlightSetup) -> str:
 
 
 def _full_voltage(setup: FlightSetup) -> float:
-    """Return the voltage of the full battery, V; inf without a battery or for a guessed battery."""
+    """Return the voltage of the full battery, V; inf if the aircraft has no battery or a guessed one."""
     cells = 0 if setup.envelope.battery_guessed else round(setup.envelope.volts / NOMINAL_CELL_VOLTAGE_V)
     return cells * FULL_CELL_VOLTAGE_V if cells else math.inf
 
@@ -384,8 +388,8 @@ _PX4_LOCATED_COMMANDS = frozenset(
 def _check_validity(mission: Mission, refuses: bool) -> Iterator[_Remark]:
     """Yield a remark on each item that PX4 refuses at upload.
 
-    refuses: True if PX4 is to fly.  Only then a command without coordinates in a frame with coordinates is reported,
-        because every Mission Planner file contains such commands.
+    refuses: True if PX4 is to fly.  Only then are commands without coordinates in a frame with coordinates reported,
+        because every file of Mission Planner contains such commands.
     """
     for item in mission.items:
         name, support = command_name(item.command), command_support(item.command)
@@ -533,7 +537,7 @@ def _check_gates(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
 
 
 def _check_distances(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
-    """Yield remarks on gates too close to a waypoint, and on the longest leg if older PX4 releases refuse it."""
+    """Yield remarks on gates too close to a waypoint, and on the longest distance if older PX4 releases refuse it."""
     yield from _check_gates(mission, origin)
     flown_items = _flown_items(mission)
     if len(flown_items) < 2:
@@ -546,7 +550,7 @@ def _check_distances(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
         yield (
             True,
             flown_items[k + 1].seq,
-            f"{reason} {PX4_WAYPOINT_SPACING_M:.0f} m by default, newer ones have no limit",
+            f"{reason} {PX4_WAYPOINT_SPACING_M:.0f} m by default; newer releases have no limit",
         )
 
 
@@ -557,7 +561,7 @@ def _check_home_altitude(mission: Mission) -> Iterator[_Remark]:
     """
     for item in _flown_items(mission):
         if item.frame in OVER_HOME and mission.home is None:
-            reason = "the file has heights above home but no home: PX4 refuses them until the vehicle has a home"
+            reason = "the file has heights above home but no home; PX4 refuses them until the vehicle has a home"
             yield None, item.seq, reason
             return
         if _height_above_home(mission, item) < 0.0:

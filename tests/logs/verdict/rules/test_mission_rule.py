@@ -368,7 +368,7 @@ def test_what_no_tangent_joins_to_a_circle_fails_where_the_autopilot_flies_there
     ((item, reason, ok),) = found
     assert (item, ok, verdict.flyable) == (expected[0], False, False)
     assert reason.startswith(expected[1])
-    assert reason.endswith("which is not judged")
+    assert reason.endswith("on a path that is not judged")
     # planfly's own guidance flies on tangents, and leaves it out with a note.
     assert not setup_of(wp(0, -3000, 300), *lines).route.unjoined_stops
 
