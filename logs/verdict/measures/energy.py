@@ -30,7 +30,7 @@ def leg_energies(requirements: RouteRequirements) -> tuple[list[float], float]:
     if not np.isfinite(requirements.ground_speed).all():
         return [math.nan] * requirements.legs, math.nan
     energies, peak_power = [], 0.0
-    # The legs of a loiter's laps are equal: compute the power of each only once.
+    # The laps of a loiter have equal legs, so each power is computed only once.
     power_at = cache(envelope.power)
     leg_durations = np.bincount(
         requirements.path.legs, weights=np.diff(requirements.path.times), minlength=requirements.legs
@@ -74,5 +74,7 @@ def reason_not_to_start(requirements: RouteRequirements) -> str:
         return ""
     energy_ratio = predicted_energy(requirements)[0] / setup.battery
     return (
-        f"not started: it takes {energy_ratio:.0f} times the energy carried" if energy_ratio > MAX_ENERGY_RATIO else ""
+        f"not started: the mission needs {energy_ratio:.0f} times the energy carried"
+        if energy_ratio > MAX_ENERGY_RATIO
+        else ""
     )

@@ -14,9 +14,9 @@ _CELLS = 150
 
 @dataclass(frozen=True, slots=True)
 class FlightHeight:
-    """Height of a flight, at which its link is mapped.
+    """Height at which the radio link of a flight is mapped.
 
-    value: m.
+    value: height or altitude, m.
     is_above_ground: True for a height above ground, False for an altitude above mean sea level.
     """
 
@@ -75,7 +75,7 @@ def link_coverage(
 ) -> LinkCoverage:
     """Compute the margin of a radio link in every cell of a map.
 
-    In the ground and above unknown ground there is no margin (NaN).
+    The margin is NaN where the ground is unknown or above the aircraft.
 
     antenna: position of the station's antenna, m, (3,).
     extent: east and north range of the map, m.
