@@ -97,7 +97,7 @@ class Verdict:
 
     @property
     def flies(self) -> bool:
-        """True if the verdict is flyable, or is complete and leaves only departure, approach or returns open.
+        """True if the verdict is flyable, or is complete and undecided only in climb-out, approach or returns.
 
         >>> from dataclasses import replace
         >>> from logs.verdict.findings import GROUND_PATH, make_finding
