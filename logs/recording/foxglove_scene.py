@@ -116,14 +116,14 @@ def log_message(time_ns: int, text: str, level: str, name: str = "planfly") -> L
 
 
 def terrain_scene(time_ns: int, scenario: Scenario) -> bytes:
-    """Encode the ground of the scenario's area as a coloured mesh with at most `MAX_VERTICES` vertices per side."""
+    """Encode the ground of the area as a coloured mesh with up to `MAX_VERTICES` vertices per side."""
     entity = _entity(time_ns, "terrain")
     mesh = b"" if scenario.terrain is None else _encode_mesh(scenario.terrain, scenario.bounds)
     return length_delimited(2, entity.SerializeToString(deterministic=True) + mesh)
 
 
 def _terrain_mesh(terrain: Terrain, bounds: Floats) -> tuple[Floats, Floats, NDArray[np.bool_]]:
-    """Return the vertices of the ground's mesh (m, (n, m, 3)), their colours ((n, m, 3)), and a mask (n, m).
+    """Return vertices (m) and colours of the ground's mesh, (n, m, 3) each, and a mask (n, m).
 
     The mask is True for vertices with known height.
     """
@@ -146,7 +146,7 @@ def _terrain_mesh(terrain: Terrain, bounds: Floats) -> tuple[Floats, Floats, NDA
 
 
 def terrain_points(scenario: Scenario) -> tuple[Floats, Floats]:
-    """Return the vertices of the terrain mesh with known height (m, (n, 3)), and their colours (0..1, (n, 3))."""
+    """Return the mesh's vertices of known height (m) and their colours (0..1), (n, 3) each."""
     if scenario.terrain is None:
         return np.zeros((0, 3)), np.zeros((0, 3))
     points, colours, is_known = _terrain_mesh(scenario.terrain, scenario.bounds)
@@ -196,7 +196,7 @@ def threats_scene(time_ns: int, threats: Threats, terrain: Terrain | None) -> by
 
 
 def _label_position(position: Floats, terrain: Terrain | None) -> Floats:
-    """Return a label's position above a point and above the highest known ground around it: east, north, up, m."""
+    """Return a label's position above a point and the highest known ground around it, m, (3,)."""
     east, north, up = (float(value) for value in position)
     top_altitude = up
     if terrain is not None:
@@ -308,7 +308,7 @@ def zones_scene(time_ns: int, scenario: Scenario, waypoints: Floats) -> bytes:
 
 
 def returns_scene(time_ns: int, drawn_returns: DrawnReturns, terrain: Terrain | None) -> bytes:
-    """Encode the path coloured by the outcomes of returns from it, the worst returns, and the glide footprint.
+    """Encode the path coloured by the outcome of returns, the worst returns, and the footprint.
 
     The coloured line is drawn below the path, so that plan and track stay visible.
     """
@@ -447,7 +447,7 @@ def aircraft_glb() -> bytes:
 
 
 def aircraft_scene(time_ns: int) -> bytes:
-    """Encode the aircraft model as a SceneUpdate in the aircraft's frame, which the transforms of the log move."""
+    """Encode the aircraft model in the aircraft's frame, which the log's transforms move."""
     model = ModelPrimitive(
         pose=Pose(position=Vector3(), orientation=Quaternion(x=0.0, y=0.0, z=0.0, w=1.0)),
         scale=Vector3(x=MODEL_SPAN_M, y=MODEL_SPAN_M, z=MODEL_SPAN_M),

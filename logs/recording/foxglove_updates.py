@@ -60,7 +60,7 @@ class GrowingTrack:
         self._count = 0
 
     def add(self, position: Floats) -> Floats:
-        """Add the next position, m, (3,), and return the track so far, thinned to at most `MAX_POINTS` points, (n, 3).
+        """Add the next position, m, (3,), and return the track so far, thinned to `MAX_POINTS` points.
 
         Call this every `TRACK_INTERVAL_S`.  The returned array is valid only until the next call.
 
@@ -110,7 +110,7 @@ _CHECK_INTERVAL_NS = 200_000_000
 
 
 class FlightEvents:
-    """Converter of flight events to Log messages; the messages do not depend on the split of the rows into blocks."""
+    """Converter of flight events to Log messages, independent of the split of rows into blocks."""
 
     def __init__(self, setup: FlightSetup, channel: int) -> None:
         """Prepare for the flight of a setup.
@@ -153,7 +153,7 @@ class FlightEvents:
             self._inside[kind] = is_inside[-1]
 
     def _leg_text(self, leg: int) -> str:
-        """Describe the start of a leg: number of the leg, waypoint to which it leads, and that waypoint's item."""
+        """Describe the start of a leg: its number, and the waypoint and item to which it leads."""
         route, waypoint = self._route, leg + 1
         if not 0 <= waypoint < len(route.items):
             return f"leg {leg}"
@@ -295,7 +295,7 @@ def threats_cloud(time_ns: int, threats: Threats) -> bytes:
 
 
 def points_along_legs(waypoints: Floats) -> Floats:
-    """Return evenly spaced points on the legs between waypoints (m, (w, 3)), including the waypoints, m, (n, 3)."""
+    """Return evenly spaced points, m, (n, 3), on the legs between waypoints (w, 3), which are included."""
     lengths = np.sqrt((np.diff(waypoints, axis=0) ** 2).sum(axis=1))
     spacing = max(_POINT_SPACING_M, float(lengths.sum()) / _MAX_SAMPLES)
     legs = [

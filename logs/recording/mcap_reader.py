@@ -116,8 +116,9 @@ def _read_sections(file: BinaryIO, container: Container) -> Iterator[bytes]:
 
 
 def _check_data_section(file: BinaryIO, crc: int, start: int) -> None:
-    """Check the CRC of the data section before its records outside chunks are used; raise _Damage if it differs.
+    """Check the CRC of the data section before its records outside chunks are used.
 
+    Raises _Damage if it differs.
     crc: CRC of the section up to byte `start`; the part after it is read twice.
     """
     resume_position = file.tell()

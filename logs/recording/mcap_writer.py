@@ -117,7 +117,7 @@ class _ChunkIndex(NamedTuple):
 
 
 class ContainerWriter:
-    """Writer of a container: magic and header, then attachments and chunks, and the summary at `write_end`."""
+    """Writer of a container: header, attachments and chunks, then the summary by `write_end`."""
 
     def __init__(self, file: BinaryIO, profile: str, level: int = 3) -> None:
         """Begin a container in an empty file open for writing.
@@ -528,8 +528,9 @@ def _copy_messages(entries: Entries, rows: Bytes, blob: Bytes, prefix: Bytes) ->
 def _index_messages(
     entries: Entries, firsts: Ints, prefix_size: int, max_channel: int
 ) -> tuple[Bytes, Chunks, ChannelIndexes]:
-    """Encode the message index records of each chunk by channel; return them with `chunks` and `channels` of `Layout`.
+    """Encode the message index records of each chunk by channel; return them, chunks and channels.
 
+    The chunks and channels are those of `Layout`.
     entries: messages, (n,) of `ENTRY`.
     firsts: index of each chunk's first message, followed by n.
     prefix_size: size of the bytes before the first message.

@@ -292,7 +292,7 @@ class _MessageCollector:
 
 @checks_types
 def read_log(path: Path | str) -> FlightLog:
-    """Read a flight log; a damaged or unfinished log is read up to the damage, and its `complete` is False.
+    """Read a flight log; a damaged or unfinished log is read up to the damage (`complete` is False).
 
     Raises LogError, in one line, for a file that is missing, empty, not an MCAP file or not a planfly log, or that
     contains no complete second of flight.
@@ -390,7 +390,7 @@ def _usable_rows(rows: StateRecords, waypoint_count: int) -> tuple[StateRecords,
 
 
 def _read_result(attachments: dict[str, bytes], row_count: int) -> tuple[str | None, str]:
-    """Return the recorded reason for the flight's end (None if unknown), and the fault of the result ("" if none).
+    """Return the reason for the flight's end (None if unknown), and the fault of the result or "".
 
     row_count: number of rows in the log; the result has a fault if it states another number.
     """
@@ -423,7 +423,7 @@ def _read_verdict(attachments: dict[str, bytes]) -> tuple[dict[str, Any] | None,
 
 
 def _read_reference(attachments: dict[str, bytes]) -> tuple[ReferenceFlights | None, str]:
-    """Return the results of reference flights (None without any), and the fault of their attachment ("" if none)."""
+    """Return the results of reference flights or None, and the fault of their attachment or ""."""
     if REFERENCE_FILE not in attachments:
         return None, ""
     try:

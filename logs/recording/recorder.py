@@ -85,7 +85,7 @@ _CHANNELS: dict[str, Any] = {
 
 
 class Recorder:
-    """Writer of a flight log; a context manager, so that a flight that raises leaves a readable, unfinished file.
+    """Writer of a flight log; as a context manager, it leaves a readable file if the flight raises.
 
     The setup is written first; then each whole second of flight is passed to the operating system, so that a killed
     process loses at most the last second.
@@ -220,7 +220,7 @@ class Recorder:
         reference: ReferenceFlights | None = None,
         returns: DrawnReturns | None = None,
     ) -> None:
-        """Write the reason for the flight's end, the verdict, reference flights and returns, and close the file."""
+        """Write the end of the flight, the verdict, reference flights and returns, and close the file."""
         if self._skipped_row is not None:
             self._append_rows(self._skipped_row)
             self._skipped_row = None
@@ -332,7 +332,7 @@ INTERRUPTED = "interrupted"
 
 
 class CrashSafeRecorder(Recorder):
-    """Recorder that leaves a valid log if Ctrl-C interrupts the flight, and locks the log against other processes.
+    """Recorder that leaves a valid log after Ctrl-C, and locks the log against other processes.
 
     The log of an interrupted flight ends with the last flown row and has no verdict; `planfly check` can judge it.  A
     log without rows is removed.  After any other error, the log stays unfinished, and `planfly recover` can read its

@@ -95,7 +95,7 @@ _MAX_PART_HEIGHTS = 4 * 2**20
 
 
 class _TerrainFile(SetupModel):
-    """Content of `terrain.json`: size, source and position of the terrain, and the names of its height parts."""
+    """Content of `terrain.json`: size, source and position of the terrain, and its height parts."""
 
     model_config = ConfigDict(validate_by_name=True, validate_by_alias=True)
     file_schema: Annotated[str, Field(alias="schema", pattern=f"^{TERRAIN_SCHEMA}$")] = TERRAIN_SCHEMA
@@ -184,7 +184,7 @@ def _pack_heights(heights: NDArray[np.float32]) -> bytes:
 
 
 def _unpack_heights(data: bytes, rows: int, cols: int, name: str) -> NDArray[Any]:
-    """Decompress the result of `_pack_heights`; raise LogError if the data are damaged or have another size."""
+    """Decompress the result of `_pack_heights`; raise LogError for damaged data or another size."""
     size = rows * cols * 4
     try:
         # The reader limits the size; decompress() would trust the size that the data declare.
@@ -198,7 +198,7 @@ def _unpack_heights(data: bytes, rows: int, cols: int, name: str) -> NDArray[Any
 
 
 def _check_coefficients(rows: list[list[float]], source: str) -> NDArray[np.float64]:
-    """Return the coefficients of the map to pixels as an array; raise LogError for an invalid shape or half-width."""
+    """Return the coefficients of the map to pixels as an array; raise LogError for invalid ones."""
     size = len(rows[0])
     if len(rows) != 2 + 2 * size or any(len(row) != size for row in rows) or size < 2:
         shape_text = f"{len(rows)} rows of {size}"

@@ -142,7 +142,7 @@ class MissionTable(SetupModel):
 
 
 class RouteTable(SetupModel):
-    """A `Route` as a table: the fields of its points are columns with one value per waypoint, or leg for airspeed."""
+    """A `Route` as a table: one column per field of its points, one value per waypoint (airspeed: leg)."""
 
     name = "route"
     position: Annotated[list[_Position], Field(min_length=2, alias="waypoints_east_north_amsl_m"), _LISTED]
@@ -172,7 +172,7 @@ class RouteTable(SetupModel):
     @model_validator(mode="before")
     @classmethod
     def _columns_of_points(cls, value: Any) -> Any:
-        """Return the fields of a `Route` by name, with its points as columns; return any other value unchanged."""
+        """Return the fields of a `Route` by name, its points as columns; return other values unchanged."""
         if not isinstance(value, Route):
             return value
         columns = {name: value.points[name] for name in field_names(ROUTE_POINT)} | {"airspeed": value.leg_airspeeds}

@@ -191,7 +191,7 @@ def state_schema() -> bytes:
 
 
 def file_descriptor_set(descriptor: "Descriptor") -> bytes:
-    """Return the serialized FileDescriptorSet of a message, with each file after the files that it imports."""
+    """Return the serialized FileDescriptorSet of a message; each file comes after its imports."""
     files: dict[str, FileDescriptor] = {}
 
     def visit(file: "FileDescriptor") -> None:

@@ -38,7 +38,7 @@ _AIRSPEED_SOURCE_TEXTS: dict[AirspeedSource, str] = {
 
 @dataclass(frozen=True, slots=True)
 class Conditions(DocumentConfig):
-    """Conditions of a verdict or a plan; fields that the log of an imported flight does not state are None."""
+    """Conditions of a verdict or a plan; None for a field that the log of an imported flight lacks."""
 
     aircraft: str
     """Name or folder of the aircraft; empty for an imported flight without a named aircraft."""
@@ -131,7 +131,7 @@ def _airspeed_source(scenario: Scenario, autopilot: Autopilot) -> AirspeedSource
 
 
 def judging_conditions(setup: FlightSetup) -> Conditions:
-    """Return the conditions (aircraft, airspeed, wind, autopilot) under which a mission or a flight is judged."""
+    """Return the conditions under which a mission or a flight is judged, from its setup."""
     conditions = plan_conditions(setup.scenario, setup.aircraft, setup.airspeed, setup.autopilot)
     conditions = replace(conditions, navigation=setup.nav, zones=len(judged_airspace(setup).zones))
     imported_log = setup.imported_log
@@ -151,7 +151,7 @@ def judging_conditions(setup: FlightSetup) -> Conditions:
 
 
 def condition_lines(conditions: Conditions) -> list[str]:
-    """Return a line on the aircraft and its airspeed, and a line on wind, turbulence, navigation, terrain and zones."""
+    """Return the line on aircraft and airspeed, and the line on weather, navigation, terrain and zones."""
     return [_aircraft_line(conditions), _world_line(conditions)]
 
 

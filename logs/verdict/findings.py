@@ -130,7 +130,7 @@ class Finding:
 
     @property
     def value(self) -> float | None:
-        """Value that was compared with the limit: the flown or the planned value, whichever matches the margin.
+        """Value that was compared with the limit: the flown or planned value, whichever fits the margin.
 
         Without a limit or a margin, it is the flown value, or else the planned value; None if both are missing.
         """
@@ -222,7 +222,7 @@ def message(brief: str, explanation: str = "", *, placed: bool = False) -> Messa
 
 
 def undecided_findings(findings: Iterable[Finding]) -> tuple[Finding, ...]:
-    """Return the findings that leave the verdict undecided, for example because the aircraft is not known well enough.
+    """Return the findings that leave the verdict undecided, such as findings on an uncertain aircraft.
 
     >>> slope = make_finding("slope", Place("leg", 1), ok=None, reason="", check=UNKNOWN_AIRCRAFT)
     >>> undecided_findings([slope]) == (slope,)
@@ -316,7 +316,7 @@ def _rounded_or_none(value: float | None) -> float | None:
 
 
 def worst_first_key(finding: Finding) -> tuple[int, float]:
-    """Return a sort key that puts the worst finding first: failed, unjudged, then passed; each sorted by margin.
+    """Return a sort key that puts the worst finding first: failed, unjudged, passed; each by margin.
 
     >>> near, far = (make_finding("slope", Place("leg", 1), ok=True, reason="", margin=m) for m in (4.0, 9.0))
     >>> worst_first_key(near) < worst_first_key(far)

@@ -11,7 +11,7 @@ HeadlinePhrase = Callable[[str, Finding], str]
 
 
 def _with_place(noun: str, finding: Finding, text: str) -> str:
-    """Join a rule's noun, the finding's place and a text in brackets, such as "slope on leg 0 (14.5° > 14.2°)".
+    """Join a rule's noun, a place and a text in brackets: "slope on leg 0 (14.5° > 14.2°)".
 
     A place that is the whole flight, plan or mission is left out.
     """
@@ -35,14 +35,17 @@ def event_phrase(noun: str, finding: Finding) -> str:
 
 
 def return_phrase(noun: str, finding: Finding) -> str:
-    """Return the brief reason of a finding on a return after the last item; otherwise a phrase with the reason."""
+    """Return the brief reason of a return after the last item; otherwise a phrase with the reason."""
     if finding.place.kind == "waypoint":
         return shorten_statement(finding.brief)
     return reason_phrase(noun, finding)
 
 
 def shortfall_phrase(noun: str, finding: Finding) -> str:
-    """Return a phrase such as "speed on leg 2 (11.9 m/s < 12 m/s)"; with the reason if no value is too low."""
+    """Return a phrase such as "speed on leg 2 (11.9 m/s < 12 m/s)".
+
+    Without a value that is too low, the phrase contains the reason instead.
+    """
     value, limit = finding.value, finding.effective_limit
     if value is None or limit is None or value >= limit:
         return reason_phrase(noun, finding)
@@ -50,8 +53,9 @@ def shortfall_phrase(noun: str, finding: Finding) -> str:
 
 
 def excess_phrase(noun: str, finding: Finding) -> str:
-    """Return a phrase such as "slope on leg 0 (14.5° > 14.2°)"; with the reason if no value exceeds the limit.
+    """Return a phrase such as "slope on leg 0 (14.5° > 14.2°)".
 
+    Without a value that exceeds the limit, the phrase contains the reason instead.
     The value is the one that was compared with the limit.  Without a margin, it is the larger of the flown and the
     planned value.
     """
@@ -65,7 +69,10 @@ def excess_phrase(noun: str, finding: Finding) -> str:
 
 
 def slope_phrase(noun: str, finding: Finding) -> str:
-    """Return a phrase with the reason if the limit is 0°, so that no slope can be flown; otherwise `excess_phrase`."""
+    """Return a phrase with the reason if the limit is 0°; otherwise return `excess_phrase`.
+
+    With a limit of 0°, the aircraft can fly no slope.
+    """
     return reason_phrase(noun, finding) if finding.limit == 0.0 else excess_phrase(noun, finding)
 
 

@@ -119,7 +119,7 @@ def answer_case(reason: str) -> JunitCase:
 
 
 def _finding_cases(findings: tuple[Finding, ...]) -> list[JunitCase]:
-    """Make one test case, with a unique name, for each finding; the result of an unjudged finding is "skipped"."""
+    """Make one test case, with a unique name, for each finding; an unjudged finding is "skipped"."""
     counts: Counter[tuple[str, str]] = Counter()
     cases = []
     for finding in findings:

@@ -92,7 +92,7 @@ class RuleFindings:
 
     @property
     def closest(self) -> Finding | None:
-        """Failed finding furthest beyond its limit, or else the finding closest to its limit; None without either."""
+        """Failed finding furthest beyond its limit, else the finding closest to its limit; None if none."""
         return closest_to_limit(self.findings)
 
     @property

@@ -24,7 +24,7 @@ from logs.verdict.wording import RULE_NOUNS
 
 @dataclass(frozen=True, slots=True)
 class Margin:
-    """Quantity whose distance from the limit is a rule's margin, and the scale by which flights are ranked.
+    """Quantity that a rule compares with a limit, and the scale by which flights are ranked.
 
     quantity: name of the quantity that is compared with the limit.
     unit: unit of the quantity, the limit and the margin.

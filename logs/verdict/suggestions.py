@@ -156,7 +156,7 @@ _MAX_RELATIVE_CHANGE = 9.0
 
 
 def _smallest_first(alternatives: list[_SizedSuggestion]) -> tuple[Suggestion, ...]:
-    """Sort alternatives by the relative size of their changes, and drop those larger than `_MAX_RELATIVE_CHANGE`."""
+    """Sort alternatives by their relative change, and drop those above `_MAX_RELATIVE_CHANGE`."""
     helpful = [sized for sized in alternatives if sized[0] <= _MAX_RELATIVE_CHANGE]
     return tuple(suggestion for _, suggestion in sorted(helpful, key=lambda sized: sized[0]))
 
@@ -164,7 +164,7 @@ def _smallest_first(alternatives: list[_SizedSuggestion]) -> tuple[Suggestion, .
 def suggest_gentler_slope(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
-    """Suggest a gentler slope, a longer leg or another airspeed for one leg; the smallest relative change first.
+    """Suggest a gentler slope, a longer leg or another airspeed; the smallest relative change first.
 
     If the aircraft is not known well enough, suggest a flight that measures its climb or sink performance.  If its
     climb performance is a guess, first suggest that the user state it.  Return () for a finding that is not on a leg.
@@ -217,7 +217,7 @@ def suggest_gentler_slope(
 def suggest_gentler_landing(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
-    """Suggest a lower or more distant waypoint before a landing that is too steep, or a landing from the other end.
+    """Suggest a lower or more distant waypoint before a steep landing, or landing from the other end.
 
     If the aircraft is not known well enough, suggest a flight that measures its descent.  Return () if the slope
     passes, or if the limit permits no descent.
@@ -337,7 +337,7 @@ def suggest_larger_loiter(
 
 
 def _longer_legs(requirements: RouteRequirements, corner: int) -> list[_SizedSuggestion]:
-    """Suggest legs at a corner that are long enough for its turn and the neighbouring turns; [] if all fit."""
+    """Suggest legs at a corner that are long enough for its and the neighbouring turns; [] if all fit."""
     needed_before = (
         requirements.length_before[corner]
         + requirements.length_after[corner - 1]
@@ -416,7 +416,7 @@ def _level_speeds(requirements: RouteRequirements, altitude: float, current_spee
 
 
 def _slope_speed(requirements: RouteRequirements, leg: int, slope: float) -> float | None:
-    """Return the commanded airspeed nearest to the present one at which the aircraft holds a slope, m/s, or None.
+    """Return the nearest commanded airspeed at which the aircraft holds a slope, m/s, or None.
 
     slope: absolute value of the slope, rad.
     """
@@ -502,7 +502,7 @@ def home_height(setup: FlightSetup) -> float:
 
 
 def _suggest_home_on_ground(setup: FlightSetup) -> tuple[Suggestion, ...]:
-    """Suggest to set a home that is far above or below the ground to the ground's altitude; otherwise return ()."""
+    """Suggest to set a home far above or below the ground on the ground; otherwise return ()."""
     home, height = setup.mission.home, home_height(setup)
     # The height is NaN if it is unknown.  If the file has no home line, its first item was probably taken for home, and
     # another altitude of this item would not help.
@@ -513,7 +513,7 @@ def _suggest_home_on_ground(setup: FlightSetup) -> tuple[Suggestion, ...]:
 
 
 def _suggest_launch_from_ground(requirements: RouteRequirements) -> tuple[Suggestion, ...]:
-    """Suggest to set home on the ground and to raise the legs that are then too low; () for a home near the ground."""
+    """Suggest to set home on the ground and to raise the legs that are then too low; or ()."""
     suggestions, setup = _suggest_home_on_ground(requirements.setup), requirements.setup
     terrain = setup.scenario.terrain
     if not suggestions or terrain is None:
@@ -529,7 +529,7 @@ def _suggest_launch_from_ground(requirements: RouteRequirements) -> tuple[Sugges
 
 
 def _suggest_other_frame(setup: FlightSetup, frame: Frame) -> tuple[Suggestion, ...]:
-    """Suggest another altitude frame for items whose altitudes fit the terrain only in this frame; () without any.
+    """Suggest another altitude frame for items that fit the terrain only in it; () without any.
 
     frame: GLOBAL_RELATIVE_ALT for items below the ground, GLOBAL for items that are too high above home.
     """
@@ -541,7 +541,7 @@ def _suggest_other_frame(setup: FlightSetup, frame: Frame) -> tuple[Suggestion, 
 
 
 def _suggest_lower_reading(setup: FlightSetup) -> tuple[Suggestion, ...]:
-    """Suggest to read a mission's altitudes as lower: with home on the ground, or as AMSL instead of above home."""
+    """Suggest to read altitudes as lower: with home on the ground, or as AMSL."""
     home_on_ground = _suggest_home_on_ground(setup) if home_height(setup) > 0.0 else ()
     return (*home_on_ground, *_suggest_other_frame(setup, Frame.GLOBAL))
 
@@ -655,7 +655,7 @@ def suggest_better_launch(
 def suggest_other_landing_course(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
-    """Suggest to land from the other end of the strip after a failed landing in a tailwind; otherwise return ()."""
+    """Suggest to land from the other end after a failed landing in a tailwind; otherwise ()."""
     ground = requirements.ground_phases
     approach = None if ground is None else ground.procedures.approach
     if finding.ok is not False or approach is None:
@@ -666,7 +666,7 @@ def suggest_other_landing_course(
 def _suggest_landing_against_wind(
     requirements: RouteRequirements, place: Place, course: float, altitude: float
 ) -> tuple[Suggestion, ...]:
-    """Suggest to land from the other end if there is a tailwind on the landing course (rad); otherwise return ().
+    """Suggest to land from the other end if the landing course (rad) has a tailwind; otherwise ().
 
     altitude: altitude of the landing point, m AMSL.
     """
@@ -680,7 +680,7 @@ def _suggest_landing_against_wind(
 def suggest_staying_inside(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
-    """Suggest lower readings of the altitudes, then a path further inside; return () for a path inside the area."""
+    """Suggest lower altitudes, then a path further inside the area; () for a path inside."""
     if finding.margin is None or not finding.margin < 0.0:
         return ()
     inset = _round_to_meter(-finding.margin + SUGGESTION_LENGTH_MARGIN_M)
@@ -720,7 +720,7 @@ def suggest_using_less_energy(
 def suggest_flying_faster(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
-    """Suggest an airspeed above the stall on the slowest leg; return () if its command is already that high.
+    """Suggest an airspeed above the stall on the slowest leg; () if it already has one.
 
     finding: failed finding of the stall rule; without a limit there is no suggestion.
     """

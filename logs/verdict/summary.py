@@ -41,7 +41,7 @@ _LEVEL_TITLES = {
 
 
 def setup_notes(setup: FlightSetup, findings: Sequence[Finding]) -> tuple[str, ...]:
-    """Return headline notes on two facts that affect all findings: an uncertain aircraft and a doubtful home altitude.
+    """Return headline notes on an uncertain aircraft and on a doubtful home altitude.
 
     There is no note on home's altitude if a finding already reports it.
     """
@@ -56,7 +56,7 @@ def setup_notes(setup: FlightSetup, findings: Sequence[Finding]) -> tuple[str, .
 
 
 def headline(findings: Sequence[Finding], flyable: bool, setup_notes: Sequence[str] = ()) -> str:
-    """Return the first line of a verdict: the answer, and the failed, unjudged or narrowly passed findings.
+    """Return the answer of a verdict with its failed, unjudged or narrowly passed findings, in one line.
 
     flyable: True if the verdict is flyable.
     setup_notes: notes from the function `setup_notes`.
@@ -130,7 +130,7 @@ _PLACED_SUBJECTS = {
 
 
 def _unknown_aircraft_text(open_findings: Sequence[Finding]) -> str:
-    """Describe the findings that are undecided because the aircraft is not known well enough; "" without any.
+    """Describe findings that are undecided because the aircraft is uncertain; "" without any.
 
     If a few slopes are the only such findings, the text names their legs.  Otherwise it counts the findings by rule.
     """
@@ -225,7 +225,7 @@ def _near_miss_notes(findings: Sequence[Finding]) -> list[str]:
 
 
 def _altitude_notes(findings: Sequence[Finding]) -> list[str]:
-    """Return notes on large altitude errors, at the worst waypoint and the worst leg that follows the ground."""
+    """Return notes on the worst altitude errors at waypoints and on legs that follow the ground."""
     waypoint_errors = _passing_errors(findings, "waypoint", "height error")
     leg_errors = _passing_errors(findings, "slope", GROUND_FOLLOWING_ERROR)
     return [
@@ -290,7 +290,7 @@ def summary_lines(
     conditions: Conditions,
     deciding: DecidingParameter | None = None,
 ) -> tuple[str, ...]:
-    """Return the lines of the summary: answer, start, conditions, autopilot, unjudged rules, warnings and levels.
+    """Return the lines of the summary, from the answer and the conditions to the other levels.
 
     levels: answers of all levels; the last answer is the verdict's own, whose headline is the first line.
     """
@@ -338,7 +338,7 @@ def summary_lines(
 
 
 def unjudged_parts(findings: Sequence[Finding], setup: FlightSetup) -> list[tuple[str, str]]:
-    """Return each rule whose unjudged findings are explained, with a text on their places and the first reason."""
+    """Return each rule with unjudged findings, with a text on their places and the first reason."""
     parts = []
     for rule in RULE_WORDS.values():
         rule_findings = [finding for finding in findings if finding.rule == rule.name and rule.explains_unjudged]
@@ -389,7 +389,7 @@ def _is_covered_by_airframe(findings: Sequence[Finding]) -> bool:
 
 
 def _pitch_limit_lines(findings: Sequence[Finding], setup: FlightSetup) -> list[str]:
-    """Return a line on the failed leg with the longest time at the autopilot's pitch limit; [] without one."""
+    """Return a line on the failed leg with the longest time at the pitch limit; [] without one."""
     failed_places = {finding.place for finding in findings if finding.ok is False}
     times = [
         (fact.value, finding.place)
@@ -470,7 +470,7 @@ def _parameter_lines(setup: FlightSetup, *, is_flown: bool) -> list[str]:
 
 
 def _ignored_settings_lines(setup: FlightSetup) -> list[str]:
-    """Return a line if the scenario states rtl_autoland but the autopilot has no such parameter, otherwise []."""
+    """Return a line if the scenario's rtl_autoland has no effect on the autopilot, otherwise []."""
     rtl_settings, parameters = setup.scenario.returns, setup.autopilot.parameters
     if (
         rtl_settings is None
@@ -483,7 +483,7 @@ def _ignored_settings_lines(setup: FlightSetup) -> list[str]:
 
 
 def _terrain_error_lines(findings: Sequence[Finding], setup: FlightSetup) -> list[str]:
-    """Return a line on the minimum clearance with and without the terrain's stated error; [] if none is stated."""
+    """Return a line on the minimum clearance less the terrain's stated error; [] if none is stated."""
     error = None if setup.scenario.terrain is None else setup.scenario.terrain.vertical_error
     clearances = [
         finding.planned if finding.flown is None else finding.flown

@@ -72,7 +72,7 @@ def place_text_within(place: Place) -> str:
 
 
 def noun_with_place(noun: str, place: Place, *, within: bool = False) -> str:
-    """Name the rule of a finding and its place; a place that is the whole flight, plan or mission is left out.
+    """Name the rule of a finding and its place, unless that is the whole flight, plan or mission.
 
     within: True for use within a sentence, with the item of a leg between commas.
 
@@ -228,7 +228,7 @@ def _length_text(change: Change) -> str:
 
 
 def _terrain_height_text(suggestion: Suggestion) -> str:
-    """Phrase changes that let legs follow the ground, with the items at their ends and the heights above ground.
+    """Phrase changes that let legs follow the ground, with their end items and heights above ground.
 
     >>> legs = [Change("terrain height", Place("leg", k, to_item=k + 1), None, 70.0 + k, "m") for k in (1, 2)]
     >>> _terrain_height_text(tuple(legs))
@@ -386,7 +386,7 @@ def disagreement_text(disagreement: Disagreement) -> str:
 
 
 def deciding_text(deciding: DecidingParameter) -> str:
-    """Describe the autopilot parameter that decides, the effect of its value, and the value that would pass.
+    """Describe the parameter that decides, the effect of its value, and the value that would pass.
 
     >>> deciding_text(DecidingParameter("TECS_HDEM_TCONST", 3.0, 1.2, "s", "clearance", Place("leg", 4), -8.2))
     'with TECS_HDEM_TCONST 3 s the aircraft is 8 m too low on leg 4; with 1.2 s the flight would pass'
@@ -426,7 +426,7 @@ def shorten_statement(statement: str) -> str:
 
 
 def text_after(text: str, starts: Sequence[str]) -> str:
-    """Return a text without the first of `starts` at its beginning, and without the punctuation that follows.
+    """Return a text without one of `starts` at its beginning, and without the punctuation after it.
 
     >>> text_after("not flyable: slope on leg 1", ("Not flyable, and incomplete", "not flyable"))
     'slope on leg 1'
@@ -436,7 +436,7 @@ def text_after(text: str, starts: Sequence[str]) -> str:
 
 
 def quantity_text(value: float, unit: str) -> str:
-    """Return a value with its unit, to three significant figures, and without an exponent even for 1140000 Wh.
+    """Return a value with its unit, to three significant figures and without an exponent.
 
     >>> quantity_text(11.87, "deg"), quantity_text(1_140_000.0, "Wh")
     ('11.9°', '1140000 Wh')

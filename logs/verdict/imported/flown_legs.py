@@ -101,8 +101,9 @@ def stretch_end_text(stretch: MissionStretch) -> str:
 def _earliest_lap(
     setup: FlightSetup, rows: Track, aligned: AlignedTrack, waypoint_indices: NDArray[np.intp]
 ) -> tuple[AlignedTrack, NDArray[np.intp]]:
-    """Align a track with the earliest laps of a repeated route that match it; return track and passed waypoints.
+    """Align a track with the earliest matching laps of a repeated route.
 
+    Return the aligned track and the indices of the passed waypoints.
     All laps have the same waypoints, so a flight that ended within a lap could otherwise be matched to any later lap.
     Return `aligned` and `waypoint_indices` unchanged if no shorter route matches the track.
     """
@@ -212,7 +213,7 @@ def plan_mismatch(setup: FlightSetup, track: Track) -> PlanMismatch | None:
 
 
 def _closest_distances(points: Floats, tracks: list[Track]) -> tuple[Floats, Floats]:
-    """Return each waypoint's minimum horizontal distance from the flight (m), and the time of it (s), (w,) each.
+    """Return each waypoint's minimum horizontal distance from the flight (m) and its time (s), (w,) each.
 
     points: waypoints, m, (w, 3).
     tracks: parts of the flight.

@@ -223,7 +223,7 @@ def damage_text(damage: Damage) -> str:
 
 
 def _start_time_text(imported_log: ImportedLog) -> str:
-    """Return a clause on the date and time at which the log's time is 0; "" if the log states no plausible date."""
+    """Return a clause on the date and time at the log's time 0; "" without a plausible date."""
     if not isfinite(imported_log.utc_start) or not 0.0 <= imported_log.utc_start < 4.1e9:
         return ""
     return f", time 0 s is {datetime.fromtimestamp(imported_log.utc_start, UTC):%Y-%m-%d %H:%M:%S} UTC"
@@ -250,7 +250,7 @@ _UNNAMED_TEXT = "no aircraft was named; name it with --aircraft"
 
 
 def judge_imported_flight(setup: FlightSetup, track: Track, *, log_complete: bool) -> Verdict:
-    """Judge the stretches of an imported flight that followed its mission; the verdict has the level "flown".
+    """Judge the stretches of an imported flight that followed its mission, at the level "flown".
 
     Raises ValueError for a flight that was not imported.
 
@@ -421,7 +421,7 @@ def _mark_unjudged(finding: Finding, cause: str, *, keep_measurements: bool = Fa
 
 
 def _unjudge_with_gaps(finding: Finding, legs: FlownLegs) -> Finding:
-    """Return the finding; a passed one is marked as not judged if the log has a gap on its leg or at its waypoint.
+    """Return the finding; mark a passed one as not judged if the log has a gap on its leg or waypoint.
 
     At a waypoint, only rules with `LogNeeds.needs_no_gap` are affected.
     """
@@ -439,8 +439,9 @@ def _unjudge_with_gaps(finding: Finding, legs: FlownLegs) -> Finding:
 
 
 def _unjudge_if_unreached(finding: Finding, legs: FlownLegs) -> Finding:
-    """Return the finding, marked as not judged if it concerns a stretch's unreached last waypoint or its leg.
+    """Return the finding; mark it as not judged if it concerns the unreached end of a stretch.
 
+    The end is the stretch's last waypoint, or the leg to this waypoint.
     On this leg, only findings of rules that need the whole leg are marked, unless they failed.
     """
     leg, waypoint = legs.requirements.legs - 1, legs.requirements.legs
@@ -486,12 +487,15 @@ def _merge_findings(findings_by_stretch: Sequence[Sequence[Finding]]) -> tuple[F
 
 
 def _merge_precedence(finding: Finding) -> int:
-    """Return a finding's precedence in a merge: 2 for a failed, 1 for a passed and 0 for an unjudged finding."""
+    """Return a finding's precedence in a merge: 2 if failed, 1 if passed, 0 if unjudged."""
     return {False: 2, True: 1, None: 0}[finding.ok]
 
 
 def _leg_ends(setup: FlightSetup, flown_stretches: Sequence[FlownLegs]) -> tuple[float, ...]:
-    """Return the end time of each leg except the last, s, never decreasing; inf from the first unreached leg on."""
+    """Return the end time of each leg except the last, s; inf from the first unreached leg on.
+
+    The times never decrease.
+    """
     end_times = np.full(len(setup.route.points), np.inf)
     for legs in flown_stretches:
         times = legs.aligned.track.time[legs.aligned.rows]

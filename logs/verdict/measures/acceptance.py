@@ -169,8 +169,9 @@ def negligible_kink_distance(requirements: RouteRequirements, waypoint: int) -> 
 
 
 def shortcut_distance(requirements: RouteRequirements, first: int, last: int) -> float | None:
-    """Return the largest distance (m) of waypoints `first` to `last` from the straight path that omits them.
+    """Return the distance of waypoints `first` to `last` from a straight path without them, m.
 
+    The distance is the largest one of these waypoints.
     Return None if the distance exceeds `KINK_FRACTION` of the corridor's half width, if a waypoint belongs to a loiter,
     if the path is vertical, or if there is no room for the turns at its ends.
     """
@@ -200,7 +201,7 @@ def _distance_from_leg(point: list[float], start: list[float], end: list[float])
 
 
 def _gap_has_room(requirements: RouteRequirements, first: int, last: int) -> bool:
-    """Return True if the route without waypoints `first` to `last` has room for the turns before and after them."""
+    """Return True if the route without waypoints `first` to `last` has room for the turns around the gap."""
     previous_corner, next_corner = first - 1, last + 1
     if not (
         _turn_fits_alone(requirements, previous_corner - 1, previous_corner, next_corner)
@@ -261,8 +262,9 @@ def _reduced_route(route: Route, waypoints: NDArray[np.int64]) -> Route:
 
 
 def step_height(requirements: RouteRequirements, leg: int) -> float | None:
-    """Return the altitude change of a leg that exceeds its slope limit, m, positive; None if it is not negligible.
+    """Return the negligible altitude change of a leg beyond its slope limit, m; None if it is too large.
 
+    The change is positive, up or down.
     A change up to `NEGLIGIBLE_STEP_M` is negligible.  If a sequence of legs around the leg is too steep overall, the
     altitude change of the whole sequence counts.
     """

@@ -34,7 +34,7 @@ _MAX_LEVELS = 12
 def find_hazards(
     requirements: RouteRequirements, center: Floats, min_altitude: float, max_altitude: float, reach: float
 ) -> list[str]:
-    """Describe the ground, missiles, zones and area edges within a distance of a center; [] without hazards.
+    """Describe ground, missiles, zones and area edges within a distance of a center; [] without hazards.
 
     center: east and north, m, (2,).
     min_altitude, max_altitude: minimum and maximum altitude of the flight, m AMSL.
@@ -106,8 +106,9 @@ def _ground_hazards(
 def _missile_hazards(
     requirements: RouteRequirements, center: Floats, min_altitude: float, max_altitude: float, reach: float
 ) -> list[str]:
-    """Describe the missiles whose sphere overlaps the disc of radius `reach` (m) between two altitudes (m AMSL).
+    """Describe the missiles whose sphere overlaps a disc between two altitudes (m AMSL).
 
+    The disc has the radius `reach`, m.
     Return [] for a mission without a scenario, because its threats are unknown.
     center: east and north, m, (2,).
     """
@@ -184,7 +185,7 @@ def _points_at_altitude(positions: Floats, altitude: float) -> Floats:
 
 
 def _straight_moves(points: Floats) -> Records:
-    """Return the n - 1 straight moves (dtype `MOVE`) between n consecutive points; each move lasts one second."""
+    """Return the n - 1 straight moves (dtype `MOVE`) between n points; each move lasts one second."""
     steps = np.diff(points, axis=0)
     lengths = np.hypot(steps[:, 0], steps[:, 1])
     moves: Records = np.zeros(len(steps), MOVE)

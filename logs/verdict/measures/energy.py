@@ -14,7 +14,7 @@ MAX_ENERGY_RATIO = 2.0
 
 
 def predicted_energy(requirements: RouteRequirements) -> tuple[float, float]:
-    """Predict the energy (Wh) and peak current (A) of steady flight along a route; NaN if the power is not known.
+    """Predict the energy (Wh) and peak current (A) of steady flight along a route; NaN without power data.
 
     Each leg is flown at its commanded airspeed, its slope over the ground in the mean wind, and its mean altitude.  The
     prediction leaves out turns and gusts, which take a few per cent more.
@@ -25,7 +25,10 @@ def predicted_energy(requirements: RouteRequirements) -> tuple[float, float]:
 
 
 def leg_energies(requirements: RouteRequirements) -> tuple[list[float], float]:
-    """Predict the energy (Wh) of steady flight on each leg, and the peak power (W); NaN if the power is not known."""
+    """Predict the energy of steady flight on each leg (Wh), and the peak power (W).
+
+    Both are NaN without power data.
+    """
     envelope, route = requirements.setup.envelope, requirements.route
     if not np.isfinite(requirements.ground_speed).all():
         return [math.nan] * requirements.legs, math.nan

@@ -32,7 +32,10 @@ def follows_ground(requirements: RouteRequirements, leg: int) -> bool:
 
 
 def mean_ground_slope(requirements: RouteRequirements, leg: int) -> float:
-    """Return the mean slope of the ground under a leg that follows it, rad; NaN for another leg or unknown ground."""
+    """Return the mean slope of the ground under a leg that follows it, rad; NaN for any other leg.
+
+    The slope is also NaN for unknown ground.
+    """
     terrain = requirements.setup.scenario.terrain
     if terrain is None or not follows_ground(requirements, leg):
         return math.nan

@@ -117,7 +117,7 @@ def has_ground_paths(requirements: RouteRequirements) -> bool:
 
 
 def takeoff_item(requirements: RouteRequirements) -> tuple[int, MissionItem | None]:
-    """Return the index of the first waypoint with a mission item, and this item if it is a take-off, otherwise None."""
+    """Return the first waypoint that has a mission item, and this item if it is a take-off, else None."""
     route = requirements.setup.route
     first = next((k for k, seq in enumerate(route.items.tolist()) if seq >= 0), 0)
     items = [item for item in requirements.setup.mission.items if item.seq == int(route.items[first])]

@@ -189,7 +189,7 @@ def move_blocks(
 
 @inner
 def _steepest_ground(block: Record, heights: Heights, to_pixel: PolyMapRecord, spacing: float) -> float:
-    """Return an upper bound on the slope of the bilinearly interpolated ground below a block, m per m; ignore NaN."""
+    """Return an upper bound on the slope of the interpolated ground below a block, m per m; ignore NaN."""
     rows, cols = heights.shape
     west, south = polymap(to_pixel, block.west, block.south)
     east, north = polymap(to_pixel, block.east, block.north)

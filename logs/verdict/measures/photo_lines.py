@@ -68,12 +68,12 @@ class LineMeasure:
 
     @property
     def ok(self) -> bool | None:
-        """True if enough of the line is usable, False if too much is lost, None if that depends on unknown ground."""
+        """True if enough of the line is usable, False if not, None if unknown ground decides."""
         return is_covered(self.usable, self.unknown)
 
 
 def is_covered(usable: float, unknown: float) -> bool | None:
-    """Return True if enough of a photo line is usable, False if not, None if that depends on unknown parts.
+    """Return True if enough of a photo line is usable, False if not, None if unknown parts decide.
 
     usable, unknown: fractions of the length of the line.
 
@@ -117,7 +117,7 @@ class _LineRows:
 def _line_rows(
     requirements: RouteRequirements, aligned: AlignedTrack, survey: Survey, line: PhotoLine
 ) -> _LineRows | None:
-    """Return the rows on which a photo line may have been flown; None if it was not reached or has only one row."""
+    """Return the rows on which a photo line may have been flown; None for fewer than two rows."""
     axis = LineAxis(requirements.points[line.first : line.last + 1])
     window = _row_window(requirements, aligned, line)
     if window.stop - window.start < 2 or not aligned.passed[line.begins]:
@@ -141,7 +141,7 @@ def _line_rows(
 def measure_line(
     requirements: RouteRequirements, aligned: AlignedTrack, survey: Survey, line: PhotoLine
 ) -> LineMeasure | None:
-    """Measure a photo line on a flown track; return None if the line was not reached or has fewer than two rows."""
+    """Measure a photo line on a flown track; return None if it was not reached or has one row."""
     rows = _line_rows(requirements, aligned, survey, line)
     if rows is None:
         return None
@@ -336,7 +336,7 @@ def count_flight_photos(requirements: RouteRequirements, aligned: AlignedTrack) 
 def _count_taken_photos(
     requirements: RouteRequirements, aligned: AlignedTrack, line: PhotoLine, rows: _LineRows
 ) -> int:
-    """Return the number of a flight's photos that are taken on a photo line, up to `PHOTO_STEP_M` beyond its ends."""
+    """Return the number of photos taken on a photo line, up to `PHOTO_STEP_M` beyond its ends."""
     photo_rows = _photo_rows(requirements, aligned, range(line.first, line.last)) - rows.track_rows.start
     photo_rows = photo_rows[(photo_rows >= 0) & (photo_rows < len(rows.along))]
     is_between_ends = (rows.along >= -PHOTO_STEP_M) & (rows.along <= rows.axis.length + PHOTO_STEP_M)
@@ -378,7 +378,7 @@ def _photo_rows(requirements: RouteRequirements, aligned: AlignedTrack, legs: ra
 
 @dataclass(frozen=True, slots=True)
 class OverlapMeasure:
-    """Minimum overlap of a survey's usable photos, as fractions of a photo; 0 if there is a gap between them.
+    """Minimum overlap of a survey's usable photos, as fractions of a photo; 0 for a gap between them.
 
     camera: the camera that takes them.
     front: overlap with the next photo on the line; None if the distance between photos is not stated, or none is

@@ -72,7 +72,7 @@ class _Samples:
 
 
 def route_progress(route: Route, position: Floats, *, anywhere: bool) -> RouteProgress:
-    """Match a track to a route by positions, and return how far it came and which rows belong to each waypoint.
+    """Match a track to a route by positions alone, and return its progress along the route.
 
     position: positions in at least two usable rows, m, (t, 3).
     anywhere: True if the track may begin anywhere on the route, like a part of an imported log; False if it begins at
@@ -160,7 +160,7 @@ def _sample_route(route: Route, spacing: float) -> _Samples:
 
 
 def _loiter_center(route: Route, waypoints: Sequence[int]) -> tuple[Floats, float]:
-    """Return the center of a loiter, m, (2,), and the radius around it within which the loiter is flown, m.
+    """Return the center of a loiter, m, (2,), and the radius within which it is flown, m.
 
     waypoints: waypoints at the loiter's corners.
     """

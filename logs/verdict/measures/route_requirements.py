@@ -189,7 +189,7 @@ def find_leg_winds(setup: FlightSetup, route: Route) -> tuple[Wind, ...]:
 
 
 def turn_requirements(route: Route, performance: LegPerformance) -> TurnRequirements:
-    """Compute the radius of each turn, the length of leg that it uses, and the sharpest turn that fits there.
+    """Compute each turn's radius and length, and the sharpest turn that fits there.
 
     performance: aircraft's performance on a leg at an airspeed.
     """
@@ -287,8 +287,9 @@ def _sharpest_turns(
 
 
 def sharpest_fly_over_turn(radii: float) -> float:
-    """Return the sharpest fly-over turn (rad) that fits the leg after its waypoint; the inverse of `fly_over_run`.
+    """Return the sharpest fly-over turn that fits the leg after its waypoint, rad.
 
+    This is the inverse of `fly_over_run`.
     With half the turn h and z = (cos h + sqrt(1 + cos^2 h))^2, the square of the length is 6 z - z^2 - 1.
     radii: length of the leg in turn radii.
 
@@ -463,7 +464,7 @@ class RouteRequirements:
         return np.array([math.sin(self.courses[leg]), math.cos(self.courses[leg])])
 
     def straight_start(self, leg: int) -> Floats:
-        """Return the point where a leg leaves a loiter's circle, or its first waypoint without a loiter, (3,) m.
+        """Return the point where a leg leaves a loiter's circle, or else its first waypoint, (3,) m.
 
         The waypoints of a loiter are corners outside its circle; the leg leaves the circle at a tangent point.
         """
@@ -477,7 +478,7 @@ class RouteRequirements:
         return max(0.0, run - float(self.length_after[leg])) if self.setup.route.arc_radii[leg] > 0.0 else run
 
     def apexes(self) -> Floats:
-        """Return the points at which the fly-by path passes each waypoint: the midpoints of the arcs, (w, 3) m."""
+        """Return the midpoints of the fly-by arcs, where the path passes each waypoint, (w, 3) m."""
         apexes = self.points.copy()
         for waypoint in range(1, len(apexes) - 1):
             if self.fly_by_offset[waypoint] > 0.0:
@@ -699,7 +700,7 @@ class SteepArc:
 
 
 def turn_limit(requirements: RouteRequirements, waypoint: int) -> tuple[float, str]:
-    """Return the lower of the scenario's and the aircraft's turn limit at a waypoint (rad), and its source."""
+    """Return the turn limit at a waypoint (rad), the lower of scenario and aircraft, and its source."""
     return tighter_turn_limit(requirements, waypoint, float(requirements.turn_limit[waypoint]))
 
 
@@ -720,7 +721,7 @@ def tighter_turn_limit(requirements: RouteRequirements, waypoint: int, aircraft_
 
 
 def slope_limits(requirements: RouteRequirements, leg: int) -> tuple[float, float]:
-    """Return the lower limit of scenario and aircraft on the climb and on the dive along a leg, rad, positive."""
+    """Return the limits on climb and dive along a leg, rad, each the lower of scenario and aircraft."""
     return (
         slope_limit(requirements, leg, is_climb=True)[0],
         slope_limit(requirements, leg, is_climb=False)[0],

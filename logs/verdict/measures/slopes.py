@@ -72,7 +72,7 @@ def fit_line(x: Floats, y: Floats) -> tuple[float, float]:
 def straight_span(
     requirements: RouteRequirements, leg: int, clearance: float, *, excludes_blends: bool = False
 ) -> tuple[float, float]:
-    """Return the start and end of the straight part of a leg between its turns, as distances from the leg's start, m.
+    """Return start and end of the straight part of a leg between its turns, m from the leg's start.
 
     clearance: distance kept from the turns, m.
     excludes_blends: True to exclude also the parts next to the turns on which the slope changes (blends).
@@ -264,8 +264,9 @@ def _height_error(requirements: RouteRequirements, leg: int, position: Floats) -
 
 
 def _ground_following_error(requirements: RouteRequirements, leg: int, position: Floats) -> float | None:
-    """Return the largest error from a leg's demanded height above ground, between its turns, m, with its sign.
+    """Return the largest error from a leg's demanded height above ground, m, with its sign.
 
+    Only the part between the leg's turns is measured.
     Return None if no row lies between the turns over known ground.
 
     position: positions of the track, m, (n, 3).
@@ -386,13 +387,13 @@ def measure_ability(requirements: RouteRequirements, aligned: AlignedTrack, leg:
 
 
 def _rows_after_run(mask: Flags, count: int) -> Flags:
-    """Return a mask (n,): True for each row for which `mask` is True in this row and the `count` rows before it."""
+    """Return a mask (n,): True if `mask` is True in the row and in the `count` rows before it."""
     rows = np.arange(mask.size)
     return np.asarray(rows - np.maximum.accumulate(np.where(mask, -1, rows)) > count)
 
 
 def _fit_plane_at_origin(value: Floats, x: Floats, y: Floats, sample_count: float) -> tuple[float, float] | None:
-    """Fit a plane value(x, y) by least squares; return its value at x = y = 0 and the standard error of this value.
+    """Fit a plane value(x, y); return its value at x = y = 0 and the standard error of this value.
 
     Return None if the data do not determine the plane.  A y that hardly varies is left out of the fit.
     sample_count: number of independent samples among the values.

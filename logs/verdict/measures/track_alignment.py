@@ -92,7 +92,7 @@ class AlignedTrack:
         return bool(self.passed[leg]) and self.rows[leg + 1] > self.rows[leg]
 
     def leg_segments(self, leg: int) -> tuple[int, int]:
-        """Return the first segment of the track on a leg, and the segment after its last; both are 0 if it has none.
+        """Return the first segment of the track on a leg, and the one after its last; 0, 0 without any.
 
         The first leg includes the track before it, the last leg the track after it.  If both waypoints of a short leg
         were passed at the same row, as within a turn, the leg has the segment after this row.
@@ -257,7 +257,7 @@ def project_onto_leg(requirements: RouteRequirements, leg: int, position: Floats
 
 
 def closest_approaches(position: Floats, target: Floats) -> tuple[Floats, Floats]:
-    """Return each track segment's minimum horizontal distance from a target (m), and its place, (n - 1,) each.
+    """Return each track segment's minimum horizontal distance from a target (m), and its place.
 
     The place is a fraction of the segment.
 
@@ -302,7 +302,7 @@ def _usable_rows(track: Track, *, is_own: bool) -> NDArray[np.bool_]:
 
 
 def _find_passage_rows(track: Track, apexes: Floats, progress: RouteProgress) -> tuple[RowNumbers, Floats]:
-    """Return the row in which each waypoint was passed, and its distance from the waypoint's apex (m), (w,) each.
+    """Return the row in which each waypoint was passed, and its distance from the apex (m), (w,) each.
 
     The row numbers never decrease, and minimize the sum of squared distances from the apexes.  Only rows along each
     waypoint's legs are considered.
@@ -463,7 +463,7 @@ _END_DELAY_S = 2.0
 
 
 def flown_phases(whole_requirements: RouteRequirements, track: Track) -> tuple[RouteRequirements, AlignedTrack | None]:
-    """Return the requirements and the aligned track of a flight's airborne part, between take-off and landing.
+    """Return requirements and aligned track of a flight's part between take-off and landing.
 
     The track is None if it has fewer than two usable rows.
     whole_requirements: requirements of the whole route, returned unchanged for a flight without ground phases.

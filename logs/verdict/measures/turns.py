@@ -67,7 +67,7 @@ def corner_passes(requirements: RouteRequirements, aligned: AlignedTrack) -> tup
 
 
 def _nearest_passes(requirements: RouteRequirements, aligned: AlignedTrack) -> list[tuple[float, float]]:
-    """Return the time (s) and the distance (m) of the closest approach to each waypoint; the times never decrease."""
+    """Return time (s) and distance (m) of the closest approach to each waypoint; times never decrease."""
     time, rows = aligned.track.time, aligned.rows
     passes: list[tuple[float, float]] = []
     start_time = float(time[0])
@@ -85,7 +85,10 @@ def _nearest_passes(requirements: RouteRequirements, aligned: AlignedTrack) -> l
 
 
 def _track_between(aligned: AlignedTrack, start: float, end: float) -> tuple[Floats, Floats]:
-    """Return the track between two times (s), with interpolated ends: times, s, (n,), and positions, m, (n, 3)."""
+    """Return times (s, (n,)) and positions (m, (n, 3)) of the track between two times, s.
+
+    Both ends are interpolated.
+    """
     time = aligned.track.time
     times = np.concatenate([[start], time[(time > start) & (time < end)], [end]])
     return times, np.column_stack([np.interp(times, time, aligned.track.position[:, j]) for j in range(3)])
@@ -162,7 +165,7 @@ def measure_turns(requirements: RouteRequirements, aligned: AlignedTrack) -> lis
 
 
 def measure_turn(requirements: RouteRequirements, aligned: AlignedTrack, waypoint: int) -> TurnMeasure:
-    """Measure the turn at an inner waypoint; the fields keep their defaults if one of its legs was not flown."""
+    """Measure the turn at an inner waypoint; fields keep their defaults if a leg was not flown."""
     if not aligned.has_flown(waypoint - 1) or not aligned.has_flown(waypoint):
         return TurnMeasure()
     track = aligned.track
@@ -263,7 +266,7 @@ def _arc_overshoot(
     distance_along: Floats,
     lateral_offset: Floats,
 ) -> float | None:
-    """Return the overshoot of a turn, m: the maximum distance outside its arc, and after the arc outside the next leg.
+    """Return the overshoot of a turn: the largest distance outside its arc or its next leg, m.
 
     It is at least 0.  Return None if the turn has no fly-by arc.
 

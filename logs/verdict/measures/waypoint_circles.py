@@ -59,7 +59,7 @@ def waypoint_circles(requirements: RouteRequirements, aligned: AlignedTrack) -> 
 
 
 def circles_text(requirements: RouteRequirements, circles: Sequence[WaypointCircle]) -> str:
-    """State where an autopilot circled, its altitude errors there, and the parameter of the altitude tolerance.
+    """State where an autopilot circled, its altitude errors, and the parameter that limits them.
 
     Return "" without circles.
     """

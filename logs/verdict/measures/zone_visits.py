@@ -46,8 +46,9 @@ PART = record_dtype(
 def distances_outside_zone(
     records: ZoneRecords, z: int, heights: Heights, to_pixel: PolyMapRecord, east: float, north: float, up: float
 ) -> tuple[float, float, int]:
-    """Return a position's distances outside the outline and the altitude band of zone `z` (m), and its closest edge.
+    """Return a position's distances outside the outline and altitude band of zone `z`, and its edge.
 
+    The distances are in m; the edge is the closest one.
     A distance is negative inside.  The distance from a band above ground is NaN if the terrain there is unknown.
     """
     zone = records.zones[z]

@@ -124,7 +124,10 @@ def drawn_returns(
 
 
 def drawn_returns_without_glides(world: ReturnWorld, starts: ReturnStarts, returns: Returns) -> DrawnReturns:
-    """Compute the data for drawing judged returns, without the slow parts: glides and lowest safe altitudes."""
+    """Compute the data for drawing judged returns, without glides and lowest safe altitudes.
+
+    Those take the most time.
+    """
     return DrawnReturns(returns, worst_returns(world, starts, returns), MinSafeAltitudes(np.zeros(0), np.zeros(0)))
 
 

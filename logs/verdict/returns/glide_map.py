@@ -120,7 +120,7 @@ def make_glide_map(
 
 
 def _add_sphere(grid: GlideMap, center: Floats, radius: float) -> None:
-    """Extend the altitude ranges `sphere_bottoms` and `sphere_tops` of the cells of `grid` by one kill sphere.
+    """Add one kill sphere to the altitudes `sphere_bottoms` and `sphere_tops` of the cells of `grid`.
 
     Each cell is checked at its point nearest to the sphere's center.
     center: (east, north, up), m.
@@ -177,8 +177,9 @@ def landable_cells(grid: GlideMap) -> Flags:
 
 
 def _square_sums(values: Floats, row_weights: Floats, column_weights: Floats) -> Floats:
-    """Return the weighted sum of values over the square around each cell, (n, e); NaN if the square leaves the map.
+    """Return the weighted sum of values over the square around each cell, (n, e).
 
+    It is NaN if the square leaves the map.
     values: (n, e).
     row_weights, column_weights: weights of the square's rows and columns, (s,) with s odd; a cell has their product.
     """
@@ -195,7 +196,7 @@ def _square_sums(values: Floats, row_weights: Floats, column_weights: Floats) ->
 
 
 def exclude_zones(grid: GlideMap, is_flat: Flags, zones: ZoneRecords, height: float) -> None:
-    """Set the mask `is_flat` (n, e) to False in exclusion zones that reach down to `height` (m above ground)."""
+    """Set `is_flat` to False in exclusion zones that reach down to `height` (m above ground)."""
     for z in np.flatnonzero(zones.zones["exclusion"]):
         _exclude_zone(is_flat, grid.ground, zones, int(z), grid.west, grid.south, grid.cell, height)
 
@@ -435,7 +436,7 @@ def _settle_cells(
     band_heads: Codes,
     links: Codes,
 ) -> None:
-    """Fill `min_altitude`, `destination` and `next_step` by settling cells in order of altitude, band after band.
+    """Fill `min_altitude`, `destination` and `next_step` by settling cells in order of altitude.
 
     This is the search of Dijkstra, against the direction of flight; see the head of this module.
     band: height of a band, m.

@@ -45,7 +45,7 @@ def remaining_glide_altitudes(
     airspeed: float,
     bank: float,
 ) -> tuple[Floats, Codes]:
-    """Return the altitude left on arrival at each start's best destination (m), and the destination's cell, (n,) each.
+    """Return the altitude left at each start's best destination (m), and its cell, (n,) each.
 
     starts: (n,) of dtype `flight.autopilots.simulated_returns.RETURN_START`.
     glide_altitudes: result of the backward search from the destinations.
@@ -181,7 +181,7 @@ def _wind_at_start(start: Record, aircraft: Record, field: Floats) -> tuple[floa
 
 @inner
 def _is_clear(state: Record, floor: Floats, spheres: Floats, radii: Floats, glider: Record) -> bool:
-    """Return True if the aircraft is on the map, above the cell's minimum altitude, and outside every kill sphere."""
+    """Return True if the aircraft is on the map, above the cell's floor and outside kill spheres."""
     i = round((state.north - glider.south) / glider.cell)
     j = round((state.east - glider.west) / glider.cell)
     if not (0 <= i < floor.shape[0] and 0 <= j < floor.shape[1]) or not state.up >= floor[i, j]:

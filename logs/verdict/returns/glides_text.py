@@ -76,7 +76,7 @@ def site_text(site: GlideSite) -> str:
 
 
 def glide_range_text(glide_range: GlideRange, glides: Glides) -> str:
-    """Describe a time range: the best destination in reach, the altitude to spare, and the autopilot's own return."""
+    """Describe a time range: best destination, altitude to spare, and the autopilot's own return."""
     time_text = (
         f"{glide_range.first:.0f} s"
         if glide_range.count == 1
@@ -114,7 +114,7 @@ def _range_reach_text(glide_range: GlideRange, glides: Glides) -> str:
 
 
 def _own_return_text(glide: Glide, glides: Glides) -> str:
-    """Describe the outcome of the autopilot's own RTL without thrust as a clause; "" if it is not simulated."""
+    """Describe the autopilot's own RTL without thrust as a clause; "" if it is not simulated."""
     name, own_text = glide.own_return.target.name, f"; {glides.autopilot}'s own return"
     match glide.own_return.end:
         case "arrives":

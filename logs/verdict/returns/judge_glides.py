@@ -122,7 +122,7 @@ class Glide:
 
 @dataclass(frozen=True, slots=True)
 class GlideRange:
-    """Time range of the flight with the same best destination and the same outcome of the autopilot's return.
+    """Time range with the same best destination and the same outcome of the autopilot's return.
 
     first, last: times of the first and the last start, s.
     count: number of glides.
@@ -366,7 +366,7 @@ def _possible_winds(scenario: Scenario, positions: Floats, times: Floats) -> Pos
 
 
 def _engine_out_return(world: ReturnWorld, target: ReturnTarget, result: Record) -> EngineOutReturn:
-    """Convert the result of a simulated return without thrust, of dtype `RETURN_RESULT`, to an `EngineOutReturn`."""
+    """Convert a result of a return without thrust (dtype `RETURN_RESULT`) to an `EngineOutReturn`."""
     clearance = float(result["clearance_before_arrival"])
     arrival_height, shortfall, impact = math.nan, math.nan, _NO_POSITION
     if result["outcome"] == RETURN_ARRIVED and world.scenario.terrain is not None:

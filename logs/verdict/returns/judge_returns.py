@@ -276,7 +276,7 @@ class Returns:
 
 
 def _report_key(ret: SimulatedReturn) -> tuple[object, ...]:
-    """Return the key by which returns are grouped: outcome and destination, and the sphere or zone that was entered."""
+    """Return the grouping key of returns: outcome and destination, and the entered sphere or zone."""
     key = (ret.kind, ret.target.name)
     return (*key, ret.threat, ret.zone) if ret.kind in ("threat", "zone") else key
 
@@ -434,7 +434,7 @@ class ReturnWorld:
         return self.with_landing(target) if ending == "on to land" else target
 
     def with_landing(self, target: ReturnTarget) -> ReturnTarget:
-        """Return an RTL's target with the landing sequence that follows its loiter; unchanged if there is none."""
+        """Return an RTL's target with the landing sequence after its loiter; unchanged without one."""
         landing = nearest_landing_sequence(target.position, self.landings) if self.ending == "on to land" else None
         if landing is None:
             return target
@@ -468,7 +468,7 @@ def unknown_energy_text(setup: FlightSetup) -> str:
 
 
 def returning_title(setup: FlightSetup) -> str:
-    """Return the title of the autopilot whose RTL is simulated; ArduPlane if the setup's autopilot has no RTL."""
+    """Return the title of the autopilot whose RTL is simulated; ArduPlane for one without an RTL."""
     autopilot = setup.autopilot.model
     return ArduPlane.title if autopilot.returns.fly is None else autopilot.title
 
@@ -902,7 +902,7 @@ def can_start_in_jsbsim(world: ReturnWorld, row: Record) -> bool:
 
 
 def limit_ratio(ret: SimulatedReturn) -> float:
-    """Return the distance of a return from its nearest limit as a multiple of the point mass's possible error.
+    """Return a return's distance from its nearest limit, divided by the error of the point mass.
 
     The limits are the ground, the required height and the kill spheres.  Below 1, the error of the point mass may
     change the outcome.  Return inf for an outcome that depends on no distance, or if all distances are unknown.

@@ -63,7 +63,7 @@ class ReturnStarts:
 
 
 def flown_starts(setup: FlightSetup, track: Track, interval: float) -> ReturnStarts:
-    """Sample a flown track as starts of returns; samples on the ground and in the track's own RTL are left out.
+    """Sample a flown track as starts of returns, without samples on the ground or in its own RTL.
 
     interval: time between samples, s.
 
@@ -101,7 +101,7 @@ def _empty_starts(*, is_flown: bool) -> ReturnStarts:
 
 
 def _height_losses(setup: FlightSetup, time: Floats, position: Floats, start_times: Floats) -> Floats:
-    """Return the height above ground that a flight loses in the `SINK_TIME_S` after each start, m, (n,); 0 if unknown.
+    """Return the height above ground lost in the `SINK_TIME_S` after each start, m, (n,); 0 if unknown.
 
     time, position: times of the flight, s, (t,), and its positions, m, (t, 3).
     start_times: s, (n,), within these times.
@@ -116,7 +116,7 @@ def _height_losses(setup: FlightSetup, time: Floats, position: Floats, start_tim
 
 
 def _low_and_slow_rows(setup: FlightSetup, track: Track, rows: NDArray[np.intp]) -> tuple[Flags, Flags]:
-    """Return two masks (n,): low rows of a take-off or landing, and low rows that are also too slow to fly.
+    """Return masks of low rows of a take-off or landing, and of low rows too slow to fly, (n,).
 
     Without terrain, both masks contain all rows of the take-off and the landing.
     rows: rows of the track, (n,).
@@ -144,7 +144,7 @@ def _ground_velocities(track: Track, rows: NDArray[np.intp]) -> Floats:
 
 
 def planned_starts(setup: FlightSetup, interval: float, requirements: RouteRequirements | None = None) -> ReturnStarts:
-    """Sample the planned path up to its own RTL as starts of returns, with the predicted energy used until then.
+    """Sample the planned path up to its own RTL as starts of returns, with the energy used.
 
     interval: time between samples, s.
     requirements: the setup's route requirements if already known.
@@ -190,7 +190,7 @@ def planned_positions(setup: FlightSetup, interval: float) -> tuple[Floats, Floa
 
 
 def _moves_before_return(setup: FlightSetup) -> Records:
-    """Return the straight segments and arcs (`MOVE`) of the planned path up to its RTL; none if it begins with one."""
+    """Return the moves (`MOVE`) of the planned path up to its RTL; none if it begins with one."""
     route = setup.route
     last_leg = (route.legs if route.rtl_start is None else route.rtl_start) - 1
     moves = path_moves(setup.path, _ground_speeds(setup), 0, last_leg)
@@ -236,7 +236,10 @@ def flown_end(track: Track) -> ReturnStarts:
 
 
 def planned_end(requirements: RouteRequirements) -> ReturnStarts:
-    """Return the end of the planned path as the start of a return, in straight flight and with the predicted energy."""
+    """Return the end of the planned path as the start of a return, with the predicted energy.
+
+    The aircraft is in straight flight.
+    """
     course = float(requirements.courses[-1])
     slope = math.tan(float(requirements.slopes[-1]))
     speed = float(_ground_speeds(requirements.setup)[-1])

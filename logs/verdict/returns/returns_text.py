@@ -115,7 +115,7 @@ def outcome_text(ret: SimulatedReturn, limit: float) -> str:
 
 
 def measured_text(ret: SimulatedReturn, limit: float, scenario: Scenario) -> str:
-    """Describe one return: destination, outcome, minimum height above ground, and distance from missile spheres.
+    """Describe one return: destination, outcome, minimum height, and distance from missile spheres.
 
     limit: required minimum height above ground, m.
     """
@@ -134,7 +134,7 @@ def measured_text(ret: SimulatedReturn, limit: float, scenario: Scenario) -> str
 
 
 def counts_text(returns: Returns) -> str:
-    """State the number of returns by outcome, such as "3 hit the ground", the worst first; "" if all are safe."""
+    """State the number of returns by outcome, the worst first, as "3 hit the ground"; "" if all are safe."""
     counts = {kind: returns.count(kind) for kind in KINDS if kind != "safe"}
     texts = {
         kind: (_SINGULAR_TEXTS if count == 1 else _PLURAL_TEXTS)[kind].format(limit=returns.limit)
@@ -228,7 +228,7 @@ def point_of_no_return_text(returns: Returns) -> str:
 
 
 def describe_causes(causes: tuple[Cause, ...]) -> list[str]:
-    """List, in up to three lines, the events that cause a return, those that cause a landing, and the others.
+    """List, in up to three lines, the events that cause a return, a landing, or neither.
 
     >>> from flight.autopilots.arduplane.failsafes import failsafe_causes
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
@@ -294,7 +294,7 @@ def describe_landing(returns: Returns) -> list[str]:
 
 
 def range_text(return_range: ReturnRange, returns: Returns, scenario: Scenario) -> str:
-    """Describe a time range: whether its returns are safe, their destination and outcome, and its worst return."""
+    """Describe a time range: are its returns safe, their destination, and the worst return."""
     worst_return = return_range.worst
     time_text = (
         f"{return_range.first:.0f} s"
@@ -381,7 +381,7 @@ def remedy_text(remedy: Remedy, returns: Returns, scenario: Scenario) -> str:
 
 
 def rally_texts(rally: Sequence[ReturnPoint], scenario: Scenario) -> list[str]:
-    """Return the latitude, longitude and height above home of each rally point as text for a ground station."""
+    """Return latitude, longitude and height above home of each rally point as text."""
     texts = []
     for point in rally:
         lat, lon = (float(value) for value in to_geo(scenario.origin, point.east, point.north))

@@ -55,7 +55,7 @@ class Remedy:
 
 
 def is_improvement(before: Returns, after: Returns) -> bool:
-    """Return True if a change makes more returns safe or fewer unsafe, and no kind of failure more frequent.
+    """Return True if a change improves the returns and makes no kind of failure more frequent.
 
     "low" returns may become more frequent only if fewer returns are unsafe.
     """
@@ -85,7 +85,7 @@ class _ReturnLimits:
 
 
 def _return_limits(world: ReturnWorld, starts: ReturnStarts, margin: float = MARGIN) -> _ReturnLimits:
-    """Return the required height above ground and distance from kill spheres of the return from each start.
+    """Return each return's required height above ground and distance from kill spheres.
 
     If the start itself is lower or closer to a sphere, only its own value minus the height lost in the turn is
     required.
@@ -216,7 +216,7 @@ def suggest_parameters(world: ReturnWorld, starts: ReturnStarts) -> list[Remedy]
 
 
 class _AltitudeSearch:
-    """Search for the lowest height of the returns above their destination, from the present height upwards."""
+    """Search, upwards from the present value, for the lowest height of returns above their destination."""
 
     def __init__(self, world: ReturnWorld, present_values: Mapping[str, float]) -> None:
         """Prepare the heights to try.
@@ -251,7 +251,7 @@ class _AltitudeSearch:
 
 
 def _suggest_other_parameters(world: ReturnWorld, trial: _ReturnTrial, altitudes: dict[str, float]) -> list[Remedy]:
-    """Suggest a change of parameters other than the return height with which all returns are safe; [] without one.
+    """Suggest a change of other parameters with which all returns are safe; return [] without one.
 
     altitudes: parameters of a return height (m) by name, which are also tried together with each change; may be empty.
     """
@@ -292,7 +292,7 @@ _PAIR_SEED_COUNT = 30
 
 
 def suggest_rally_points(world: ReturnWorld, starts: ReturnStarts) -> Remedy | None:
-    """Suggest the fewest rally points that make the most returns safe, or None if no point improves the returns.
+    """Suggest the fewest rally points that make the most returns safe; None if no point helps.
 
     The search adds the best points one by one, swaps points, and removes superfluous points.  Each return goes to the
     point that the autopilot would choose.
@@ -360,7 +360,7 @@ def _search_in_rounds(
 def _rally_candidates(
     world: ReturnWorld, starts: ReturnStarts, spacing: float, max_distance: float
 ) -> list[ReturnPoint]:
-    """Return candidate rally points on a grid near the path, at two altitudes, with loiters clear of spheres.
+    """Return candidate rally points on a grid near the path, at two altitudes, clear of spheres.
 
     spacing: grid spacing, m, increased if there are too many candidates.
     max_distance: maximum distance from the path, m.
@@ -489,7 +489,10 @@ class _RallySearch:
         )
 
     def _simulate_candidates(self, searched_starts: NDArray[np.intp]) -> None:
-        """Simulate the returns from starts to their nearest candidates; returns to other candidates count as unsafe."""
+        """Simulate the returns from starts to their nearest candidates.
+
+        Returns to other candidates count as unsafe.
+        """
         pairs = [
             (start, int(candidate))
             for start in searched_starts
@@ -514,7 +517,7 @@ class _RallySearch:
         )
 
     def _count_good(self, searched_starts: NDArray[np.intp], point_set: list[int]) -> int:
-        """Return the number of good returns with these rally points, each to the point that the autopilot chooses.
+        """Return the number of good returns if the autopilot chooses among these rally points.
 
         The autopilot chooses the nearest point.  It returns as without rally points if this point is too far away, or
         farther than another destination.

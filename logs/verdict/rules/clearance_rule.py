@@ -76,7 +76,7 @@ def clearance_findings(
 
 
 def _known_heights(terrain: Terrain, points: Floats) -> tuple[Floats, Floats]:
-    """Return the lowest known height above ground of each path segment, and its first place over unknown ground.
+    """Return each segment's lowest known height above ground, and its first place over unknown ground.
 
     points: corners of the path (east, north, up), m, (n, 3).
 
@@ -181,7 +181,7 @@ class _Requirement(NamedTuple):
         return requirement
 
     def worst_height(self, heights: Floats, points: Floats) -> tuple[float, float]:
-        """Return the height above ground with the smallest margin, and the height required at the same point, m.
+        """Return the height above ground with the smallest margin, and the height required there, m.
 
         heights: heights above ground at `points`, m, (n,).
         points: positions, m, (n, 3).
@@ -194,7 +194,7 @@ class _Requirement(NamedTuple):
         return float(heights[k]), requirement
 
     def smallest_margin(self, heights: Floats, points: Floats) -> tuple[int, float]:
-        """Return the index of the known height with the smallest margin, and the height (m) required at this point."""
+        """Return the index of the height with the smallest margin, and the height required there, m."""
         if not self.fields:
             return int(np.nanargmin(heights)), self.limit
         requirement = self.required_heights(points)
@@ -218,7 +218,7 @@ class _Landing(NamedTuple):
 
 
 def _find_landing(requirements: RouteRequirements) -> _Landing | None:
-    """Return the landing of a mission; None without a landing, and for a plan without planned ground phases.
+    """Return the landing of a mission; None without a landing or without planned ground phases.
 
     Without a `[landing]` in the scenario, a simulated flight ends in the air over the landing point.  This rule then
     leaves the descent to the rules `landing` and `approach`.  In an imported log, the descent ends on the ground.
@@ -238,7 +238,7 @@ def _find_landing(requirements: RouteRequirements) -> _Landing | None:
 def _fields_by_leg(
     requirements: RouteRequirements, landing: _Landing | None
 ) -> dict[int, tuple[tuple[float, float], ...]]:
-    """Return, by leg number, the home or landing positions near which the leg needs less height above ground.
+    """Return, by leg number, the home or landing positions near which the leg may be lower.
 
     A position is (east, north), m.  The legs of a flown or logged take-off have the position of home.  The final
     approach has the landing point.  So have earlier legs of the landing, from the last waypoint that keeps the full
@@ -292,7 +292,7 @@ def _first_airborne_segment(requirements: RouteRequirements, aligned: AlignedTra
 
 
 def _last_clear_waypoint(requirements: RouteRequirements, final_leg: int) -> int:
-    """Return the last waypoint up to the start of the final approach that keeps the required height above ground.
+    """Return the last waypoint before the final approach that keeps the required height above ground.
 
     Return the start of the final approach if no waypoint keeps this height, or if the terrain is unknown.
     """
@@ -310,7 +310,7 @@ def _limit_source(requirements: RouteRequirements, limit: float) -> str:
 
 
 def _terrain_error_text(clearance: float, limit: float, error: float | None) -> str:
-    """Describe the clearance that remains after the terrain's error is subtracted; "" without a stated error.
+    """Describe the clearance that remains after the terrain's error is subtracted; "" without one.
 
     clearance, limit, error: minimum height above ground, required height and vertical error of the terrain data, m.
     """

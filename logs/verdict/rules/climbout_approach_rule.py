@@ -279,7 +279,10 @@ def _takeoff_profile(
 
 
 def _find_obstacles(requirements: RouteRequirements, path: GroundPath) -> _Obstacles:
-    """Return the obstacles on a path from home.  Height above ground is not checked on the first `LAUNCH_RUN_M`."""
+    """Return the obstacles on a path from home.
+
+    Height above ground is not checked on the first `LAUNCH_RUN_M`.
+    """
     terrain, end = requirements.setup.scenario.terrain, float(path.distance[-1])
     entered_hazard = first_hazard_on_path(requirements, path)
     if terrain is None or end <= LAUNCH_RUN_M:
@@ -386,7 +389,7 @@ def _degrees_text(slope: float) -> str:
 def _clear_courses_text(
     requirements: RouteRequirements, home_position: tuple[float, float], ground_altitude: float, top_altitude: float
 ) -> str:
-    """Describe the widest range of courses on which a launch climbs to the take-off's altitude without obstacles."""
+    """Describe the widest range of launch courses on which the climb is clear of obstacles."""
 
     def is_clear(course: float) -> bool:
         """Return True if a launch on a course (rad) climbs to the take-off's altitude without obstacles."""

@@ -20,7 +20,7 @@ from world.wording import count_text
 def completion_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, end_reason: str, log_complete: bool
 ) -> list[Finding]:
-    """Judge whether a flight followed a feasible plan to the last waypoint, and whether its log is complete."""
+    """Judge whether a feasible plan was flown to its last waypoint, with a complete log."""
     plan = requirements.setup.plan
     faults = []
     if plan is not None and plan.failures:
@@ -95,11 +95,7 @@ _RETURN_MODE = "RTL"
 
 
 def imported_completion_finding(setup: FlightSetup, stretches: Sequence[FlownLegs], log_complete: bool) -> Finding:
-    """Judge whether an imported flight completed its mission; undecided if the log may miss a part of it.
-
-    stretches: legs flown in each part of the log that followed the mission.
-    log_complete: False if the log is damaged or unfinished.
-    """
+    """Judge whether an imported flight completed its mission; undecided if the log may lack a part of it."""
     last_leg, faults, unknown_texts, notes = setup.route.legs - 1, [], [], []
     flown_legs = {leg for legs in stretches for leg in range(legs.first, legs.last - legs.partial)}
     leg_count = len(set(setup.route.leg_numbers.tolist()))

@@ -49,9 +49,8 @@ def energy_findings(
 ) -> list[Finding]:
     """Compare the energy used with the battery's energy without its reserve.
 
-    If a battery failsafe aborts the mission earlier, the limit is the energy used until then.  A mission with an
-    endless jump fails.  The finding is undecided if the capacity is a guess, if the power is unknown or too uncertain,
-    or if a failsafe may act.
+    If a battery failsafe acts earlier, it sets the limit.  A mission with an endless jump fails.  The finding is
+    undecided if the capacity is a guess, if the power is unknown or too uncertain, or if a failsafe may act.
     """
     setup, envelope = requirements.setup, requirements.setup.envelope
     limit, source, failsafe_text = _energy_limit(requirements)
@@ -108,7 +107,7 @@ def energy_findings(
 
 
 def _energy_limit(requirements: RouteRequirements) -> tuple[float, str, str]:
-    """Return the energy that a flight may use (Wh), the source of this limit, and a clause on a battery failsafe.
+    """Return the usable energy (Wh), the source of this limit, and a clause on a battery failsafe.
 
     The clause is "" if the reserve is reached before any failsafe acts.  The failsafes of several batteries set no
     limit, because the charge drawn from each battery is unknown.
@@ -141,7 +140,7 @@ def _max_energy_text(max_energy: float, source: str) -> str:
 
 
 def _endless_jump_faults(requirements: RouteRequirements, usable_energy: float, energy_ratio: float) -> list[Message]:
-    """Report an endless jump as a fault, with the number of rounds that the energy permits; [] without one.
+    """Report an endless jump as a fault, with the rounds that the energy permits; [] without one.
 
     A round is one repetition of the items between the jump and its destination.
     usable_energy: energy without the reserve, Wh.
@@ -196,7 +195,7 @@ def _energy_without_jump(requirements: RouteRequirements) -> float:
 
 
 def _flown_energy(requirements: RouteRequirements, aligned: AlignedTrack | None) -> tuple[float, float]:
-    """Return the energy (Wh) and the peak current (A) of a flight from take-off to landing; NaN if not flown."""
+    """Return the energy (Wh) and peak current (A) of a flight from take-off to landing; NaN if not flown."""
     track = None if aligned is None else aligned.track
     if requirements.ground_phases is not None:
         track = requirements.ground_phases.track
@@ -249,7 +248,7 @@ def _judge_battery_failsafes(requirements: RouteRequirements, energy_used: float
 
 
 def _return_time_fault(requirements: RouteRequirements, energy_used: float) -> Message | None:
-    """Return a message if the battery's remaining time may trigger a return before the mission ends, else None.
+    """Return a message if the battery's remaining time may trigger an early return, otherwise None.
 
     The remaining time is shortest at the end of the mission.  It is compared with the time of the longest return, so
     that the result holds at all times of the mission.
@@ -275,7 +274,7 @@ def _return_time_fault(requirements: RouteRequirements, energy_used: float) -> M
 
 
 def _reachable_voltage_text(requirements: RouteRequirements, failsafe: BatteryFailsafe, energy_used: float) -> str:
-    """Explain why a voltage failsafe may act before the battery is down to its reserve; otherwise return "".
+    """Explain why a voltage failsafe may act before the battery is at its reserve; otherwise "".
 
     The voltage of a battery under load is not simulated.  While the reserve is left, a healthy battery has more than
     `EMPTY_CELL_VOLTAGE_V` in each cell.  The number of cells is calculated with `NOMINAL_CELL_VOLTAGE_V`.
@@ -296,7 +295,7 @@ def _reachable_voltage_text(requirements: RouteRequirements, failsafe: BatteryFa
 
 
 def _used_text(requirements: RouteRequirements, energy_used: float, max_current: float, *, is_empty: bool) -> str:
-    """Describe the energy used (Wh) and the peak current (A), or the fuel used by an aircraft without a battery.
+    """Describe the energy used (Wh) and the peak current (A), or the fuel used by an engine.
 
     is_empty: True if the battery or the tank is empty at the end of the flight.
     """

@@ -28,7 +28,7 @@ _METHOD = "every point of the path's straight segments and arcs, and of the segm
 
 
 def make_zone_test(setup: FlightSetup) -> Callable[[Zone], bool]:
-    """Return a test of zones: True if the setup's planned path violates the zone by more than `ROUNDING_M`.
+    """Return a test of zones: True if the setup's path violates a zone by more than `ROUNDING_M`.
 
     >>> from logs.recording.example_log import example_log
     >>> from world.airspace.zones import Cylinder
@@ -189,7 +189,7 @@ def _zone_finding(
 
 
 def _visit_facts(visit: Record) -> list[Fact]:
-    """Return as facts the violation's duration, its number of entries, and time, position and leg of entry and exit."""
+    """Return facts on a violation: its duration, its entries, and where it begins and ends."""
     facts = [Fact("time beyond", visit.violation_time, "s"), Fact("entries", float(visit.entries), "1")]
     for event in ("entry", "exit"):
         for coordinate, unit in (("time", "s"), ("east", "m"), ("north", "m"), ("up", "m"), ("leg", "1")):

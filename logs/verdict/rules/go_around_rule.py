@@ -264,10 +264,7 @@ def _unknown_path_text(
 def _go_around_finding(
     requirements: RouteRequirements, terrain: Terrain, landing: _Landing, *, is_required: bool
 ) -> Finding:
-    """Simulate go-arounds from several positions on the glide, and judge the worst one.
-
-    is_required: True if a faulty go-around fails; otherwise it leaves the finding undecided.
-    """
+    """Simulate go-arounds from positions on the glide, and judge the worst; it fails only if required."""
     setup, place, height = requirements.setup, requirements.waypoint(landing.waypoint), landing.climb_height
     climb_text = (
         f"the aircraft climbs to {height:.0f} m above home,"
@@ -403,9 +400,8 @@ def _judge_go_around(
     destination: LandingStart,
     top_altitude: float,
 ) -> _GoAround:
-    """Return a simulated go-around with its outcome: heights above ground, hazards, and where its path is unknown.
+    """Return a simulated go-around with its outcome: heights, hazards, and where its path is unknown.
 
-    go_around: abort point, without an outcome.
     result: record of dtype `flight.autopilots.simulated_returns.RETURN_RESULT`.
     positions: simulated path with one point per second, m, (n, 3).
     destination: destination of the go-around.

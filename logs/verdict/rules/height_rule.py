@@ -58,8 +58,9 @@ def height_findings(
 
 
 def max_segment_heights(terrain: Terrain, points: Floats) -> tuple[Floats, Floats]:
-    """Return each segment's maximum height above ground (m), and its place as a fraction of the segment, (n - 1,) each.
+    """Return each segment's maximum height above ground (m) and its place, (n - 1,) each.
 
+    The place is a fraction of the segment.
     points: ends of the segments as east, north and up, m, (n, 3).
 
     The height is exact for ground that is interpolated bilinearly; NaN if a segment leaves the terrain data.  It is

@@ -127,7 +127,7 @@ def _climb_clearance(requirements: RouteRequirements, path: GroundPath) -> tuple
 
 
 def _remaining_runway(requirements: RouteRequirements, take_off: TakeOff, position: Floats) -> float:
-    """Return the runway remaining at the aircraft's last contact with it, m; inf for a launch without a runway."""
+    """Return the runway left at the aircraft's last contact with it, m; inf without a runway."""
     terrain = requirements.setup.scenario.terrain
     if take_off.launch.method != "runway" or terrain is None:
         return math.inf
@@ -160,7 +160,7 @@ def _describe_take_off(
 
 
 def _describe_climb(track: Track, distances: Floats, terrain: Terrain | None) -> str:
-    """Describe the climb after a launch: its slope and final course, or the height lost over the distance flown.
+    """Describe the climb after a launch: slope and final course, or the height lost.
 
     distances: distance of each row along the track, m, (t,).
     """

@@ -128,7 +128,7 @@ def _unknown_station_text(requirements: RouteRequirements, link: RadioLink) -> s
 
 
 def _end_of_reactions(requirements: RouteRequirements, aligned: AlignedTrack | None) -> float:
-    """Return the time from which the autopilot no longer reacts to a loss of the link, s; inf without such a time.
+    """Return the time from which the autopilot ignores a loss of the link, s; inf without one.
 
     From then on, the aircraft is returning anyway, or ArduPlane is in a landing sequence
     (`Plane::failsafe_in_landing_sequence`).
@@ -186,7 +186,7 @@ def _judge_reaction_returns(
 
 
 def _starts_in_outages(starts: ReturnStarts, outages: Sequence[Outage], delay: float, interval: float) -> ReturnStarts:
-    """Select the starts of returns during outages, from the time at which the autopilot notices each outage.
+    """Select the starts of returns in outages, from the time when the autopilot notices them.
 
     One start before and one start after each such period is included.
 

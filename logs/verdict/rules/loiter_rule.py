@@ -94,7 +94,7 @@ def _circle_center(requirements: RouteRequirements, corner: int) -> Floats:
 def merge_loiter_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, findings: Sequence[Finding]
 ) -> tuple[Finding, ...]:
-    """Merge the findings on the corners of each loiter into one, and keep each rule's worst finding on its legs."""
+    """Merge the findings on each loiter's corners, and keep each rule's worst finding on its legs."""
     joins_at_center = requirements.setup.autopilot.loiters.steers_to_center
     merged: list[Finding | None] = list(findings)
     # Indexed by rule and place: a mission of jumps has hundreds of loiters, and each thousands of findings.
@@ -317,7 +317,7 @@ def _flown_facts(
 
 
 def _flown_laps(requirements: RouteRequirements, aligned: AlignedTrack | None, circle: LoiterCircle) -> float:
-    """Return the number of laps flown around a loiter's center, between the waypoints before and after the loiter.
+    """Return the laps flown around a loiter's center between the waypoints before and after it.
 
     The number is NaN without a flight, if the flight did not reach the loiter's last corner, or if the autopilot
     follows the drawn corners instead of circling the center.
@@ -345,7 +345,7 @@ def _is_whole(requirements: RouteRequirements, aligned: AlignedTrack | None, cir
 
 
 def _uses_parameter_radius(requirements: RouteRequirements, circle: LoiterCircle) -> bool:
-    """Return True if the autopilot takes a loiter's radius from its parameter, because the mission item states none."""
+    """Return True if a loiter's radius comes from a parameter, because its mission item states none."""
     rules, seq = requirements.setup.autopilot.loiters, int(requirements.setup.route.items[circle.first])
     loiter = next((stated_loiter(item) for item in requirements.setup.mission.items if item.seq == seq), None)
     return rules.exits_on_heading and rules.radius != 0.0 and loiter is not None and rules.radius_of(loiter) == 0.0
@@ -368,7 +368,7 @@ def _held_bank(
 
 
 def _hazards_text(requirements: RouteRequirements, circle: LoiterCircle, min_radius: float) -> str:
-    """Describe the hazards too close to a loiter that is flown wider than drawn; return "" if there are none.
+    """Describe hazards too close to a loiter that is flown wider than drawn; "" if there are none.
 
     min_radius: radius at the bank limit, with which the loiter is flown, m.
     """
@@ -402,7 +402,7 @@ def _has_reached(requirements: RouteRequirements, aligned: AlignedTrack, circle:
 
 
 def _small_radius_faults(requirements: RouteRequirements, circle: LoiterCircle, min_radius: float) -> list[Message]:
-    """Return a fault as a list if a loiter's radius is below `min_radius`, the radius at the bank limit (m)."""
+    """Return a fault if a loiter's radius is below `min_radius`, the radius at the bank limit, m."""
     if circle.radius >= min_radius - LOITER_RADIUS_TOLERANCE_M:
         return []
     speed = float(requirements.route.leg_airspeeds[circle.first])

@@ -24,7 +24,7 @@ from world.wording import count_text
 def departure_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge loss of control by unusable rows of the log, maximum bank, minimum airspeed and ground contact.
+    """Judge loss of control by unusable rows, maximum bank, minimum airspeed and ground contact.
 
     Return [] before a flight.  Without usable rows, the finding is not judged.
     """

@@ -93,7 +93,7 @@ _Remark = tuple[bool | Literal["refused"] | None, int | None, str | Message]
 
 
 def _universal_findings(remarks_by_check: list[list[_Remark]]) -> list[Finding]:
-    """Return a finding for each check that fails for every autopilot; the finding does not name PX4's function.
+    """Return a finding for each check that fails for every autopilot, without PX4's name for it.
 
     Items that only PX4 refuses are left out, because they do not concern a mission that ArduPlane flies.
     """
@@ -145,7 +145,7 @@ def _check_finding(check: str, remarks: list[_Remark], refuses: bool) -> Finding
 
 
 def _arduplane_refusal_findings(setup: FlightSetup) -> list[Finding]:
-    """Return one finding on the items that ArduPlane refuses at upload but PX4 accepts; [] for other autopilots."""
+    """Return one finding on items that only ArduPlane refuses at upload; [] for other autopilots."""
     refused_items = [
         item
         for item in setup.mission.items
@@ -354,7 +354,7 @@ def _rally_distance(mission: Mission) -> float:
 
 
 def _home_fence_violation(setup: FlightSetup) -> str:
-    """Describe how home violates the mission's fence, such as "inside an exclusion polygon"; "" if it does not."""
+    """Describe how home violates the fence, as "inside an exclusion polygon"; "" if it does not."""
     mission, checks = setup.mission, setup.autopilot.checks
     if mission.home is None or not mission.fences:
         return ""
@@ -416,7 +416,10 @@ def _check_validity(mission: Mission, refuses: bool) -> Iterator[_Remark]:
 
 
 def _height_above_home(mission: Mission, item: MissionItem) -> float:
-    """Return an item's height above home, m; NaN if unknown.  A height above terrain is returned unchanged."""
+    """Return an item's height above home, m; NaN if unknown.
+
+    A height above terrain is returned unchanged.
+    """
     if item.frame in OVER_HOME | OVER_TERRAIN:
         return item.alt
     return item.alt - mission.home.alt if mission.home is not None else math.nan
@@ -537,7 +540,7 @@ def _check_gates(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
 
 
 def _check_distances(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
-    """Yield remarks on gates too close to a waypoint, and on the longest distance if older PX4 releases refuse it."""
+    """Yield remarks on gates close to a waypoint, and on a distance that older PX4 releases refuse."""
     yield from _check_gates(mission, origin)
     flown_items = _flown_items(mission)
     if len(flown_items) < 2:

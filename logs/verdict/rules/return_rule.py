@@ -79,7 +79,7 @@ def return_findings(
 def flown_return_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, end_reason: str, log_complete: bool
 ) -> list[Finding]:
-    """Judge the RTL of a simulated flight, the RTL after the last item, and the scenario's requirements on returns.
+    """Judge a simulated flight's RTL, its RTL after the last item, and the scenario's requirements.
 
     end_reason: "completed" if the flight ended after its RTL loiter, otherwise the reason for its end.
     log_complete: not used, because the completion rule reports it.
@@ -143,7 +143,7 @@ def _automatic_return_findings(requirements: RouteRequirements, end: ReturnStart
 
 
 def _requirement_findings(requirements: RouteRequirements, starts: Callable[[float], ReturnStarts]) -> list[Finding]:
-    """Judge whether RTLs and glides from the whole path meet the scenario's requirements; [] without requirements.
+    """Judge whether RTLs and glides meet the scenario's requirements; [] without requirements.
 
     starts: function that samples the starts of RTLs at an interval, s.
     """

@@ -49,7 +49,7 @@ from world.wind import W20
 def slope_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge the slope of each leg, except in a survey's turnarounds; if ``geometric``, judge only the route."""
+    """Judge the slope of each leg, except in turnarounds; if ``geometric``, judge only the route."""
     findings, turnaround_legs = [], requirements.turnaround_legs()
     for leg in range(requirements.legs):
         if leg in turnaround_legs:
@@ -65,7 +65,7 @@ def slope_findings(
 def _leg_finding(
     requirements: RouteRequirements, leg: int, measure: SlopeMeasure | None, *, is_complete: bool
 ) -> Finding:
-    """Judge a leg's planned slope; after a flight also its flown slope, altitude, throttle and performance.
+    """Judge a leg's planned slope and, after a flight, its flown slope, altitude and throttle.
 
     measure: measurements of the flown leg; None before a flight.
     is_complete: True if the flight reached the last waypoint.
@@ -376,7 +376,7 @@ def _no_progress_text(requirements: RouteRequirements, leg: int) -> str:
 
 
 def _limit_text(requirements: RouteRequirements, leg: int, limit: float, source: str, *, is_climb: bool) -> str:
-    """Describe the limit on a leg's slope (rad); a limit of the aircraft is described with airspeed and wind."""
+    """Describe the limit on a leg's slope (rad), for the aircraft with airspeed and wind."""
     if source == "scenario":
         return f"the scenario allows {math.degrees(limit):.1f}°"
     speed = float(requirements.route.leg_airspeeds[leg])
@@ -393,7 +393,7 @@ def _limit_text(requirements: RouteRequirements, leg: int, limit: float, source:
 
 
 def _wind_text(tailwind: float, crosswind: float) -> str:
-    """Describe the larger of two wind components (m/s): "5 m/s crosswind", "... tailwind" or "... headwind"."""
+    """Describe the larger of two wind components (m/s), such as "5 m/s crosswind"."""
     if abs(crosswind) > abs(tailwind):
         return f"{abs(crosswind):.0f} m/s crosswind"
     return f"{abs(tailwind):.0f} m/s {'tailwind' if tailwind > 0.0 else 'headwind'}"
@@ -405,7 +405,7 @@ def _distance_text(distance: float) -> str:
 
 
 def _throttle_text(requirements: RouteRequirements, name: str) -> str:
-    """Describe a throttle limit: "throttle at full", "throttle at idle", or the parameter that limits full throttle.
+    """Describe a throttle limit, such as "throttle at full", or by the parameter that limits it.
 
     name: "full" or "idle".
     """
@@ -465,7 +465,7 @@ def _measured_facts(requirements: RouteRequirements, leg: int, measure: SlopeMea
 
 
 def _aircraft_slope_facts(requirements: RouteRequirements, leg: int) -> list[Fact]:
-    """Return the steepest climb or descent that the aircraft can fly on a leg, as a fact of a failed finding."""
+    """Return, as a fact, the steepest climb or descent that the aircraft can fly on a leg."""
     limits = requirements.climb if float(requirements.slopes[leg]) >= 0.0 else requirements.dive
     return [Fact(AIRCRAFT_SLOPE, math.degrees(float(limits[leg])), "deg")]
 
@@ -473,7 +473,7 @@ def _aircraft_slope_facts(requirements: RouteRequirements, leg: int) -> list[Fac
 def _flown_faults(
     requirements: RouteRequirements, leg: int, measure: SlopeMeasure, limit: float, performance_faults: list[Message]
 ) -> dict[str, Message]:
-    """Return the faults of a flown leg by quantity: "slope", "height", and "full" or "idle" for the throttle.
+    """Return the faults of a flown leg by quantity: "slope", "height", and "full" or "idle" throttle.
 
     limit: limit of the slope, rad.
     performance_faults: faults that show a lack of performance.
@@ -541,7 +541,7 @@ def _height_error_limit(measure: SlopeMeasure) -> float:
 
 
 def _rate_limit_slope(requirements: RouteRequirements, leg: int, *, is_climb: bool) -> tuple[float, str]:
-    """Return the slope at the autopilot's climb or sink rate limit, over the ground, rad, and the limit's name.
+    """Return the slope over the ground at the autopilot's climb or sink rate limit, and its name.
 
     The slope is inf without a limit, and for an imported flight whose log does not contain the parameter.
     """
@@ -559,7 +559,7 @@ def _rate_limit_slope(requirements: RouteRequirements, leg: int, *, is_climb: bo
 
 
 def _rate_limit_faults(requirements: RouteRequirements, leg: int, measure: SlopeMeasure) -> list[Message]:
-    """Return a fault if the autopilot's climb or sink rate limit kept a flight from reaching the leg's height."""
+    """Return a fault if the autopilot's rate limit kept a flight from the leg's height."""
     planned_slope = float(requirements.slopes[leg])
     sign = 1.0 if planned_slope >= 0.0 else -1.0
     slope, name = _rate_limit_slope(requirements, leg, is_climb=planned_slope >= 0.0)

@@ -71,10 +71,7 @@ def _parameter_findings(requirements: RouteRequirements) -> list[Finding]:
 def _speed_finding(
     requirements: RouteRequirements, aligned: AlignedTrack | None, leg: int, demanded: float, *, geometric: bool
 ) -> Finding:
-    """Judge the commanded and the flown airspeed on one leg.
-
-    demanded: airspeed that the mission states, true or equivalent, m/s.
-    """
+    """Judge the airspeed on one leg; `demanded` is the mission's airspeed, true or equivalent, m/s."""
     commanded = float(requirements.route.leg_airspeeds[leg])
     min_speed, max_speed, faults = _level_speed_range(requirements, leg, commanded)
     notes = [*_speed_range_notes(requirements, leg), _command_text(demanded, commanded, min_speed, max_speed)]
@@ -207,7 +204,7 @@ def _uncertainty_text(requirements: RouteRequirements, leg: int, commanded: floa
 
 
 def _speed_range_notes(requirements: RouteRequirements, leg: int) -> list[str]:
-    """Return a note if the autopilot does not accept the speed that the mission commands on a leg; otherwise []."""
+    """Return a note if the autopilot does not accept a leg's commanded speed; otherwise []."""
     setup, autopilot = requirements.setup, requirements.setup.autopilot
     command, limits = float(setup.route.leg_airspeeds[leg]), autopilot.speeds.limits
     if limits is None or limits.min <= command <= limits.max:
@@ -218,7 +215,10 @@ def _speed_range_notes(requirements: RouteRequirements, leg: int) -> list[str]:
 
 
 def _short_leg_notes(requirements: RouteRequirements, leg: int, commanded: float) -> list[str]:
-    """Return a note if a leg is too short to reach its airspeed at `MAX_STEADY_ACCELERATION_MPS2`, otherwise []."""
+    """Return a note if a leg is too short to reach its airspeed; otherwise [].
+
+    The acceleration is `MAX_STEADY_ACCELERATION_MPS2`.
+    """
     previous_speed = float(requirements.route.leg_airspeeds[leg - 1]) if leg else commanded
     change, leg_length = commanded - previous_speed, float(requirements.runs[leg])
     duration = abs(change) / MAX_STEADY_ACCELERATION_MPS2
@@ -250,7 +250,7 @@ def _nearest_mean_airspeed(aligned: AlignedTrack, leg: int, commanded: float) ->
 
 
 def _one_second_means(aligned: AlignedTrack, rows: slice) -> Floats:
-    """Return the moving one-second means of the airspeed, m/s; one mean if the rows span less than a second."""
+    """Return moving one-second means of the airspeed, m/s; one mean for less than a second."""
     speed = aligned.track.airspeed[rows].astype(np.float64)
     width = max(1, min(speed.size, round(1.0 / aligned.tick)))
     sums = np.concatenate([[0.0], np.cumsum(speed)])
@@ -304,7 +304,7 @@ def _level_speed_range(
 def _measure_airspeed(
     requirements: RouteRequirements, aligned: AlignedTrack, leg: int
 ) -> tuple[float, float, float] | None:
-    """Return a leg's mean airspeed, its tolerance and the minimum one-second mean, m/s; None for too short a leg.
+    """Return a leg's mean airspeed, its tolerance and its minimum one-second mean, m/s, or None.
 
     The tolerance allows for gusts and for a change of slope at the start of the leg.
     """

@@ -50,7 +50,7 @@ class _Margin:
 def stall_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge the minimum margin of airspeed above the stall in a bank; return [] for a route without a turn.
+    """Judge the minimum margin of airspeed above the stall in a bank; [] without a turn.
 
     A route whose airspeed is below the stall speed in a planned turn also fails after a flight.  An autopilot that flew
     faster or banked less does not make the route flyable.
@@ -65,7 +65,7 @@ def stall_findings(
 
 
 def _planned_findings(requirements: RouteRequirements) -> list[Finding]:
-    """Judge the planned turn with the smallest margin above the stall; return [] for a route without a turn."""
+    """Judge the planned turn with the smallest margin above the stall; return [] without a turn."""
     worst_margin: tuple[float, int, _Margin] | None = None
     for corner in range(1, requirements.legs):
         for speed in requirements.route.leg_airspeeds[corner - 1 : corner + 1].tolist():

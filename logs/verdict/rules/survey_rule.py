@@ -116,7 +116,7 @@ def _overlap_findings(requirements: RouteRequirements, aligned: AlignedTrack | N
 
 
 def overlap_text(measure: OverlapMeasure, check: str) -> str:
-    """Describe the minimum overlap of a survey's photos, the photo lines with it, and the required overlap.
+    """Describe a survey's minimum overlap of photos, the lines with it, and the required overlap.
 
     Return "" if the overlap is unknown.
 
@@ -144,7 +144,7 @@ def overlap_text(measure: OverlapMeasure, check: str) -> str:
 
 
 def _unflyable_turnaround_findings(requirements: RouteRequirements, survey: Survey) -> list[Finding]:
-    """Report turnarounds that are too tight or too steep to be flown as drawn and that have hazards within reach.
+    """Report turnarounds near hazards that are too tight or too steep to be flown as drawn.
 
     The path of such a turnaround is known only after a flight.  The turns onto the first line and off the last line
     are also turnarounds.
@@ -181,7 +181,7 @@ def _is_too_tight(requirements: RouteRequirements, corner: int) -> bool:
 
 
 def _off_altitude_length(requirements: RouteRequirements, first: int, last: int, end: int, tolerance: float) -> float:
-    """Return the length of route after a turnaround on which the aircraft is not yet at the planned altitude, m.
+    """Return the length of route after a turnaround that is flown off the planned altitude, m.
 
     The aircraft starts the turnaround at the planned altitude, and then climbs or descends no steeper than its limits.
     first, last: waypoints at which the turnaround begins and ends.
@@ -289,7 +289,7 @@ def _turn_lead(requirements: RouteRequirements, line: PhotoLine) -> float:
 
 
 def _clip_to_length(distance: float, length: float) -> float:
-    """Limit a distance to the range from 0 to `length`, m; return `length` for a distance that is not finite."""
+    """Limit a distance to the range 0 to `length`, m; return `length` for a non-finite distance."""
     return min(max(distance, 0.0), length) if math.isfinite(distance) else length
 
 
@@ -333,7 +333,7 @@ def unusable_parts_text(measure: LineMeasure) -> str:
 
 
 def _coverage_fault(measure: LineMeasure, name: str) -> Message:
-    """Describe the usable fraction of a photo line, the causes of the loss, and the lengths lost at the line's ends."""
+    """Describe the usable fraction of a photo line, the causes of the loss, and the lost ends."""
     ends_text = f"; its first {measure.lost_at_start:.0f} m and last {measure.lost_at_end:.0f} m are lost"
     if max(measure.lost_at_start, measure.lost_at_end) < 1.0:
         ends_text = ""

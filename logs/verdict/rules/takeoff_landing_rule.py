@@ -33,7 +33,7 @@ _RESULT_BEYOND_LIMIT = {"takeoff": None, "landing": False}
 def takeoff_findings(
     requirements: RouteRequirements, _aligned: AlignedTrack | None = None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge the climb from the ground at home to the take-off item's waypoint; return [] without a take-off item.
+    """Judge the climb from home to the take-off item's waypoint; [] without a take-off item.
 
     Return [] also if the take-off was flown, because the launch rule then judges it.
     """
@@ -99,7 +99,7 @@ def _gentle_launch_findings(requirements: RouteRequirements, launch: Launch) -> 
 def landing_findings(
     requirements: RouteRequirements, _aligned: AlignedTrack | None = None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge the slope of the descent from the last waypoint to the landing; return [] without a landing item.
+    """Judge the slope from the last waypoint to the landing; return [] without a landing item.
 
     The finding is undecided if no waypoint of the route belongs to the landing.  Return [] also for a flown landing,
     which the touchdown rule judges.

@@ -79,7 +79,7 @@ def threat_findings(
 
 
 def _sphere_sizes(threats: Threats, kind: SphereKind) -> tuple[Floats, Floats]:
-    """Return the radii and the exposure scales of the threats' missile or radar spheres, m: two arrays (n,)."""
+    """Return radius and exposure scale of each threat's missile or radar sphere, m, (n,) each."""
     if kind == "missile":
         return threats.kill_radius, threats.kill_scale
     return threats.detection_radius, threats.detection_scale

@@ -66,7 +66,7 @@ class _Landing(NamedTuple):
 def touchdown_findings(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge a flown landing; before a flight, only report a strip that is too short to judge the touchdown."""
+    """Judge a flown landing; before a flight, only report a strip too short to be judged."""
     ground_phases = requirements.ground_phases
     if ground_phases is None or ground_phases.procedures.approach is None:
         planned_approach = requirements.setup.ground_phases.approach if geometric else None
@@ -262,7 +262,7 @@ def _detect_faults(approach: Approach, landing: _Landing) -> list[Message]:
 
 
 def _short_strip_messages(approach: Approach) -> list[Message]:
-    """Return a message if a strip is shorter than the uncertainty of the simulated touchdown point, otherwise []."""
+    """Return a message if a strip is too short for the uncertain touchdown point; otherwise []."""
     if approach.strip.length > 2.0 * TOUCHDOWN_ERROR_M:
         return []
     brief = f"the strip is {approach.strip.length:.0f} m long"

@@ -161,8 +161,9 @@ def _unflown_turn_text(
 
 
 def _fly_over_notes(requirements: RouteRequirements, waypoint: int, turn: float) -> list[str]:
-    """Return a note if a waypoint is flown over because a fly-by arc would miss its acceptance radius, otherwise [].
+    """Return a note if a fly-by arc would miss the acceptance radius; otherwise [].
 
+    The waypoint is then flown over.
     turn: course change, rad.
     """
     radius = float(requirements.radius[waypoint])
@@ -258,7 +259,7 @@ def _measured_facts(measure: TurnMeasure | None) -> list[Fact]:
 def _flown_faults(
     requirements: RouteRequirements, waypoint: int, measure: TurnMeasure, limit: float
 ) -> dict[str, Message]:
-    """Return the faults of a flown turn by quantity, with the names of `_flown_facts`, or "circles" for full circles.
+    """Return the faults of a flown turn by quantity: names of `_flown_facts`, or "circles".
 
     limit: largest course change, rad.
     """
@@ -291,7 +292,7 @@ def _flown_faults(
 
 
 def _tight_turn_fault(requirements: RouteRequirements, waypoint: int, measure: TurnMeasure) -> Message | None:
-    """Return a fault if a turn passed its waypoint closer than an arc at the bank limit would, otherwise None.
+    """Return a fault if a turn was tighter than an arc at the bank limit, otherwise None.
 
     The arc between legs that are too short for their turn is tighter than the bank limit permits.  A flight along this
     arc exceeded the bank limit or slowed down.

@@ -200,7 +200,7 @@ def _closest_approach(
 def explain_by_circles(
     requirements: RouteRequirements, aligned: AlignedTrack | None, findings: Sequence[Finding]
 ) -> tuple[Finding, ...]:
-    """Add to the reason of each failed finding the circles that the autopilot flew at the finding's waypoints."""
+    """Add to each failed finding's reason the circles that the autopilot flew at its waypoints."""
     circles = [] if aligned is None else waypoint_circles(requirements, aligned)
     if aligned is None or not circles:
         return tuple(findings)
