@@ -67,9 +67,9 @@ def headline(findings: Sequence[Finding], flyable: bool, setup_notes: Sequence[s
         notes = [*filter(None, unjudged), *_near_miss_notes(findings), *_altitude_notes(findings)]
         return "; ".join(["flyable", *notes, *setup_notes])
     failed_findings = _failed_by_urgency(findings)
-    if not failed_findings and (open_text := undecided_text(findings)):
+    if not failed_findings and (reason := undecided_text(findings)):
         notes = [*_near_miss_notes(findings), *_altitude_notes(findings)]
-        return "; ".join([f"not judged in full: {open_text}", *notes, *setup_notes])
+        return "; ".join([f"not judged in full: {reason}", *notes, *setup_notes])
     named_findings = _headline_findings(failed_findings)
     unnamed_count = len(failed_findings) - len(named_findings)
     text = (
@@ -234,16 +234,16 @@ def _altitude_notes(findings: Sequence[Finding]) -> list[str]:
     ]
 
 
-def _passing_errors(findings: Sequence[Finding], rule: str, what: str) -> list[tuple[float, Place]]:
+def _passing_errors(findings: Sequence[Finding], rule: str, fact_name: str) -> list[tuple[float, Place]]:
     """Return value and place of one fact from the findings of a rule that did not fail.
 
-    what: name of the fact.
+    fact_name: name of the fact.
     """
     return [
         (fact.value, finding.place)
         for finding in findings
         for fact in finding.facts
-        if finding.rule == rule and finding.ok is not False and fact.what == what
+        if finding.rule == rule and finding.ok is not False and fact.what == fact_name
     ]
 
 
@@ -440,7 +440,7 @@ def _parameter_lines(setup: FlightSetup, *, is_flown: bool) -> list[str]:
         return []
     contradictions = [
         *(_misspelling_lines(parameters) if isinstance(parameters, ParameterSet) else ()),
-        *([f"Parameters that do not fit: {'; '.join(parameters.contradictions)}"] if parameters.contradictions else []),
+        *([f"Contradictory parameters: {'; '.join(parameters.contradictions)}"] if parameters.contradictions else []),
     ]
     if not is_flown and all(len(name) <= LONGEST_NAME for name in parameters.unused):
         return contradictions

@@ -88,8 +88,8 @@ def link_coverage(
     ground = terrain.height(grid_east, grid_north)
     altitudes = ground + height.value if height.is_above_ground else np.full(ground.shape, height.value)
     is_in_ground = altitudes <= ground
-    is_open = np.isfinite(ground) & ~is_in_ground
+    is_in_air = np.isfinite(ground) & ~is_in_ground
     margin = np.full(ground.shape, np.nan)
-    positions = np.column_stack([grid_east[is_open], grid_north[is_open], altitudes[is_open]])
-    margin[is_open] = link_margins(link, terrain, antenna, positions)
+    positions = np.column_stack([grid_east[is_in_air], grid_north[is_in_air], altitudes[is_in_air]])
+    margin[is_in_air] = link_margins(link, terrain, antenna, positions)
     return LinkCoverage(west, south, side, height, margin, is_in_ground)

@@ -81,7 +81,7 @@ def energy_findings(
         if is_guessed:
             reason = f"{GUESSED_BATTERY_TEXT}; {reason}"
         elif energy > limit and not failsafe_text:
-            reason += f"; {ENERGY_RESERVE_FRACTION:.0%} must be left"
+            reason += f"; a reserve of {ENERGY_RESERVE_FRACTION:.0%} must be left"
         reason += "" if is_guessed or max_energy <= needed_energy else _max_energy_text(max_energy, envelope.source)
         reason += failsafes.unjudged_text if failsafes.faults else f"{failsafe_text}{failsafes.unjudged_text}"
     undecided_faults = failsafes.undecided if not faults and (is_guessed or energy <= limit) else []

@@ -157,8 +157,8 @@ def _zone_finding(
                 f"{visit.depth:.1f} m {side_text}",
                 f", {visit.violation_time:.1f} s in all"
                 + (f" ({visit.entries} times)" if visit.entries > 1 else "")
-                + f"; the {subject} {entry_text} at {_event_text(requirements, visit, 'entry')}, and {exit_text} at"
-                f" {visit.exit_time:.1f} s; it is {deepest_text} at {visit.at_time:.1f} s",
+                + f". The {subject} {entry_text} at {_event_text(requirements, visit, 'entry')}, is {deepest_text} at"
+                f" {visit.at_time:.1f} s, and {exit_text} at {visit.exit_time:.1f} s",
             )
         )
     elif visit.depth > 0.0:

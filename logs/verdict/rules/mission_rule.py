@@ -412,7 +412,7 @@ def _check_validity(mission: Mission, refuses: bool) -> Iterator[_Remark]:
                 f"{name} in frame {item.frame}: PX4 accepts this command only in frame {int(Frame.MISSION)}",
             )
     if mission.items and mission.items[0].command == C.NAV_LAND:
-        yield REFUSED, mission.items[0].seq, "starts with landing"
+        yield REFUSED, mission.items[0].seq, "the mission starts with a landing"
 
 
 def _height_above_home(mission: Mission, item: MissionItem) -> float:
@@ -432,9 +432,9 @@ def _check_takeoff(mission: Mission) -> Iterator[_Remark]:
         if item.command in TAKEOFFS:
             height = _height_above_home(mission, item)
             if height <= 0.0:
-                yield REFUSED, item.seq, f"takeoff altitude {height:.1f} m is not above home"
+                yield REFUSED, item.seq, f"the takeoff altitude is {height:.1f} m above home, but must be above 0 m"
             if has_earlier_place:
-                yield REFUSED, item.seq, "takeoff is not the first waypoint item"
+                yield REFUSED, item.seq, "the takeoff is not the first waypoint item"
         has_earlier_place = has_earlier_place or item.command in PLACES | TAKEOFFS | LANDINGS | {C.NAV_RETURN_TO_LAUNCH}
 
 
@@ -445,14 +445,14 @@ def _check_landing(mission: Mission) -> Iterator[_Remark]:
     landings = [k for k, command in enumerate(commands) if command in LANDINGS]
     seq = [item.seq for item in mission.items]
     if len(land_starts) > 1:
-        yield REFUSED, seq[land_starts[1]], "more than one land start command"
+        yield REFUSED, seq[land_starts[1]], "the mission has more than one DO_LAND_START"
     if landings and landings[0] == 0:
-        yield REFUSED, seq[0], "starts with landing"
+        yield REFUSED, seq[0], "the mission starts with a landing"
     for k, command in enumerate(commands):
         if command == C.NAV_RETURN_TO_LAUNCH and land_starts and land_starts[0] < k:
-            yield REFUSED, seq[k], "land start item before RTL item is not possible"
+            yield REFUSED, seq[k], "a return to launch after DO_LAND_START is not possible"
     if land_starts and not any(land > land_starts[0] for land in landings):
-        yield REFUSED, seq[land_starts[0]], "invalid land start: no landing follows"
+        yield REFUSED, seq[land_starts[0]], "no landing follows DO_LAND_START"
 
 
 def _check_approach(mission: Mission, origin: GeoOrigin, limits: FeasibilityLimits) -> Iterator[_Remark]:
@@ -480,11 +480,11 @@ def _check_approach(mission: Mission, origin: GeoOrigin, limits: FeasibilityLimi
                 continue
             distance = math.sqrt(distance * distance - radius * radius)
         elif previous.command != C.NAV_WAYPOINT:
-            yield REFUSED, item.seq, "unsupported landing approach entrance: only LOITER_TO_ALT or WAYPOINT"
+            yield REFUSED, item.seq, "the approach must begin with a WAYPOINT or a LOITER_TO_ALT"
             continue
         angle = math.atan2(altitude_difference, distance)
         if angle > limits.landing_angle + PX4_LANDING_BUFFER_RAD:
-            reason = f"the landing glide slope {math.degrees(angle):.1f}° is steeper than {max_angle:.1f}°"
+            reason = f"the landing glide slope is {math.degrees(angle):.1f}°, more than the maximum of {max_angle:.1f}°"
             yield REFUSED, item.seq, reason
 
 
@@ -499,7 +499,7 @@ def _check_required_ends(mission: Mission, limits: FeasibilityLimits, refuses: b
     elif limits.stated:
         yield REFUSED, None, missing_ends
     else:
-        # A single parameter of unknown value: no verdict, and irrelevant for another autopilot.
+        # The value of the parameter is unknown, so nothing is decided.  It does not concern other autopilots.
         yield None if refuses else True, None, missing_ends
 
 
@@ -522,7 +522,8 @@ def _check_first_distance(mission: Mission, origin: GeoOrigin) -> Iterator[_Rema
         yield (
             None,
             flown_items[0].seq,
-            f"first waypoint too far away: {distance:.0f} m from home, maximum {PX4_FIRST_WAYPOINT_DISTANCE_M:.0f} m",
+            f"the first waypoint is {distance:.0f} m from home, more than the maximum of"
+            f" {PX4_FIRST_WAYPOINT_DISTANCE_M:.0f} m",
         )
 
 
@@ -536,7 +537,7 @@ def _check_gates(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
     for previous, following in itertools.pairwise(flown_items):
         has_gate = C.CONDITION_GATE in (previous.command, following.command)
         if has_gate and _distance_between(previous, following, origin) < PX4_GATE_SPACING_M:
-            yield REFUSED, following.seq, "distance between waypoint and gate too close"
+            yield REFUSED, following.seq, "the gate and the neighbouring waypoint are too close together"
 
 
 def _check_distances(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
@@ -568,7 +569,7 @@ def _check_home_altitude(mission: Mission) -> Iterator[_Remark]:
             yield None, item.seq, reason
             return
         if _height_above_home(mission, item) < 0.0:
-            yield True, item.seq, f"waypoint {item.seq} below home: a warning"
+            yield True, item.seq, f"waypoint {item.seq} is below home, for which PX4 only warns"
 
 
 def _check_fence(setup: FlightSetup) -> Iterator[_Remark]:

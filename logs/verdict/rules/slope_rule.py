@@ -302,7 +302,7 @@ def _certain_limit_text(requirements: RouteRequirements, leg: int, limit: float,
 def _steep_arc_faults(requirements: RouteRequirements, leg: int, measure: SlopeMeasure | None) -> list[Message]:
     """Return a fault if the fly-by arc at a leg's end is steeper than the aircraft can fly, otherwise []."""
     arc = steep_arc(requirements, leg)
-    if arc is None or (measure is not None and _is_arc_kept(arc, measure)):
+    if arc is None or (measure is not None and _is_arc_within_tolerance(arc, measure)):
         return []
     corner = leg + 1
     place = requirements.waypoint(corner)
@@ -323,7 +323,7 @@ def _steep_arc_faults(requirements: RouteRequirements, leg: int, measure: SlopeM
     return [Message(arc_text + limit, brief)]
 
 
-def _is_arc_kept(arc: SteepArc, measure: SlopeMeasure) -> bool:
+def _is_arc_within_tolerance(arc: SteepArc, measure: SlopeMeasure) -> bool:
     """Return True if the height that a flown arc misses is within a leg's height tolerance.
 
     Other rules judge the airspeed and the height above ground on the arc.
@@ -438,7 +438,7 @@ def _flown_facts(requirements: RouteRequirements, leg: int, measure: SlopeMeasur
         limit_name = requirements.setup.autopilot.speeds.max_pitch_name
         facts.append(("pitch", f"pitch at its limit {limit_name} for {measure.pitch_limit_time:.0f} s"))
     arc = steep_arc(requirements, leg)
-    if arc is not None and _is_arc_kept(arc, measure):
+    if arc is not None and _is_arc_within_tolerance(arc, measure):
         place = place_text(requirements.waypoint(leg + 1))
         facts.append(("arc", f"the arc at {place} misses its height by only {arc.missing_height:.1f} m"))
     return facts

@@ -235,8 +235,8 @@ def _short_leg_notes(requirements: RouteRequirements, leg: int, commanded: float
         + previous_speed
     )
     return [
-        f"from {previous_speed:.1f} to {commanded:.1f} m/s takes about {duration:.0f} s and {needed_length:.0f} m,"
-        f" but the leg has {leg_length:.0f} m, so about {end_speed:.1f} m/s are reached"
+        f"the change from {previous_speed:.1f} to {commanded:.1f} m/s takes about {duration:.0f} s and"
+        f" {needed_length:.0f} m, but the leg has {leg_length:.0f} m, so about {end_speed:.1f} m/s are reached"
     ]
 
 

@@ -147,10 +147,10 @@ def _stall_finding(margin: _Margin, time_or_place_text: str, tolerance: float, *
     tolerance: accepted deficit of airspeed, m/s.
     """
     stall_text = (
-        f"{margin.speed:.1f} m/s {time_or_place_text}, stall {margin.stall_speed:.1f} m/s in"
+        f"airspeed {margin.speed:.1f} m/s {time_or_place_text}; the stall speed is {margin.stall_speed:.1f} m/s in"
         f" {math.degrees(margin.bank):.0f}° of bank"
     )
-    fault = message(stall_text, f" (level {margin.level_stall_speed:.1f} m/s; true airspeeds)")
+    fault = message(stall_text, f" and {margin.level_stall_speed:.1f} m/s in level flight (true airspeeds)")
     return make_finding(
         "stall",
         FLIGHT,
