@@ -159,7 +159,7 @@ def test_the_turn_with_the_least_margin_is_told(speeds: list[float], at: int) ->
     bank = math.atan(math.tan(math.radians(30.0)) * (18.0 / 20.0) ** 2)
     assert item.planned == 18.0
     assert item.limit == pytest.approx(16.0 / math.sqrt(math.cos(bank)), abs=1e-3)
-    assert f"18.0 m/s at waypoint {at}, stall" in item.reason
+    assert f"18.0 m/s at waypoint {at}; the stall speed" in item.reason
 
 
 def test_the_moment_of_the_least_margin_is_told() -> None:
