@@ -78,7 +78,7 @@ def test_energy_ends_a_flight(long: Path) -> None:
     assert short.ended == "nothing is left in the battery or the tank"
     assert float(short.track.energy[-1]) == pytest.approx(0.7 * used, rel=1e-3)
     none = fly_and_judge(dataclasses.replace(opened, battery=0.1 * used))
-    assert (len(none.track), none.ended) == (0, "not started: it takes 10 times the energy carried")
+    assert (len(none.track), none.ended) == (0, "not started: the mission needs 10 times the energy carried")
 
 
 def opened_calm(path: Path) -> FlightSetup:

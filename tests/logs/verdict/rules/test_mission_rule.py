@@ -40,7 +40,7 @@ REFUSED = {
         "checkDistancesBetweenWaypoints",
         (*GOOD[:2], wp(0, 1500, command=4501), GOOD[2]),
         3,
-        "distance between waypoint and gate too close",
+        "the gate and the neighbouring waypoint are too close together",
     ),
     "unsupported": (
         "checkMissionItemValidity",
@@ -59,21 +59,21 @@ REFUSED = {
         "checkTakeoff",
         (wp(0, 500, 0, command=22), *GOOD[1:]),
         1,
-        "takeoff altitude 0.0 m is not above home",
+        "the takeoff altitude is 0.0 m above home, but must be above 0 m",
     ),
-    "takeoff-late": ("checkTakeoff", (GOOD[1], GOOD[0], GOOD[2]), 2, "takeoff is not the first waypoint item"),
+    "takeoff-late": ("checkTakeoff", (GOOD[1], GOOD[0], GOOD[2]), 2, "the takeoff is not the first"),
     "two-land-starts": (
         "checkFixedWingLanding",
         (*GOOD, "2 189 0 0 0 0 0 0 0", "2 189 0 0 0 0 0 0 0", wp(1500, 0, 60), wp(0, 0, 0, command=21)),
         5,
-        "more than one land start",
+        "more than one DO_LAND_START",
     ),
-    "land-start-alone": ("checkFixedWingLanding", (*GOOD, "2 189 0 0 0 0 0 0 0", wp(1500, 0)), 4, "invalid land start"),
+    "land-start-alone": ("checkFixedWingLanding", (*GOOD, "2 189 0 0 0 0 0 0 0", wp(1500, 0)), 4, "no landing follows"),
     "rtl-after-land-start": (
         "checkFixedWingLanding",
         (*GOOD, "2 189 0 0 0 0 0 0 0", wp(1500, 0, 60), "2 20 0 0 0 0 0 0 0", wp(0, 0, 0, command=21)),
         6,
-        "land start item before RTL item",
+        "a return to launch after DO_LAND_START",
     ),
     "approach-below": (
         "checkFixedWindLandApproach",
@@ -86,7 +86,7 @@ REFUSED = {
         "checkFixedWindLandApproach",
         (*GOOD, wp(1500, 0, 150), wp(0, 0, 0, command=21)),
         5,
-        "the landing glide slope 5.7° is steeper than 5.0°",
+        "the landing glide slope is 5.7°, more than the maximum of 5.0°",
     ),
     "inside-orbit": (
         "checkFixedWindLandApproach",
@@ -98,7 +98,7 @@ REFUSED = {
         "checkFixedWindLandApproach",
         (*GOOD, wp(1500, 0, 60, command=18, p="1 0 150 0"), wp(0, 0, 0, command=21)),
         5,
-        "unsupported landing approach entrance",
+        "the approach must begin with",
     ),
 }
 
@@ -209,7 +209,7 @@ def test_first_waypoint_too_far() -> None:
     finding = of("checkDistanceToFirstWaypoint", wp(0, 500), wp(0, 1500), home=HOME_FAR)
     assert finding.ok is None
     assert judge_geometry(setup_of(wp(0, 500), wp(0, 1500), home=HOME_FAR)).flyable
-    assert "first waypoint too far away: 179" in finding.reason
+    assert "the first waypoint is 179" in finding.reason
 
 
 def test_a_good_landing_passes_every_check() -> None:
@@ -224,7 +224,7 @@ def test_what_px4_only_remarks_on_does_not_fail() -> None:
     assert of("checkMissionItemValidity", *GOOD, wp(1500, 0, frame=10)).ok is None
     below = of("checkIfBelowHomeAltitude", *GOOD, wp(1500, 0, -5))
     assert below.ok
-    assert "waypoint 4 below home" in below.reason
+    assert "waypoint 4 is below home" in below.reason
     apart = of("checkDistancesBetweenWaypoints", *GOOD)
     assert apart.ok
     assert "MIS_DIST_WPS" in apart.reason
@@ -371,7 +371,7 @@ def test_what_no_tangent_joins_to_a_circle_fails_where_the_autopilot_flies_there
     ((item, reason, ok),) = found
     assert (item, ok, verdict.flyable) == (expected[0], False, False)
     assert reason.startswith(expected[1])
-    assert reason.endswith("which is not judged")
+    assert reason.endswith("on a path that is not judged")
     # planfly's own guidance flies on tangents, and leaves it out with a note.
     assert not setup_of(wp(0, -3000, 300), *lines).route.unjoined_stops
 
