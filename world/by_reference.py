@@ -177,7 +177,11 @@ def _read_field(context: Any, builder: Any, reference: Reference, pointer: Any, 
 
 @unbox(Reference)
 def _unbox_reference(kind: Reference, value: Any, c: Any) -> Any:
-    """Generate the code that converts a Python instance to the pointer that a kernel takes."""
+    """Generate the code that converts a Python instance to the pointer that a kernel takes.
+
+    kind: numba's type of the pointer.
+    value, c: the instance and numba's context in the generated code.
+    """
     pointer_type = c.context.get_value_type(kind)
     pointer = cgutils.alloca_once_value(c.builder, ir.Constant(pointer_type, None))
     address = c.pyapi.object_getattr_string(value, "_address")

@@ -132,7 +132,11 @@ def _raise_unplaced(file: Path) -> NoReturn:
 
 
 def _read_crs(file: Path, driver: str, source: Any) -> str | None:
-    """Read the reference system of an open file as WKT; None if the file states none."""
+    """Read the reference system of an open file as WKT, with its height axis; None if the file states none.
+
+    driver: GDAL driver of the file.
+    source: the open file.
+    """
     import rasterio
 
     if source.crs is None:

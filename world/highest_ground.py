@@ -87,7 +87,8 @@ def _raise_cell(max_heights: Floats, i: int, j: int, height: float) -> None:
 def _highest_pixel(heights: Heights, to_pixel: PolyMapRecord, west: float, south: float, cell_side: float) -> float:
     """Return the height of the highest pixel in a cell, m.
 
-    west, south: corner of the cell, m.
+    heights, to_pixel: heights of the terrain, and the map from positions to its pixels.
+    west, south, cell_side: corner and side of the cell, m.
 
     The sides of the cell are taken as straight in pixel coordinates. Returns -inf for a cell without a pixel, and NaN
     if a pixel has no data.

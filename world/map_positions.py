@@ -96,6 +96,9 @@ def check_above_ground(key: str, point: Floats, source: str, ground: Terrain | N
 def make_threats(tables: list[ThreatTable], source: str, origin: GeoOrigin, ground: Terrain | None) -> Threats:
     """Convert the threats of a scenario file to threats on the map.
 
+    source: name of the file in messages.
+    ground: terrain; None if unknown.
+
     A threat without a height is on the ground. Raises ScenarioError for a threat without an altitude AMSL at a position
     without terrain.
     """

@@ -487,6 +487,10 @@ def _with_file_zones(
 ) -> ScenarioFile:
     """Return a scenario file's data with the zones of its zone files.
 
+    file_zones: zones of the files, and notes on reading them.
+    source: name of the files in messages.
+    bounds: [[west, east], [south, north]] of the scenario's area, (2, 2) m.
+
     Zones that are not near the scenario's area are omitted; a note states their number.
     """
     if not file_zones.zones and not file_zones.notes:

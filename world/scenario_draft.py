@@ -95,9 +95,11 @@ def make_draft(
 ) -> Draft:
     """Make the draft of a scenario for a flight from a start to a destination.
 
+    name: name of the scenario.
     height: height of start and destination above ground, m.
     raster: elevation file; None for flat ground.
     terrain: path of that file as the scenario file states it.
+    aircraft, airspeed, autopilot, version: see `Draft`.
 
     The area extends beyond the line from start to destination by about a third of the line's length on all sides. It is
     clipped to the data of the elevation file. Raises ArgumentError for positions that are outside the file, or too near

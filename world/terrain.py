@@ -85,6 +85,8 @@ def _rebuild_terrain(heights: Heights, *other_fields: Any) -> Terrain:
 def pixel_height(heights: Heights, col: float, row: float) -> float:
     """Return the bilinearly interpolated height at fractional pixel coordinates, m; NaN off the raster.
 
+    heights: m at the pixel centres, (rows, columns).
+
     The raster extends `EDGE_TOLERANCE` beyond the outer pixel centres.
     """
     rows, cols = heights.shape

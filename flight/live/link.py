@@ -519,7 +519,11 @@ class Link:
         dropped.streams += reason is RefusalReason.STREAMS
 
     def _register_peer(self, source: Address, system: int, component: int) -> Peer | None:
-        """Return the station at an address, which may be new; None if the table of stations is full."""
+        """Return the station at an address, which may be new; None if the table of stations is full.
+
+        source: address of the station.
+        system, component: MAVLink ids of the station.
+        """
         now = self.clock()
         self.peers = {key: peer for key, peer in self.peers.items() if now - peer.last_heard_time < PEER_TIMEOUT_S}
         peer = self.peers.get(source)

@@ -420,6 +420,9 @@ class MissionServer:
     def _receive_item(self, message: Any, station: Station, kind: MissionType, now: float) -> list[MissionReply]:
         """Store an item of an upload; request the next item, or replace the list after the last item.
 
+        message: MISSION_ITEM_INT or MISSION_ITEM.
+        kind: list to which the item belongs.
+
         Without an upload, an item is a command to fly to its position, or a repeated last item, which is acknowledged
         again.
         """

@@ -75,7 +75,10 @@ class Downlink:
     """
 
     def __init__(self, link: Link, status: Status, parameters: Parameters, show: ShowText, pause: float) -> None:
-        """Send the first heartbeat at once."""
+        """Make the first heartbeat due at once.
+
+        status: state of the vehicle, which telemetry reports.
+        """
         self._link = link
         self._status = status
         self._parameters = parameters
@@ -161,7 +164,10 @@ class MissionProgress:
     """
 
     def __init__(self, server: MissionServer, arming: ArmingState, status: Status, downlink: Downlink) -> None:
-        """Start with a whole mission, from its first item."""
+        """Start with a whole mission, from its first item.
+
+        status: state of the vehicle, whose mission fields are updated.
+        """
         self._server = server
         self._arming = arming
         self._status = status

@@ -354,7 +354,11 @@ def make_itinerary(mission: Mission, *, resets_jump_counters: bool = False) -> I
 
 
 def _add_command_limits(mission: Mission, steps: "_Steps", builder: "_ItineraryBuilder") -> None:
-    """Add open items and notes where an autopilot runs fewer jumps or commands than the mission has."""
+    """Add open items and notes where an autopilot runs fewer jumps or commands than the mission has.
+
+    steps: finished iteration over the mission's items.
+    builder: receives the open items and notes.
+    """
     jumps = [item.seq for item in mission.items if item.command in JUMPS and item.seq in steps.reached]
     if len(jumps) > _MAX_COUNTED_JUMPS:
         text = f"flown, but ArduPlane skips jumps beyond the first {_MAX_COUNTED_JUMPS}"
@@ -578,7 +582,12 @@ class _ItineraryBuilder:
                 self._set_home(item)
 
     def add_open_item(self, text: str, seq: int, *, arduplane: bool = True, px4: bool = True) -> None:
-        """Record an item that changes the path and is not simulated, for one or both autopilots."""
+        """Record an item that changes the path and is not simulated, for one or both autopilots.
+
+        text: command of the item, and the part that is not simulated.
+        seq: number of the item.
+        arduplane, px4: True to record it for this autopilot.
+        """
         for applies, notes, open_items in (
             (arduplane, self.notes.arduplane, self.open_items),
             (px4, self.notes.px4, self.px4_open_items),

@@ -248,7 +248,10 @@ def _signed_radius(
 ) -> float:
     """Return the radius of a loiter, m, negative to the left; add a note if it differs from the stated radius.
 
+    loiter: loiter of the stop.
     up: altitude of the loiter, m AMSL.
+    default_radius: function that returns the aircraft's default loiter radius.
+    rules: loiter rules of the autopilot.
 
     Raises MissionError if the stated radius is too large.
     """

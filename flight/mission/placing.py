@@ -354,7 +354,9 @@ def rally_stops(mission: Mission) -> tuple[RoutePoint, ...]:
 def _place_return_points(
     mission: Mission, home: Home, origin: GeoOrigin, heights: "_AltitudeConverter"
 ) -> tuple[ReturnPoint, ...]:
-    """Return home and the rally points on the map.
+    """Return home and the rally points on the map, home first.
+
+    heights: converter that has this home.
 
     Raises MissionError, which names the rally point, if it is beyond the maximum extent of the map.
     """
@@ -405,7 +407,9 @@ def _place_stops(
 
 
 def project_stops(source: str, stops: tuple[RoutePoint, ...], origin: GeoOrigin) -> Floats:
-    """Return east and north of each stop, (n, 2) m.
+    """Return east and north of each stop on the map about an origin, (n, 2) m.
+
+    source: name of the mission in errors.
 
     Raises MissionError, which names the item, if a stop is beyond the maximum extent of the map.
     """

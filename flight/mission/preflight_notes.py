@@ -132,7 +132,11 @@ def _heights_text(heights: list[float]) -> str:
 def _note_rally_points(
     points: tuple[ReturnPoint, ...], route: Route, scenario: Scenario, rules: ReturnRules
 ) -> Iterator[str]:
-    """Yield notes on rally points that are below ground, or too far away for an RTL from the route."""
+    """Yield notes on rally points that are below ground, or too far away for an RTL from the route.
+
+    points: the rally points on the map.
+    rules: RTL rules of the autopilot.
+    """
     for point in points:
         name = f"rally point {point.number}"
         ground = math.nan if scenario.terrain is None else float(scenario.terrain.height(point.east, point.north))
@@ -185,6 +189,9 @@ def _note_autoland(
     mission: Mission, scenario: Scenario, parameters: Mapping[str, float], assumed_parameters: Mapping[str, float]
 ) -> Iterator[str]:
     """Yield a note on a landing sequence if RTL_AUTOLAND is 0, because ArduPlane then refuses to arm.
+
+    parameters: stated parameters of the autopilot, by name.
+    assumed_parameters: parameters that are assumed for the mission's landing, by name.
 
     Arming is checked in AP_Arming.cpp. There is no note on an assumed value if the scenario has a landing, because
     planfly writes RTL_AUTOLAND for its plan.

@@ -442,6 +442,14 @@ class _ReturnBuilder:
         start: Position,
         next_position: Position | None,
     ) -> None:
+        """Start the RTL at a position, without waypoints.
+
+        circle: loiter at the end, at the altitude of the way there.
+        end_altitude: altitude of the loiter's end, m AMSL.
+        slope_base, min_slope_height: see `ReturnTarget` and `ReturnRules`.
+        dive_slope: steepest descent (tangent).
+        next_position: position to which the RTL continues after the loiter, or None.
+        """
         self.points: list[RoutePoint] = []
         self._stop, self._circle, self._slope_base = circle, circle, slope_base
         self._end_altitude = end_altitude
@@ -537,7 +545,11 @@ class _ReturnBuilder:
             self._add_waypoint(east, north, 0.0)
 
     def add_loiter(self, east: float, north: float, course: float) -> None:
-        """Add the leg to a point on the circle, and the loiter until its altitude and its time are reached."""
+        """Add the leg to a point on the circle, and the loiter until its altitude and its time are reached.
+
+        east, north: point on the circle, m.
+        course: course along the circle at this point, rad.
+        """
         if math.hypot(east - self._position[0], north - self._position[1]) > _MIN_TANGENT_M:
             self._add_waypoint(east, north, 0.0)
         self._circle = self._circle.placed_at(

@@ -840,7 +840,11 @@ def _spiral_slope_function(limits: Limits | None) -> SpiralSlopes:
 
 
 def _start_text(itinerary: Itinerary, first_stop: RoutePoint, origin: GeoOrigin, waypoints: Floats) -> str:
-    """Return a description of the flight's start: its item, position, altitude and course."""
+    """Describe the start of a flight in the air: its item, position, altitude and course.
+
+    first_stop: route point at the start.
+    waypoints: waypoints of the route, (w, 3) m.
+    """
     course = math.degrees(float(leg_courses(waypoints)[0])) % 360.0
     lat, lon = first_stop.lat_deg, first_stop.lon_deg
     if first_stop.loiter is not None:

@@ -96,7 +96,10 @@ def _lead_lengths(route: Route, survey: Survey) -> list[float]:
 
 
 def fixed_layout_reason(mission: Mission, route: Route, survey: Survey) -> str:
-    """Return the reason why the layout of a survey cannot be changed, or "" if it can."""
+    """Return the reason why the layout of a survey cannot be changed, or "" if it can be changed.
+
+    route: the mission's route, in which the survey was found.
+    """
     if any(item.command in (Command.DO_JUMP, Command.DO_JUMP_TAG, Command.JUMP_TAG) for item in mission.items):
         return "the mission contains jumps"
     index_by_seq = {item.seq: index for index, item in enumerate(mission.items)}

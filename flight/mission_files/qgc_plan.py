@@ -219,6 +219,7 @@ def _landing_items(item: dict[str, Any], source: str, location: str, number: int
     """
 
     def read_position(key: str) -> list[Any] | None:
+        """Return the latitude, longitude and altitude under a key of the pattern, or None if it is missing."""
         return _read_coordinate(item, key, source, location)
 
     approach = read_position("landingApproachCoordinate") or read_position("loiterCoordinate")
@@ -262,7 +263,10 @@ def _landing_items(item: dict[str, Any], source: str, location: str, number: int
 
 
 def _landing_commands(item: dict[str, Any], source: str, location: str) -> list[tuple[int, int, list[Any]]]:
-    """Return the optional commands of a landing pattern, as command, frame and parameters.
+    """Return the optional commands of a landing pattern, each as MAV_CMD, MAV_FRAME and seven parameters.
+
+    item: JSON object of the pattern.
+    location: location of the item in the file, for messages.
 
     Raises MissionError for an approach speed that is not a number above 0, or that is too high.
     """
@@ -384,7 +388,11 @@ _UNNAMED_FIRMWARES = (0, 8)
 
 
 def _check_vehicle(kind: int | None, source: str) -> None:
-    """Raise MissionError if a plan is for a vehicle other than an airplane."""
+    """Raise MissionError if a plan is for a vehicle other than a fixed-wing aircraft.
+
+    kind: MAV_TYPE of the vehicle; None if missing.
+    source: name of the file in messages.
+    """
     for kinds, name in _OTHER_VEHICLES:
         if kind in kinds:
             allowed = f"{name}: planfly flies fixed-wing aircraft (1)"
@@ -500,7 +508,10 @@ def _read_item(item: _Item, index: int, source: str) -> MissionItem:
 
 
 def _read_home(values: list[float | None] | None, source: str) -> Home | None:
-    """Return the planned home, or None if it is missing or at 0, 0; a missing altitude is NaN."""
+    """Return the planned home, or None if it is missing or at 0, 0; a missing altitude is NaN.
+
+    values: latitude and longitude, degrees, and altitude, m AMSL, each None where it is null.
+    """
     if values is None or values[0] is None or values[1] is None:
         return None
     lat, lon, alt = values[0], values[1], math.nan if values[2] is None else values[2] + 0.0
@@ -517,7 +528,12 @@ def _read_fences(fence: _GeoFence, source: str) -> tuple[MissionItem, ...]:
     fences: list[MissionItem] = []
 
     def add(command: Command, p1: float, point: list[float], location: str) -> None:
-        """Add a fence item. Raises MissionError for an invalid position."""
+        """Append a fence item (a corner or a circle). Raises MissionError for an invalid position.
+
+        p1: number of corners, or radius, m.
+        point: latitude and longitude, degrees.
+        location: location of the shape in the file, for messages.
+        """
         item = MissionItem(
             len(fences),
             int(command),

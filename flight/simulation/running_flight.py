@@ -380,7 +380,11 @@ def default_gear(ground_phases: GroundPhases) -> Gear:
 def find_release(
     setup: FlightSetup, local_map: LocalMap, ground: Ground, aircraft: Aircraft, take_off: TakeOff
 ) -> Release:
-    """Return the state of the aircraft at the release: at the end of the launch, or at rest on the runway."""
+    """Return the state of the aircraft at the end of its launch, or at rest on a runway.
+
+    local_map, ground: local map and terrain of the flight.
+    take_off: the take-off that is simulated.
+    """
     launch = take_off.launch
     position, velocity = take_off.release()
     if launch.method == "runway":

@@ -450,6 +450,10 @@ def _find_airborne_end(
 ) -> int:
     """Return the code (a key of `ENDS`) of the first condition that ends an airborne flight; 0 if it continues.
 
+    state, memory: records of the workspace, with the aircraft's state and the progress along the route.
+    height_above_ground: m; NaN if unknown.
+    min_airspeed: airspeed below which control is lost, m/s.
+
     The conditions are, in this order, ground contact, bank, stall, end of the route, and empty battery.
     """
     if height_above_ground <= 0.0:
@@ -468,7 +472,11 @@ def _find_airborne_end(
 
 @inner
 def _set_output(output: Record, commands: Record, air: Record, scale_positive: Record, scale_negative: Record) -> None:
-    """Set the values for JSBSim, in JSBSim's units: commands, mean wind plus gust, and ground altitude."""
+    """Set the values for JSBSim, in JSBSim's units: commands, mean wind plus gust, and ground altitude.
+
+    output: record of `OUTPUT`, which is set.
+    scale_positive, scale_negative: factors from SI to JSBSim's units, for values above zero and for other values.
+    """
     output.elevator, output.aileron = commands.elevator, commands.aileron
     output.rudder, output.throttle = commands.rudder, commands.throttle
     # Mean wind is set as part of the gust: three properties a tick instead of six.
@@ -496,6 +504,8 @@ def _update_wind(
     The components are along true north, east and down.  The mean wind has no vertical component.  Without turbulence
     (`wind.w20` is 0) the gust in the record stays as it is.
 
+    wind: record of `MEAN_WIND`.
+    gusts, noise: state of the gust filters, and random numbers of the tick.
     height_above_ground, up: height and altitude of the aircraft, m; the height is NaN over unknown ground.
     convergence_cos, convergence_sin: cosine and sine of the grid convergence, the map course of true north.
     """

@@ -248,7 +248,10 @@ def _upper_word(value: Any) -> str:
 
 
 def _period_texts(applicability: Any, source: str) -> list[str]:
-    """Return the periods in which a zone is active, as [[zones]] texts; empty for an always active zone."""
+    """Return the periods in which a zone is active, as texts of a [[zones]] table; empty for an always active zone.
+
+    applicability: value of the file, a list of periods with schedules; None for always.
+    """
     if applicability is None:
         return []
     if not isinstance(applicability, list) or not all(isinstance(entry, dict) for entry in applicability):

@@ -134,7 +134,10 @@ def _geojson_zone(feature: Any, location: str, index: int, source: str) -> tuple
 
 
 def _check_holes(parts: list[list[list[tuple[float, float]]]], source: str) -> None:
-    """Raise ScenarioError if a hole of a polygon lies outside its outline."""
+    """Raise ScenarioError if a hole of a polygon lies outside its outline.
+
+    parts: polygons, each as rings of (latitude, longitude), the outline first.
+    """
     try:
         is_inside = all(are_holes_inside(part) for part in parts if part)
     except ValueError as error:

@@ -124,7 +124,7 @@ def box_distance(records: ZoneRecords, z: int, west: float, east: float, south: 
 
 @inlined
 def distance_to_edge(edge: Record, east: float, north: float) -> float:
-    """Return the horizontal distance from a position to one edge, m."""
+    """Return the horizontal distance from a position (east, north, m) to an edge, a record of `EDGE`, m."""
     step_e, step_n = edge.to_east - edge.east, edge.to_north - edge.north
     east_offset, north_offset = east - edge.east, north - edge.north
     fraction = (east_offset * step_e + north_offset * step_n) / (step_e * step_e + step_n * step_n)
@@ -137,6 +137,9 @@ def distance_to_edge(edge: Record, east: float, north: float) -> float:
 @inner
 def nearest_edge(records: ZoneRecords, z: int, east: float, north: float) -> tuple[float, int]:
     """Return the distance from a position to the outline of zone z, m, and the index of the nearest edge.
+
+    z: index of the zone in ``records``.
+    east, north: position, m.
 
     The distance is horizontal, and negative inside the zone. The index is -1 for a cylinder, which has no edges.
     """

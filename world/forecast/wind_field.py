@@ -308,7 +308,7 @@ def fit_mean_profile(
     reference_amsl: float,
     altitudes: tuple[float, float],
 ) -> MeanProfile:
-    """Return the mean profile of a wind field at a time (s) and a place (deg).
+    """Fit the mean profile of a wind field at a time (s on the field's axis) and a place (deg).
 
     reference_amsl: altitude of the profile's speed, m AMSL.
     altitudes: lowest and highest altitude of the mission, between which the profile is fitted, m AMSL.
