@@ -89,7 +89,8 @@ class ArmingState:
         if not should_arm:
             if self.flying and not is_forced:
                 return CommandResult(
-                    DENIED, "disarm denied in flight: a forced disarm (param2 21196; MAVProxy: disarm force) ends it"
+                    DENIED,
+                    "disarm denied in flight: a forced disarm (param2 21196; MAVProxy: disarm force) ends the flight",
                 )
             self.end_requested = self.flying
             self.armed = False

@@ -98,11 +98,11 @@ class LoiterRules:
         """Return a note for an autopilot that loiters about the last waypoint after the mission's end.
 
         >>> LoiterRules(80.0, "NAV_LOITER_RAD", ends_in_circle=True).end_note()
-        'after the last waypoint the aircraft circles it without end, with NAV_LOITER_RAD, 80 m: flown once'
+        'after the last waypoint the aircraft loiters around it without end, with NAV_LOITER_RAD, 80 m: ...'
         """
         name = f"{self.radius_name}, " if self.radius_name else ""
         circle = f"with {name}{abs(self.radius):g} m"
-        return f"after the last waypoint the aircraft circles it without end, {circle}: flown once"
+        return f"after the last waypoint the aircraft loiters around it without end, {circle}: one lap is flown"
 
 
 # Rules of an autopilot without loiter rules.

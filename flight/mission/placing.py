@@ -518,10 +518,10 @@ class _AltitudeConverter:
         ground = self.ground_at_home()
         if not math.isnan(home.alt):
             if abs(home.alt - ground) > _HOME_ALTITUDE_TOLERANCE_M:
-                hint = "" if home.alt else "; ground stations write 0 where no home was set"
+                hint = "" if home.alt else ". Ground stations write 0 if no home was set"
                 self.notes.add(
-                    f"home is at {home.alt:.1f} m AMSL, but the ground there is at {ground:.1f} m: "
-                    "heights above home are measured from home's altitude; for a launch from that ground, set home to"
+                    f"home is at {home.alt:.1f} m AMSL, but the ground there is at {ground:.1f} m AMSL. "
+                    "Heights above home are measured from home's altitude. For a launch from that ground, set home to"
                     f" {ground:.1f} m AMSL{hint}"
                 )
             return home.alt

@@ -454,7 +454,9 @@ def parse_plan_file(text: str, source: str) -> Mission:
     if home is None and file.mission.plannedHomePosition is not None:
         warnings.append(f"{source}: plannedHomePosition is not a position: the mission has no home")
     if [item.seq for item in items] != list(range(1, len(items) + 1)):
-        warnings.append(f"{source}: the doJumpId are not 1 to {len(items)}: items are numbered by their order instead")
+        warnings.append(
+            f"{source}: the values of doJumpId are not 1 to {len(items)}: items are numbered by their order instead"
+        )
     mission = Mission(
         home=home,
         items=tuple(items),

@@ -39,7 +39,7 @@ from world.wording import count_text
 # First line of the file.
 HEADER = "QGC WPL 110"
 # Clause in the warning about a home in a frame of items.
-HOME_LINE_MISSING_TEXT = "the file probably has no home line"
+HOME_LINE_MISSING_TEXT = "the file has no home line"
 # Maximum number of lines in a file, comments and empty lines included: ten per item.
 MAX_LINES = 10 * MAX_ITEMS
 
@@ -220,8 +220,8 @@ def _collect_warnings(locations: list[TextLine], items: list[MissionItem], *, ha
     if len(body) == len(items):
         warnings.append(
             f"{locations[0]}: no home line (seq 0): the mission has no home and begins with this "
-            "item, as in Mission Planner; QGroundControl and MAVProxy treat it as home and do "
-            "not fly it"
+            "item, as in Mission Planner. QGroundControl and MAVProxy treat this item as home and "
+            "do not fly it"
         )
     elif first.command != Command.NAV_WAYPOINT:
         warnings.append(
@@ -233,8 +233,9 @@ def _collect_warnings(locations: list[TextLine], items: list[MissionItem], *, ha
             warnings.append(f"{locations[0]}: home is at 0, 0, which stands for no position: the mission has no home")
         elif first.frame not in (Frame.GLOBAL, Frame.GLOBAL_INT):
             warnings.append(
-                f"{locations[0]}: home in frame {first.frame}: its height is taken as above mean sea level;"
-                f" {HOME_LINE_MISSING_TEXT}, so ground stations take the first item for home and do not fly it"
+                f"{locations[0]}: home in frame {first.frame}: its height is read as an altitude above mean sea level."
+                f" Probably {HOME_LINE_MISSING_TEXT}: ground stations then treat the first item as home and do not"
+                " fly it"
             )
     numbering_text = "items are numbered by line instead, as ground stations do, and jumps use these numbers"
     seq_steps = list(enumerate((following.seq - item.seq for item, following in pairwise(items)), 1))

@@ -244,7 +244,9 @@ def test_items_are_counted_by_their_order_and_jumps_go_to_the_item_named() -> No
     mission = parse_mission(plan_with(simple(2, 36.4), simple(5, 36.5), jump), "a.plan")
     assert [item.seq for item in mission.items] == [1, 2, 3]
     assert mission.items[2].params[0] == 2.0
-    assert mission.warnings == ("a.plan: the doJumpId are not 1 to 3: items are numbered by their order instead",)
+    assert mission.warnings == (
+        "a.plan: the values of doJumpId are not 1 to 3: items are numbered by their order instead",
+    )
 
 
 @pytest.mark.parametrize(("altitude", "known"), [(None, False), (0.0, True), (310.0, True)])

@@ -146,7 +146,10 @@ def test_a_home_at_0_0_is_left_out_and_said(kind: str) -> None:
         (
             "3 22 15 0 0 0 36.5 -84.2 310",
             Home(36.5, -84.2, 310.0),
-            ["home in frame 3: its height is taken as above mean sea level; the file probably has no home line"],
+            [
+                "home in frame 3: its height is read as an altitude above mean sea level."
+                " Probably the file has no home line"
+            ],
         ),
         ("3 22 15 0 0 0 0 0 100", None, ["home is at 0, 0, which stands for no position"]),
         ("2 178 0 22 0 0 0 0 0", None, ["home is at 0, 0, which stands for no position"]),
