@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from aircraft.path_limits import aircraft_slopes, turn_radius_between
-from flight.mission.altitude_frames import misread_altitudes
+from flight.mission.altitude_frames import find_misread_altitudes
 from flight.mission.items import LANDINGS, OVER_HOME, Frame
 from flight.mission.itinerary import stated_loiter
 from flight.mission_files.wpl import HOME_LINE_MISSING_TEXT
@@ -533,7 +533,7 @@ def _suggest_other_frame(setup: FlightSetup, frame: Frame) -> tuple[Suggestion, 
 
     frame: GLOBAL_RELATIVE_ALT for items below the ground, GLOBAL for items that are too high above home.
     """
-    below_ground, too_high = misread_altitudes(setup.mission, setup.scenario.origin, setup.scenario.terrain)
+    below_ground, too_high = find_misread_altitudes(setup.mission, setup.scenario.origin, setup.scenario.terrain)
     if not (too_high if frame == Frame.GLOBAL else below_ground):
         return ()
     current = Frame.GLOBAL_RELATIVE_ALT if frame == Frame.GLOBAL else Frame.GLOBAL

@@ -12,7 +12,7 @@ from itertools import product
 
 import numpy as np
 
-from flight.mission.altitude_frames import misread_altitudes
+from flight.mission.altitude_frames import find_misread_altitudes
 from flight.mission.edits import movable_indices, move_item, set_airspeed, set_altitude, set_loiter_radius
 from flight.mission.items import LANDINGS, OVER_TERRAIN, Command, Frame, Mission
 from flight.mission.route import Route
@@ -336,7 +336,7 @@ def _set_home_altitude(edited: _EditedMission, change: Change, _finding: Finding
 def _set_altitude_frame(edited: _EditedMission, change: Change, _finding: Finding) -> None:
     """Change the altitude frame of the items that fit the terrain only in the other frame, keeping their numbers."""
     scenario, mission, frame = edited.requirements.setup.scenario, edited.mission, Frame(int(change.wanted))
-    below_ground, too_high = misread_altitudes(mission, scenario.origin, scenario.terrain)
+    below_ground, too_high = find_misread_altitudes(mission, scenario.origin, scenario.terrain)
     items, readings = list(mission.items), too_high if frame == Frame.GLOBAL else below_ground
     for reading in readings:
         items[reading.item_index] = replace(items[reading.item_index], frame=frame)

@@ -246,7 +246,7 @@ def test_the_judge_finds_the_fence_kept() -> None:
     setup = setup_of(*CORNER, threats=threats)
     mission, notes = add_plan_fence(setup)
     assert any(
-        note.startswith("omitted from the fence, because the mission passes above or below: m198;") for note in notes
+        note.startswith("omitted from the fence, because the mission passes above or below: m198. ") for note in notes
     )
 
     def failed(fences: Any) -> list[str]:
