@@ -427,7 +427,7 @@ class _ForecastReader:
             if latitude.ndim == 2:
                 rotate_to_north(velocities, latitude.values, longitude.values, self.latitudes, self.longitudes)
         shape = velocities.shape[1:-1]
-        altitudes = np.broadcast_to(self._geopotential(datasets, east, dim) if kind == "pressure" else values, shape)
+        altitudes = np.broadcast_to(self._geopotential(datasets, east) if kind == "pressure" else values, shape)
         is_missing = ~np.isfinite(velocities).all(axis=(0, -1)) | ~np.isfinite(altitudes)
         is_used = ~is_missing.all(axis=(0, 1, 2))
         if not is_used.any():
@@ -455,7 +455,7 @@ class _ForecastReader:
         attributes = array.attrs
         return attributes.get("standard_name") == "x_wind" or attributes.get("GRIB_uvRelativeToGrid") == 1
 
-    def _geopotential(self, datasets: Sequence[Any], wind: Any, dim: str | None) -> Floats:
+    def _geopotential(self, datasets: Sequence[Any], wind: Any) -> Floats:
         """Return the altitudes of a wind's pressure levels, (t, y, x, k) m AMSL, from the geopotential height.
 
         wind: variable of the wind.

@@ -346,7 +346,7 @@ def _stretch_findings(setup: FlightSetup, legs: FlownLegs) -> list[Finding]:
         checked_finding = _unjudge_with_gaps(_unjudge_without_data(setup, legs, finding), legs)
         if legs.partial:
             checked_finding = _unjudge_if_unreached(checked_finding, legs)
-        findings.append(_renumber_place(checked_finding, legs.first, setup))
+        findings.append(_renumber_place(checked_finding, legs.first))
     return [*findings, *_findings_without_data(setup, {finding.rule for finding in findings})]
 
 
@@ -458,7 +458,7 @@ def _unjudge_if_unreached(finding: Finding, legs: FlownLegs) -> Finding:
     return finding
 
 
-def _renumber_place(finding: Finding, first: int, setup: FlightSetup) -> Finding:
+def _renumber_place(finding: Finding, first: int) -> Finding:
     """Return a finding of a stretch with its place numbered in the whole route.
 
     first: number of the stretch's first waypoint in the route.

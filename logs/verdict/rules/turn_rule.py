@@ -328,7 +328,6 @@ RULE = Rule(
             "MAX_FLY_BY_OFFSET_RADII",
             "BANK_TOLERANCE_RAD",
             "POSSIBLE_BANK_RAD",
-            "POSSIBLE_BANK_RAD",
             "OVERSHOOT_TOLERANCE_M",
             "SETTLED_CROSS_TRACK_M",
         ),
