@@ -31,7 +31,7 @@ class Emna(Umda):
     """
 
     def _sample(self, count: int) -> Floats:
-        """Draw samples of the maximum-likelihood Gaussian (1/N).
+        """Draw samples (count, d) from the Gaussian fitted to the selected samples by maximum likelihood (divisor N).
 
         Samples outside the box are drawn again, and finally clipped to the box.
         """

@@ -179,7 +179,7 @@ def waypoint_generations(search: Search, population: int, generations: int) -> N
     deviation = np.array(
         [FIRST_DEVIATION_ALONG_FRACTION * interval, FIRST_DEVIATION_ACROSS_FRACTION * interval, FIRST_DEVIATION_UP_M]
     )
-    rows = sampling.first(first_count, np.array([0.0, 0.0, ABOVE_CEILING_FRACTION]))
+    rows = sampling.draw_first(first_count, np.array([0.0, 0.0, ABOVE_CEILING_FRACTION]))
     if not len(search.archive.vectors):
         # The archive must contain a path whenever the search is stopped.
         search.evaluate(_as_vectors(rows[:, :1]))
@@ -201,7 +201,7 @@ def waypoint_generations(search: Search, population: int, generations: int) -> N
         if generation < generation_count - 1:
             cost = chains.cost[1:-1]
             elite = search.archive.vectors[0].reshape(inner_count, 3)
-            rows = sampling.next(rows, cost, later_count, deviation, float(cost.min()) * (1.0 + slack), elite)
+            rows = sampling.draw_next(rows, cost, later_count, deviation, float(cost.min()) * (1.0 + slack), elite)
             deviation = DEVIATION_FACTOR * deviation
 
 
