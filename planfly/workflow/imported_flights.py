@@ -447,12 +447,11 @@ def fly_draws(
 
 
 def start_after_takeoff(setup: FlightSetup, track: Track) -> FlightSetup:
-    """Return a setup whose mission begins in flight, at the take-off's altitude.
+    """Replace the take-off of a mission by a waypoint where the flight reached the take-off's altitude.
 
-    It begins where the first_item segment of the flight reached this altitude.
-
-    The autopilot chooses the course of a take-off itself, and the model's flight starts in the air.  The setup is
-    returned unchanged if the mission has no take-off, or if the segment never reached this altitude.
+    A model's flight starts in the air, and a mission does not state the course of its take-off: the autopilot chooses
+    it.  The setup is returned unchanged if the mission has no take-off, or if the first segment of the flight did not
+    reach this altitude.
     """
     imported_log, route, mission, scenario = setup.imported_log, setup.route, setup.mission, setup.scenario
     first_item = next((item for item in mission.items if item.seq == route.items[0]), None)
