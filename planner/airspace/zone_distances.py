@@ -244,9 +244,7 @@ def measure_zone_margin(
 ) -> None:
     """Fill the `ZONE_MARGIN` record for a straight piece a-b of a path.
 
-    heights, to_pixel: ground heights, m, and the map from positions to their pixels.
-    depths: heights of the ground with the opposite sign.
-    a, b: ends of the piece, (3,) m.
+    heights, depths, to_pixel: ground heights, m, the same with the opposite sign, and the map from positions to pixels.
     lateral_error: (2,) lateral tracking error at a and b, m.
     error_below, error_above: vertical tracking error, m.
     """

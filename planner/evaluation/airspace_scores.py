@@ -160,7 +160,7 @@ def add_airspace_violations(
     """
     has_zones, has_max_height = data.airspace.zones.required.shape[0] > 0, data.airspace.max_height < math.inf
     required = required_headroom(data)
-    part_start, part_end = np.empty(3), np.empty(3)
+    begin, end = np.empty(3), np.empty(3)
     last_leg, across = legs.shape[0] - 1, float(data.tracking.across)
     for i in range(last_leg + 1):
         offset_before, offset_after = float(flown_corners[i].fly_by_offset), float(flown_corners[i + 1].fly_by_offset)
@@ -178,8 +178,8 @@ def add_airspace_violations(
                 (last_fraction, 1.0, 0.0),
             ):
                 if end_fraction > fraction:
-                    _cut_segment(path[i], path[i + 1], fraction, end_fraction, part_start, part_end)
-                    violations.bounds += _leg_zone_penetration(data, part_start, part_end, lateral, below, above)
+                    _cut_segment(path[i], path[i + 1], fraction, end_fraction, begin, end)
+                    violations.bounds += _leg_zone_penetration(data, begin, end, lateral, below, above)
         else:
             max_offset = 0.0
         for corner_offset, length, fraction in (
@@ -189,22 +189,14 @@ def add_airspace_violations(
             if corner_offset <= 0.0:
                 continue
             corner_fraction = min(1.0, length / max(legs[i].run, 1e-6))
-            _cut_segment(
-                path[i],
-                path[i + 1],
-                max(0.0, fraction - corner_fraction),
-                min(1.0, fraction + corner_fraction),
-                part_start,
-                part_end,
-            )
+            cut_begin, cut_end = max(0.0, fraction - corner_fraction), min(1.0, fraction + corner_fraction)
+            _cut_segment(path[i], path[i + 1], cut_begin, cut_end, begin, end)
             if has_zones and max_offset > 0.0:
-                violations.bounds += _leg_zone_penetration(
-                    data, part_start, part_end, across + corner_offset, below, above
-                )
+                violations.bounds += _leg_zone_penetration(data, begin, end, across + corner_offset, below, above)
             if has_max_height:
                 extra_height = max(0.0, -lag_at(lags[i], fraction), -lag_at(lags[i], abs(fraction - corner_fraction)))
                 violations.terrain += _swath_excess_height(
-                    data, required, part_start, part_end, across + corner_offset, extra_height, math.inf
+                    data, required, begin, end, across + corner_offset, extra_height, math.inf
                 )
 
 

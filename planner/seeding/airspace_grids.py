@@ -203,9 +203,7 @@ def _relax_airspace_stage(
     A change of course is measured from the cheapest route to a cell only, so the result is not exactly the optimum.
     """
     step, width, zones, spacing = frame.length / grid.stages, grid.across.size, data.airspace.zones, grid.layer_spacing
-    lateral = (
-        0.0 if stage in (1, grid.stages) else float(data.tracking.across)
-    )  # There is no tracking error at a fixed end.
+    lateral = 0.0 if stage in (1, grid.stages) else float(data.tracking.across)  # No tracking error at a fixed end.
     turn_cost, slope_fraction = (TURN_COST * step, GENTLE_SLOPE_FRACTION) if grid.gentle else (0.0, 1.0)
     slopes = _step_slopes(data, frame, step, 0.5 * (data.start[2] + data.destination[2]), slope_fraction)
     for y in range(width):
