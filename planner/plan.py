@@ -176,9 +176,9 @@ class Plan:
     procedures: DepartureAndApproach | None = None
 
     def __post_init__(self) -> None:
-        """Lock the arrays, and name the four scores.
+        """Make the arrays read-only, and convert the scores, which may be any four numbers, to named tuples.
 
-        The scores may be given as any four numbers. Raises ArgumentError if the certificate belongs to other waypoints.
+        Raises ArgumentError if the certificate belongs to other waypoints.
         """
         for name in ("waypoints", "history"):
             array = np.array(getattr(self, name), dtype=np.float64)
@@ -251,12 +251,15 @@ class Plan:
         return ("the path violates constraints at its sampled points",)
 
     def __hash__(self) -> int:
+        """Return the hash of the plan's file, so that equal plans have equal hashes."""
         return hash(plan_json(self))
 
     def __eq__(self, other: object) -> bool:
+        """Return True if the other object is a plan with the same file."""
         return plan_json(self) == plan_json(other) if isinstance(other, Plan) else NotImplemented
 
     def __repr__(self) -> str:
+        """Describe the plan in a line: scenario, number of waypoints, state and length."""
         ratio = self.objectives.length_ratio
         return f"<Plan {self.scenario.name}: {len(self.waypoints)} waypoints, {self.state}, {ratio:.4f} times straight>"
 

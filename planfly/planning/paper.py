@@ -279,7 +279,10 @@ TABLE_FILES = ("table.csv", "runs.csv", "runs.json", "times.csv", "convergence.p
 
 
 def paper_file_names(problems: Sequence[int]) -> list[str]:
-    """Return the names of all files that are written for problems, which are given by their numbers of threats."""
+    """Return the names of all files that are written for some problems.
+
+    problems: numbers of threats, which name the problems.
+    """
     pictures = [f"{kind}-{threats:02d}.png" for threats in problems for kind in ("paths", "encodings")]
     return [*TABLE_FILES, *pictures]
 

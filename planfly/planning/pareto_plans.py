@@ -28,7 +28,10 @@ def make_pareto_plans(
     The default plan is made by `make_plan`; if it is not safe, the front is empty.  Alternatives that are unsafe with
     their departure and approach are omitted.  If gusts can make the autopilot orbit waypoints, the alternatives have
     few enough waypoints to make this rare.
-    stop, continues: see `make_plan`.
+
+    advance: function called with the progress.
+    stop: stop condition of the searches.
+    continues: True if the mission continues beyond the destination of the plans.
     """
     default_plan = make_plan(scenario, uav, seed, advance=advance, stop=stop, continues=continues)
 

@@ -167,6 +167,10 @@ class _EditedMission:
     """Mission whose items are moved one by one."""
 
     def __init__(self, context: MissionContext, judged: JudgedMission, choice: _Choice) -> None:
+        """Start with the unchanged mission.
+
+        judged: the mission with its verdict.  choice: choice of the items to move.
+        """
         self.context, self.mission, self.route = context, judged.mission, judged.setup.route
         self.requirements, self.choice = judged.requirements, choice
         self.is_changed = False

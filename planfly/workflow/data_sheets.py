@@ -522,7 +522,7 @@ def _parameter_lines(stated: AircraftParameters, overridden: Sequence[str]) -> l
     """
 
     def is_used(text: str) -> bool:
-        """Return True if the data sheet does not override a parameter."""
+        """Return True if the data sheet does not override the parameter with this text."""
         return not any(overridden_text.startswith(f"{text} (") for overridden_text in overridden)
 
     used_texts = list(filter(is_used, stated.texts.values()))
@@ -829,7 +829,8 @@ def _readme_text(
 ) -> str:
     """Return the text of ``README.md``: stated and guessed values, performance, uncertainties and files.
 
-    parameter_lines, throttle_lines: lines on the parameter file, and on its throttle of level flight.
+    parameter_lines: lines on the values of the parameter file.
+    throttle_lines: lines on the parameter file's throttle in level flight.
     """
     sheet, name = sized.sheet, aircraft.name
     propulsion = "burns fuel; its mass stays the same" if sheet.burns_fuel else "is electric"

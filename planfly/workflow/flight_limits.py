@@ -48,10 +48,7 @@ def predicted_seconds(setup: FlightSetup) -> float:
 
 
 def length_and_duration_text(setup: FlightSetup) -> str:
-    """Return the length and the predicted duration of a flight as text.
-
-    An example is "12.3 km, about 500 s in the air".
-    """
+    """Return the length and the predicted duration of a flight, such as "12.3 km, about 500 s in the air"."""
     seconds = predicted_seconds(setup)
     time = f"{seconds:.0f} s" if seconds < 120.0 else f"{seconds / 60.0:.0f} min"
     if seconds >= 2.0 * 3600.0:

@@ -80,6 +80,7 @@ class ImportedFlight:
         return self.setup.imported_log is not None and self.setup.imported_log.damage.lossy
 
     def __repr__(self) -> str:
+        """Describe the flight in a line: scenario, end, track and verdict."""
         return f"<ImportedFlight {self.setup.scenario.name}: {self.ended}; {self.track!r}, {self.verdict!r}>"
 
     def _repr_html_(self) -> str:

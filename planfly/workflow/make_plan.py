@@ -116,7 +116,8 @@ def make_given_plan(scenario: Scenario, uav: Uav, seed: int, waypoints: Floats) 
 def finish_plan(plan: Plan, uav: Uav, *, continues: bool = False, keeps_waypoints: bool = False) -> Plan:
     """Complete a plan without another search, by the steps that `make_plan` takes after its search.
 
-    keeps_waypoints: see `limit_waypoint_orbits`.
+    continues: True if the mission continues beyond the destination of the plan.
+    keeps_waypoints: True to keep the waypoints of the plan even if gusts make orbits at them too likely.
     """
     limited_plan = limit_waypoint_orbits(plan, uav, keeps_waypoints=keeps_waypoints)
     return _add_ground_phases(ensure_altitude_margin(limited_plan, uav), uav, continues=continues)

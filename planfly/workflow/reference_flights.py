@@ -138,7 +138,7 @@ def judge_airframe_flight(
 
     The flight has the same true airspeeds as a flight by ArduPlane.  ArduPlane treats airspeeds as equivalent
     airspeeds, which are higher true airspeeds at a higher altitude.
-    should_abort: see `explain_verdict`.
+    should_abort: called throughout the flight; once it returns True, the flight is aborted with TrialAborted.
     """
     airframe_route = true_airspeed_route(setup)
     trial = Trial(
@@ -160,8 +160,10 @@ def find_deciding_parameter(
     """Find an autopilot parameter that makes a failed flight pass at another value, or return None.
 
     verdict: verdict on the flight with the setup's own parameters.
-    should_abort: see `explain_verdict`.  This takes up to about twenty flights with the simulated autopilot.  For
-    the flight of an autopilot program, the result is None unless the simulated autopilot fails, too.
+    should_abort: called throughout the flights; once it returns True, they are aborted with TrialAborted.
+
+    This takes up to about twenty flights with the simulated autopilot.  For the flight of an autopilot program, the
+    result is None unless the simulated autopilot fails, too.
     """
     if setup.autopilot.parameters is None or verdict.flies:
         return None

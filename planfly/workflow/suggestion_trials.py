@@ -101,7 +101,7 @@ def _newly_open_findings(old_verdict: Verdict, new_verdict: Verdict) -> list[tup
 
 
 def _was_unreached(old_verdict: Verdict, old_finding: Finding | None) -> bool:
-    """Return True if the old flight ended before it could judge a finding, or all of it."""
+    """Return True if a finding could not be fully judged before a change, because the flight ended early."""
     has_ended_early = old_verdict.level == "flown" and not old_verdict.complete
     return has_ended_early and (old_finding is None or old_finding.ok is None or old_finding.place == FLIGHT)
 
@@ -247,6 +247,7 @@ class SuggestionTrials:
     _trials: dict[object, Trial] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        """Prepare the trial of the unchanged mission, and count the flights that are allowed."""
         self._current_trial = Trial(self.judged.setup, self.context.uav.aircraft)
         # One flight less: the reference flight with planfly's guidance.
         self._flights_left = min(MAX_TRIAL_FLIGHTS, max_explaining_flights(self.judged.setup) - 1)

@@ -188,7 +188,9 @@ def half_blend_length(aircraft: PerformanceTable, amsl: float) -> float:
 def fly_by_vertices(
     aircraft: PerformanceTable, previous: Floats, waypoint: Floats, next_waypoint: Floats, radius: float
 ) -> Floats:
-    """Return vertices (k, 3) of the flown path past `waypoint`; see `blended_vertices`.
+    """Return vertices (k, 3) of a path past `waypoint` that is nowhere higher than the flown path.
+
+    `blended_vertices` describes the vertices.
 
     The length of the blend is computed at the altitude of the waypoint.
     """

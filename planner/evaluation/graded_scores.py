@@ -152,7 +152,7 @@ def score_legs(
 def score_ground(
     data: ProblemArrays, limits: PrecomputedLimits, scratch: PathScratch, path: Floats, violations: Record
 ) -> None:
-    """Add the violations of the clearance along the legs: the second part of `score_path`."""
+    """Add the violations of the clearance above ground along the legs: the second part of `score_path`."""
     legs, terrain_legs = scratch.legs, scratch.terrain_legs
     sample_terrain(
         data.heights,

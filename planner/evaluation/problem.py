@@ -499,7 +499,7 @@ def _make_slope_bounds(terrain: Terrain) -> SlopeBounds:
 def _fill_unknown_ground(data: ProblemArrays, terrain: Terrain) -> ProblemArrays:
     """Return the arrays with unknown ground replaced by ground up to the ceiling, which a search avoids.
 
-    The certificate reads the terrain without this ground.
+    The certificate uses the original terrain, with its unknown ground.
     """
     is_unknown = np.isnan(terrain.heights)
     if not is_unknown.any():

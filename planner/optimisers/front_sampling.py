@@ -92,6 +92,7 @@ class FrontSampling:
         population: int,
         rng: np.random.Generator,
     ) -> None:
+        """Start with an empty archive; the class documents the arguments."""
         self._lower, self._upper, self._directions = lower, upper, directions
         self.reference, self._axes = reference, axes
         self._size, self._population, self._rng = size, population, rng

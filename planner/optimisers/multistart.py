@@ -53,6 +53,7 @@ class Gaussian:
     """
 
     def __init__(self, mean: Floats, deviation: float, population: int, scale: Floats | None = None) -> None:
+        """Set the learning rates of CMA-ES for this population and number of variables."""
         size = mean.size
         self.mean, self.deviation, self.population = mean.copy(), deviation, population
         weights = np.log(population / 2.0 + 0.5) - np.log(np.arange(1, population // 2 + 1))
@@ -180,6 +181,7 @@ class Multistart(BoxSearch):
         *,
         initial: Floats | None = None,
     ) -> None:
+        """Start the first search, unless first samples are to be evaluated before; see the class for the arguments."""
         super().__init__(lower, upper, rank, population, rng, initial=initial)
         self._population = population
         self._centre, self._scale = np.full(lower.size, 0.5), None

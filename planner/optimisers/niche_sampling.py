@@ -50,6 +50,7 @@ class NicheSampling:
         allowed: Callable[[Floats, Ints], Flags],
         rng: np.random.Generator,
     ) -> None:
+        """Store the boxes, the test for feasible samples, and the random generator."""
         self._lower, self._upper = lower, upper
         self._allowed = allowed
         self._rng = rng

@@ -76,6 +76,7 @@ class PartialResampling(BoxSearch):
         *,
         initial: Floats | None = None,
     ) -> None:
+        """Start with a small population of samples; the class documents the arguments."""
         super().__init__(lower, upper, rank, population, rng, initial=initial)
         self._max_count = population
         self._count = min(population, max(MIN_POPULATION, FIRST_POPULATION_PER_VARIABLE * lower.size))

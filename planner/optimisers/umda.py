@@ -49,6 +49,7 @@ class Umda(BoxSearch):
         basis: Floats | None = None,
         floor: Floats | None = None,
     ) -> None:
+        """Draw or clip the first samples; the class documents the arguments."""
         super().__init__(lower, upper, rank, population, rng, initial=initial)
         self._basis = basis
         self._floor = floor

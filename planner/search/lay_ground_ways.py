@@ -329,6 +329,7 @@ class _BestRejected:
     """Best rejected path, and the number of rejected paths, for a message."""
 
     def __init__(self) -> None:
+        """Start without rejected paths."""
         self.count, self._margin, self.problem = 0, -math.inf, ""
 
     def add(self, certificate: Certificate | None) -> None:

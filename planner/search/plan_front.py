@@ -130,6 +130,7 @@ class Front:
     ended: str = "completed"
 
     def __repr__(self) -> str:
+        """Describe the front in a line: scenario, number of plans, and why the search ended."""
         return f"<Front {self.default.plan.scenario.name}: {len(self.plans)} of {self.asked} plans, {self.ended}>"
 
     def _repr_html_(self) -> str:

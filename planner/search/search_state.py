@@ -383,7 +383,7 @@ class Search:
         return bool(are_safe(self.archive.scores[0]))
 
     def first_safe_found(self) -> bool:
-        """Return True if the search should end with the first safe path and has finished one."""
+        """Return True if the search is to end with the first safe path, and has found a path that meets the goal."""
         if not self.first_safe or (self.shortest is None and not self.archive.is_feasible()):
             return False
         return self.shortest is not None or self.meets_goal(self.best_certified()[1])

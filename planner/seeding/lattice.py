@@ -205,7 +205,7 @@ def begin_lattice_search(data: ProblemArrays, frame: RotatedFrame, lattice: Latt
 
 @compiled
 def _start_states(data: ProblemArrays, frame: RotatedFrame, lattice: Lattice, table: _StateTable) -> Codes:
-    """Mark the states at the start as reached, and return them, (k,)."""
+    """Mark the states at the start as reached, at the prescribed course or on all courses; return them, (k,)."""
     first_state = ((lattice.behind * lattice.across + lattice.right) * lattice.layers + lattice.start_layer) * 8
     start_course = _nearest_course(frame, data.start_course)
     states = np.arange(first_state, first_state + 8) if start_course < 0 else np.array([first_state + start_course])
@@ -442,7 +442,7 @@ def ceiling_route(
 
     step: spacing of the lattice, m.
     depth: depth to which the route may enter the missiles' spheres, m.
-    pause: see `lattice_route`.
+    pause: function called from time to time; an exception raised there stops the search.
 
     The spheres of missiles on the ground are narrowest at the ceiling. Only one layer is searched, which takes
     milliseconds. The climb to the ceiling at the start and the descent at the destination may therefore be too steep.

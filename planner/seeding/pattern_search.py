@@ -263,9 +263,9 @@ def _begin_search(data: ProblemArrays, frames: WaypointFrames, start: Floats, st
 def _fill_trial(
     box: _Box, moves: Floats, k: int, steps: Floats, round_start: Floats, vector: Floats, trial: Floats
 ) -> None:
-    """Fill a trial vector (d,) with a vector after its move k, clipped to the box.
+    """Apply move k to a vector (d,), clip the result to the box, and fill `trial` (d,) with it.
 
-    If k is the number after the last move, the displacement of the whole round is repeated instead.
+    If k is one more than the last move, the displacement of the whole round is repeated instead.
     """
     for d in range(vector.size):
         step = steps[k] * moves[k, d] if k < moves.shape[0] else vector[d] - round_start[d]

@@ -248,7 +248,7 @@ def continue_grid_costs(
 
 @inlined
 def passing_side(lateral_offset: float, vertical_offset: float) -> int:
-    """Return the side on which a point passes an obstacle.
+    """Return the side on which a point passes an obstacle: LEFT, RIGHT, OVER or UNDER.
 
     lateral_offset, vertical_offset: offset of the point to the left of the obstacle's centre, and above the centre, m.
     """
