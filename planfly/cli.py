@@ -58,7 +58,10 @@ _REPORTED_ERRORS = (PlanflyError, OSError, MemoryError, KeyboardInterrupt)
 
 
 def _run_and_report(argv: Sequence[str] | None) -> int:
-    """Run one command; report bad input, errors of the machine and interruptions in one line.  Return the exit code."""
+    """Run one command.
+
+    Report bad input, errors of the machine and interruptions in one line.  Return the exit code.
+    """
     try:
         with safe_streams():
             return _run_command(argv)

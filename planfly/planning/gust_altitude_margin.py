@@ -438,9 +438,10 @@ def _zone_shortfall(problem: Problem, parts: _Parts) -> Shortfall | None:
 
 
 def _gust_paths(parts: _Parts) -> list[Floats]:
-    """Return copies of a path (p, 3), each displaced vertically by one more step, up to the full gust displacement.
+    """Return copies of a path (p, 3) that are displaced vertically by 1, 2, ... steps.
 
-    A step is at most `_HEIGHT_STEP_M` high, so that no hazard is missed.
+    The last copy has the full displacement of the gusts. A step is at most `_HEIGHT_STEP_M` high, so that no hazard is
+    missed.
     """
     margins = np.maximum(parts.margin_before, parts.margin_after)
     step_count = max(1, math.ceil(float(margins.max()) / _HEIGHT_STEP_M))

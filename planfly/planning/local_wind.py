@@ -157,7 +157,10 @@ def _ground_speed_ratio(scenario: Scenario, airspeed: float, samples: Floats, co
 
 
 def _ground_speeds(airspeed: float, wind_east: Floats, wind_north: Floats, courses: Floats) -> Floats:
-    """Return the ground speeds on courses (rad), m/s, for an airspeed and wind components (m/s towards east, north)."""
+    """Return the ground speeds on courses (rad), m/s.
+
+    airspeed, wind_east, wind_north: airspeed, and wind towards east and north, m/s.
+    """
     sin, cos = np.sin(courses), np.cos(courses)
     crosswinds = wind_east * cos - wind_north * sin
     return np.sqrt(np.maximum(0.0, airspeed**2 - crosswinds**2)) + wind_east * sin + wind_north * cos

@@ -71,7 +71,7 @@ class SeededPlan:
 
     @property
     def safe(self) -> bool:
-        """True if the plan has no violation and no kill exposure at six points per leg, as the paper defines safety."""
+        """True if the plan has no violation and no kill exposure at the paper's six points per leg."""
         return not any(self.violations) and self.objectives.kill_exposure == 0.0
 
 

@@ -339,7 +339,7 @@ def _set_home_altitude(edited: _EditedMission, change: Change, _finding: Finding
 
 
 def _set_altitude_frame(edited: _EditedMission, change: Change, _finding: Finding) -> None:
-    """Change the altitude frame of the items that fit the terrain only in the other frame, keeping their numbers."""
+    """Change the altitude frame of items that fit the terrain only in the other frame; keep their numbers."""
     scenario, mission, frame = edited.requirements.setup.scenario, edited.mission, Frame(int(change.wanted))
     below_ground, too_high = misread_altitudes(mission, scenario.origin, scenario.terrain)
     items, readings = list(mission.items), too_high if frame == Frame.GLOBAL else below_ground

@@ -123,7 +123,7 @@ def read_aircraft_parameters(file: Path) -> AircraftParameters:
 
 
 def _arduplane_value(entries: Mapping[str, Entry], name: str) -> tuple[float, float, str] | None:
-    """Return value, default and text ("NAME value") of a parameter in an ArduPlane file; None if the file lacks it."""
+    """Return value, default and text ("NAME value") of an ArduPlane parameter; None if not in the file."""
     definition = next((candidate for candidate in DEFINITIONS.values() if candidate.name == name), None)
     if definition is None or name not in _USED_PARAMETERS:
         return None
@@ -136,7 +136,7 @@ def _arduplane_value(entries: Mapping[str, Entry], name: str) -> tuple[float, fl
 
 
 def _px4_value(entries: Mapping[str, Entry], name: str) -> tuple[float, float, str] | None:
-    """Return value, default (both in ArduPlane's unit) and text of a parameter in a PX4 file; None if it lacks it."""
+    """Return value, default (in ArduPlane's unit) and text of a PX4 parameter; None if not in the file."""
     px4_name, factor = (_PX4_STALL[0], 1.0) if name == "AIRSPEED_STALL" else FROM_ARDUPILOT[name]
     if px4_name not in entries:
         return None
@@ -727,7 +727,7 @@ def arduplane_parameters_text(
 
 
 def servo_text(aircraft: Aircraft, performance: Performance) -> str:
-    """Return the text of ``ardupilot.toml``: servo output and pulses of elevator, ailerons, throttle and rudder.
+    """Return the text of ``ardupilot.toml``: servo outputs and pulses of surfaces and throttle.
 
     Elevons and V-tails are mixed within the model.
     """
@@ -797,7 +797,7 @@ def _trim_throttle_lines(file_parameters: Mapping[str, float], performance: Perf
 
 
 def _climb_lines(stated: AircraftParameters) -> list[str]:
-    """Return a line of ``README.md`` if the climb rate of the parameter file is not at full throttle; [] otherwise."""
+    """Return a line of ``README.md`` if the file's climb rate is not at full throttle; otherwise []."""
     if not {"TECS_CLMB_MAX", "THR_MAX"} <= stated.values.keys():
         return []
     climb_name, throttle_name = (stated.texts[name].split()[0] for name in ("TECS_CLMB_MAX", "THR_MAX"))

@@ -33,9 +33,10 @@ class FlightLimits:
 
 
 def predicted_seconds(setup: FlightSetup) -> float:
-    """Predict the duration of a flight in still air, s: the path length divided by the mean demanded airspeed.
+    """Predict the duration of a flight in still air, s.
 
-    The mean of the legs' airspeeds is weighted by the time on each leg.
+    It is the path length divided by the mean demanded airspeed.  The mean of the legs' airspeeds is weighted by the
+    time on each leg.
 
     >>> from logs.recording.example_log import example_log
     >>> flown = example_log()

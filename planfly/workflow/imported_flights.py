@@ -162,7 +162,9 @@ def _check_plan_autopilot(path: Path, mission: Mission, program: str) -> None:
 
 
 def _read_mission(path: Path, flight: LoggedFlight, options: LogOptions) -> tuple[Mission, str, Scenario | None]:
-    """Read the planned mission; return the mission, a description of its source, and the scenario of its plan.
+    """Read the planned mission.
+
+    Return the mission, a description of its source, and the scenario of its plan.
 
     The scenario is None without a plan.json.
 
@@ -425,7 +427,7 @@ class DrawnFlight:
 def fly_draws(
     setup: FlightSetup, track: Track, aircraft: str, draws: Sequence[DrawnFlight], advance: Advance
 ) -> tuple[Reflight, ...]:
-    """Simulate the longest sequence of followed legs once for each draw, and return the comparisons with the log.
+    """Simulate the longest sequence of followed legs once per draw; return the comparisons with the log.
 
     A draw is a sampled variant of the aircraft in a sampled wind.  A draw is left out if its aircraft cannot start or
     flies none of the legs.

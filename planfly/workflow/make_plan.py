@@ -107,7 +107,7 @@ def _complete_in_gusts(plan: Plan, uav: Uav, search: Search) -> Plan:
 
 
 def make_given_plan(scenario: Scenario, uav: Uav, seed: int, waypoints: Floats) -> Plan:
-    """Make a plan from given waypoints (w, 3), m, without a search, and certify it by all checks of `make_plan`."""
+    """Make a plan from given waypoints (w, 3), m, and certify it by all checks of `make_plan`."""
     return finish_plan(
         certify_waypoints(scenario, uav.limits.with_margin(), waypoints, seed=seed), uav, keeps_waypoints=True
     )

@@ -174,9 +174,10 @@ def expand_path_pattern(target: str | Path, name: str, seed: int) -> Path:
 def file_target(
     target: str | Path, name: str, seed: int, *, suffix: str, overwrite: bool, source: Path | None = None
 ) -> Path:
-    """Replace the placeholders in the path of an output file, check it with `check_output_file`, and return it.
+    """Replace the placeholders in the path of an output file; check the path, and return it.
 
-    A path with placeholders in a missing folder is not checked, because the caller makes the folder.
+    `check_output_file` checks it.  A path with placeholders in a missing folder is not checked, because the caller
+    makes the folder.
     suffix: suffix that the file must have, because its format does not depend on its name.
     """
     path = expand_path_pattern(target, name, seed)

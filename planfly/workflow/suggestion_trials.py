@@ -58,7 +58,9 @@ _GROWTH_M = 2.0
 
 
 def finding_key(finding: Finding) -> tuple[str, str, int | None, str]:
-    """Return a key by which a finding is found again after a change: its rule, and kind, index and name of its place.
+    """Return a key that identifies a finding before and after a change of the mission.
+
+    The key is the rule, and the kind, index and name of the place.
 
     Item numbers are not part of the key, because a change may shift them.
     """
@@ -79,9 +81,10 @@ def _is_undecided(finding: Finding) -> bool:
 
 
 def _newly_open_findings(old_verdict: Verdict, new_verdict: Verdict) -> list[tuple[Finding | None, Finding]]:
-    """Return pairs (old finding or None, new finding) for the findings that fail or are undecided only after a change.
+    """Return the findings that fail or are undecided only after a change, each with the old finding.
 
-    A finding that passed before and is not judged after the change is included.
+    The old finding is None if there was none.  A finding that passed before and is not judged after the change is
+    included.
     """
     old_findings = _worst_findings(old_verdict)
     pairs = []

@@ -158,7 +158,9 @@ def _tighten_turns(spec: Spec, scenario: Scenario, failed_findings: list[Finding
 
 
 def _raise_clearance(spec: Spec, scenario: Scenario, failed_findings: list[Finding]) -> list[Tightening]:
-    """Raise the minimum clearance in `spec` by the largest shortfall of the flight; return this change in a list.
+    """Raise the minimum clearance in `spec` by the largest shortfall of the flight.
+
+    Return this change in a list.
 
     Return [] without a failed finding on the clearance; then `spec` is not changed.
     """
@@ -231,7 +233,9 @@ FlyRound = Callable[[Scenario], tuple[Verdict, bool]]
 def refine(
     scenario: Scenario, max_rounds: int, fly_round: FlyRound, keep_results: Callable[[int], None]
 ) -> tuple[Verdict, Rounds]:
-    """Plan and fly in rounds until a round is flyable; each round tightens the limits that the last flight violated.
+    """Plan and fly in rounds until a round is flyable.
+
+    Each round tightens the limits that the last flight violated.
 
     max_rounds: maximum number of rounds after the first.
     fly_round: function that plans in a scenario and flies; it returns the verdict, and True if the plan was flown.

@@ -106,7 +106,7 @@ def zone_penetration(
 def penetration_depth(
     records: ZoneRecords, z: int, line: MapSegment, required_distance: float
 ) -> tuple[float, float, float]:
-    """Return the depth of a line in exclusion z with its margin, and the part of the line abreast of the zone.
+    """Return the depth of a line in exclusion z with its margin, and the part abreast of the zone.
 
     required_distance: required distance from the zone, m.
 
@@ -128,7 +128,7 @@ def penetration_depth(
 
 @inner
 def _inclusion_excess(records: ZoneRecords, z: int, line: MapSegment, required_distance: float) -> float:
-    """Return the distance by which a line is outside inclusion z or too close to its edge, integrated, m x km.
+    """Return how much a line is outside inclusion z or too close to its edge, integrated, m x km.
 
     required_distance: required distance from the edge, on the inside, m.
     """

@@ -53,7 +53,7 @@ class ZoneMargins(NamedTuple):
 
 
 def add_margins(zones: Sequence[Zone], ends: Floats, terrain: Terrain | None, margins: ZoneMargins) -> ZonesWithMargins:
-    """Return zones with the required margins, reduced for each zone whose margin a fixed end of the path violates.
+    """Return zones with their required margins, reduced where a fixed end of the path violates a margin.
 
     ends: fixed ends of the path, (k, 3) m.
 
@@ -219,7 +219,7 @@ class ShapeView(NamedTuple):
 
 @inlined
 def segment_between(ax: float, ay: float, bx: float, by: float) -> MapSegment:
-    """Return the line from (ax, ay) to (bx, by), m east and north; a line without length gets the course north."""
+    """Return the line from (ax, ay) to (bx, by), m; a line without length gets the course north."""
     dx, dy = bx - ax, by - ay
     horizontal_length = math.sqrt(dx * dx + dy * dy)
     if horizontal_length < 1e-9:

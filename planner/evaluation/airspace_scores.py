@@ -77,7 +77,10 @@ def airspace_pieces(data: ProblemArrays, waypoints: Floats) -> Records:
 
 @inner
 def _pieces_without_tracking_error(data: ProblemArrays, waypoints: Floats) -> Records:
-    """Cut a path (w, 3) without tracking error into `TRACKED_PIECE` records: its legs, then the chords of its arcs."""
+    """Cut a path (w, 3) without tracking error into its legs and the chords of its arcs.
+
+    Return `TRACKED_PIECE` records, first of the legs.
+    """
     leg_count, radii = waypoints.shape[0] - 1, fly_by_radii(data, waypoints)
     pieces = np.zeros(leg_count + leg_count * _MAX_PIECES, dtype=TRACKED_PIECE)
     for i in range(leg_count):

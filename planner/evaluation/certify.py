@@ -105,7 +105,9 @@ _MAX_NAMED_PLACES = 6
 
 
 def _summarise_faults(faults: list[_Fault]) -> list[str]:
-    """Describe the faults of one kind in a line: the worst fault, and the places of the others; [] without faults.
+    """Describe the faults of one kind in a line: the worst fault, and the places of the others.
+
+    Return [] without faults.
 
     faults: margin, place and description of each fault.
     """

@@ -205,7 +205,7 @@ def _segment_distance(threats: Records, start: Floats, end: Floats, min_distance
 
 @compiled
 def with_end_course_points(data: ProblemArrays, path: Floats) -> Floats:
-    """Add a point at each end of a path (w, 3), so that the turns from and to the end courses can be measured.
+    """Add a point at each end of a path (w, 3), to measure the turns from and to the end courses.
 
     One distant point lies before the start, the other after the destination, both on the prescribed courses. Without a
     prescribed course the point extends the leg, so that there is no turn.
@@ -292,9 +292,10 @@ def heights_above_ground(data: ProblemArrays, waypoints: Floats) -> Records:
 
 @inner
 def _tracked_heights(data: ProblemArrays, pieces: Records) -> Records:
-    """Measure the minimum heights above ground along pieces and to either side of them, as `CERTIFIED_PIECE` records.
+    """Measure the minimum heights above ground along pieces and to either side of them.
 
-    The height includes the tracking error below the piece, and is NaN over unknown ground.
+    Return `CERTIFIED_PIECE` records. The height includes the tracking error below the piece, and is NaN over unknown
+    ground.
 
     pieces: `TRACKED_PIECE` records.
     """
@@ -334,7 +335,7 @@ def _measure_piece(data: ProblemArrays, start: Floats, end: Floats, of_arc: bool
 def required_buffer(
     data: ProblemArrays, buffer: float, end_buffers: tuple[float, float], a: Floats, b: Floats
 ) -> float:
-    """Return the height required on a piece a-b in addition to the clearance, m; it is reduced near a fixed end.
+    """Return the height required on a piece a-b in addition to the clearance, m.
 
     buffer: additional height away from the ends, m.
     end_buffers: additional heights at the start and the destination, m.

@@ -232,7 +232,7 @@ def _add_ends(space: Space, inner_waypoints: Floats) -> Floats:
 
 
 def rotated_encoding(space: Space, waypoints: int) -> Encoding:
-    """Make the rotated encoding, in which inner waypoint i lies in the i-th interval of the axis (section III).
+    """Make the rotated encoding: inner waypoint i lies in interval i of the axis (section III).
 
     waypoints: number w of waypoints, including both ends.
 

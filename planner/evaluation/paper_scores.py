@@ -107,7 +107,9 @@ def _are_limits_fixed(data: ProblemArrays, limits: PrecomputedLimits) -> bool:
 def _score_block(
     data: ProblemArrays, limits: PrecomputedLimits, paths: Floats, first_path: int, size: int, block: Record
 ) -> None:
-    """Score a block of `size` paths side by side, beginning with path number `first_path`; fill the sums of the block.
+    """Score a block of `size` paths side by side, beginning with path number `first_path`.
+
+    Fill the sums of the block.
 
     Each waypoint is mapped to the raster once. Between waypoints a leg is assumed to be straight in pixels.
     """
@@ -261,7 +263,7 @@ def _add_exposures(spheres: Records, units: Int32s, size: int, block: Record) ->
 
 @inlined
 def _add_leg(limits: PrecomputedLimits, size: int, is_first: bool, block: Record) -> None:
-    """Add the length of a leg; count its slope, and the turn into it, if they exceed their limits (eq. 1-4, 8)."""
+    """Add the length of a leg, and count its slope and the turn into it if too large (eq. 1-4, 8)."""
     climb, dive, cos_max_turn = limits.climb_slope, limits.dive_slope, limits.cos_max_turn
     east = block.step.east
     north = block.step.north

@@ -435,7 +435,7 @@ def _max_buffer(certified: ProblemArrays, certified_margin: float) -> float:
 
 
 def _reduced_performance(scenario: Scenario, limits: Limits) -> PerformanceTable:
-    """Return the aircraft's performance, reduced for turbulence and limited to the autopilot's vertical rates."""
+    """Return the aircraft's performance, reduced for turbulence and by the autopilot's vertical rates."""
     slope_fraction, tracking = SLOPE_FRACTION_BY_TURBULENCE[scenario.wind.turbulence], limits.tracking
     if tracking is None:
         return derate(limits.performance(), slope_fraction, slope_fraction, limits.reserve_climb, limits.reserve_sink)
@@ -448,7 +448,7 @@ def _reduced_performance(scenario: Scenario, limits: Limits) -> PerformanceTable
 
 
 def _buffer_growth(scenario: Scenario, limits: Limits, aircraft: PerformanceTable) -> float:
-    """Return the growth of the buffer with the distance from an end, m per m.
+    """Return the growth of the buffer (height above the clearance) with the distance from an end, m per m.
 
     The aircraft can follow this growth. Without reserves above or below the path it is `BUFFER_GROWTH_RATIO`, which is
     also the maximum.
@@ -475,9 +475,9 @@ def _none_to_nan(value: float | None) -> float:
 
 
 def _end_buffer(terrain: Terrain, limits: Limits, point: Floats, buffer: float, fraction: float = 1.0) -> float:
-    """Return the buffer of the clearance at a fixed end, m.
+    """Return the buffer (height required above the clearance) at a fixed end, m.
 
-    It is the full buffer. If the end is too low for the full buffer, it is a fraction of the available height.
+    It is the full buffer, or a fraction of the available height if the end is too low for the full buffer.
     """
     height_above_ground = float(point[2] - terrain.height(point[0], point[1]))
     available_height = height_above_ground - limits.min_clearance - 0.01

@@ -80,7 +80,9 @@ def set_lag(
 def compute_height_lags(
     tracking: Record, aircraft: PerformanceTable, wind: Wind, path: np.ndarray, legs: Records, lags: Records
 ) -> None:
-    """Compute the altitude lag of the aircraft on each leg of a path (w, 3); there is no lag at the start of the path.
+    """Compute the altitude lag of the aircraft on each leg of a path (w, 3).
+
+    There is no lag at the start of the path.
 
     lags: `HEIGHT_LAG` records to fill, (w - 1,).
     """
@@ -143,7 +145,9 @@ def _take_sample(
     altitude_change: float,
     min_step: float,
 ) -> tuple[float, float]:
-    """Sample the ground at a point of a line; return the height above the required clearance and the next step.
+    """Sample the ground at a point of a line.
+
+    Return the height above the required clearance and the next step.
 
     tiles, tile_side: bounds on the slope of the ground, as in `SlopeBounds`.
     growth: slope of the required height, as in `RequiredClearance`.

@@ -356,7 +356,9 @@ class LegModel(NamedTuple):
 
 @inner
 def model_leg(travel: TravelCost, table: PerformanceTable, start: Floats, finish: Floats, model: LegModel) -> float:
-    """Return the cost of a leg, which is always finite; fill its first and second derivatives by the leg's ends.
+    """Return the cost of a leg, which is always finite.
+
+    Fill its first and second derivatives by the leg's ends.
 
     The curvature (second derivative) is the sum of the curvatures of the length, of the time at each
     height, and of the power, which are all convex. The coupling of height and course is omitted, so the matrix has no

@@ -192,9 +192,10 @@ class FrontSampling:
             )
 
     def _archive_rows(self, values: Floats) -> Ints:
-        """Return the row numbers of the objectives (n, m) that the archive keeps: the distinct, non-dominated ones.
+        """Return the row numbers of the objectives (n, m) that the archive keeps.
 
-        If there are more than the archive can hold, keep those that cover most of the hypervolume.
+        These are the distinct, non-dominated rows. If there are more than the archive can hold, keep those that cover
+        most of the hypervolume.
         """
         level = Level(tuple(range(values.shape[1])), (NO_GOAL,) * values.shape[1])
         front = np.flatnonzero(ranks(values, (level,)) == 0)

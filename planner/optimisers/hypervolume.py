@@ -52,7 +52,9 @@ def _non_dominated(points: Floats) -> Floats:
 
 
 def covering_order(points: Floats, reference: Floats, count: int, rng: np.random.Generator | None = None) -> Ints:
-    """Choose up to `count` points (n, m) that cover most hypervolume; return their row numbers in order of choice.
+    """Choose up to `count` points (n, m) that cover most hypervolume.
+
+    Return their row numbers in order of choice.
 
     reference: (m,) upper limit; a point that is not below it in every objective is left out.
     rng: random generator of the probes; None for the same probes in every call.
@@ -99,7 +101,9 @@ def _mark_covered_probes(points: Floats, probes: Floats) -> Marks:
 
 @compiled
 def _choose_rows_greedily(marks: Marks, first_rows: Ints, count: int) -> Ints:
-    """Choose `count` points that together cover many probes; return the numbers of their rows in marks (n, p).
+    """Choose `count` points that together cover many probes.
+
+    Return the numbers of their rows in marks (n, p).
 
     `first_rows` are chosen first, then repeatedly the row that covers most probes not yet covered. Of equal rows, the
     first is chosen. The gain of a row can only decrease when other rows are chosen. Its last count

@@ -181,7 +181,7 @@ class Multistart(BoxSearch):
         *,
         initial: Floats | None = None,
     ) -> None:
-        """Start the first search, unless first samples are to be evaluated before; see the class for the arguments."""
+        """Start the first search if there are no first samples; the class documents the arguments."""
         super().__init__(lower, upper, rank, population, rng, initial=initial)
         self._population = population
         self._centre, self._scale = np.full(lower.size, 0.5), None
@@ -214,7 +214,7 @@ class Multistart(BoxSearch):
         self._draw_generation(self._search)
 
     def _store_generation(self, points: Floats, scores: Floats) -> None:
-        """Set `samples` and `scores`: the best sample of all generations, then this generation, sorted best first."""
+        """Set `samples` and `scores`: the best sample of all generations, then this sorted generation."""
         if len(self.scores) and self._rank(np.stack([self.scores[0], scores[0]]))[0] == 0:
             points, scores = np.concatenate([self.samples[:1], points]), np.concatenate([self.scores[:1], scores])
         self.samples, self.scores = points, scores

@@ -218,7 +218,9 @@ def _count_marks(marks: Ints) -> int:
 
 @inner
 def _dense_ranks(rows: Floats, begin: int, end: int) -> tuple[Ints, int]:
-    """Rank the candidates begin to end - 1 by the second row of scores; return their ranks and the number of ranks.
+    """Rank the candidates begin to end - 1 by the second row of scores.
+
+    Return their ranks and the number of ranks.
 
     Ranks start at 1 and have no gaps; equal values have the same rank.
     """

@@ -108,5 +108,5 @@ class Umda(BoxSearch):
 
 
 def _project(rows: Floats, basis: Floats) -> Floats:
-    """Project rows (n, d) onto the columns of a basis (d, k); arrays that are not contiguous are copied first."""
+    """Project rows (n, d) onto the columns of a basis (d, k), after making both arrays contiguous."""
     return multiply_by_sparse(np.ascontiguousarray(rows), np.ascontiguousarray(basis))

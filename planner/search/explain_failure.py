@@ -318,7 +318,7 @@ def _describe_walls(scenario: Scenario) -> list[str]:
 
 
 def _map_crossings(scenario: Scenario) -> Iterator[tuple[float, np.ndarray]]:
-    """Yield lines across the map: each line's distance from the start (m) and its points on the map, (n, 2) m."""
+    """Yield lines across the map: distance of the line from the start (m), and its points (n, 2), m."""
     frame = rotated_frame(scenario.start, scenario.destination)
     half_width = float(np.hypot(*np.diff(scenario.bounds, axis=1)[:, 0]))
     across = np.linspace(-half_width, half_width, POINTS_ACROSS)

@@ -226,7 +226,10 @@ def _limit_generations(search: Search, generations: int) -> int:
 
 
 def count_remaining_legs(search: Search) -> int:
-    """Return the number of legs that the search may still evaluate; `ALL_LEGS` if the scenario states a budget."""
+    """Return the number of legs that the search may still evaluate.
+
+    It is not limited (`ALL_LEGS`) if the scenario states a budget of evaluations.
+    """
     settings = search.problem.scenario.planner
     if settings.budget is not None:
         return ALL_LEGS
@@ -255,7 +258,7 @@ def _as_vectors(rows: Floats) -> Floats:
 
 
 def _join_candidates(search: Search, paths: Floats, slack: float) -> WaypointChains:
-    """Join the waypoints of different paths (k, w, 3); find the best path through each waypoint, up to a bound of cost.
+    """Join the waypoints of different paths (k, w, 3) to the best path through each waypoint.
 
     slack: fraction by which the first bound exceeds the cost of the best safe path.
 

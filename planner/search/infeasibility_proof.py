@@ -161,7 +161,7 @@ def _is_proven_closed(data: ProblemArrays, missiles: Flags, column_size: float, 
 
 @inner
 def _lowest_ground(data: ProblemArrays, i: int, j: int, column_size: float) -> float:
-    """Return the height of the lowest terrain pixel below a column or next to it, m; -inf if a pixel has no data.
+    """Return the lowest ground below a column or next to it, m; -inf if a pixel has no data.
 
     i, j: indices of the column towards east and north.
     """

@@ -436,7 +436,7 @@ class _Launch(NamedTuple):
 
 
 def _find_launches(site: _Site, launch: Launch, takeoff_height: float, altitude: float) -> tuple[list[_Launch], str]:
-    """Return the launches that are clear of ground, missiles and zones, and the reason to state if there are none.
+    """Return the launches clear of ground, missiles and zones, and the reason if there are none.
 
     takeoff_height: height above home up to which the launch climbs straight ahead, m.
     altitude: altitude for which the climb performance is computed, m AMSL.
@@ -768,7 +768,7 @@ def _approach_altitudes(
 
 
 def _scale_slope(site: _Site, factor: float, is_descent: bool, altitude: float, course: float) -> float:
-    """Return `factor` times the climb slope on a course (rad), or times the dive slope if `is_descent`, m per m."""
+    """Return `factor` times the climb slope, or the dive slope if `is_descent`, on a course (rad)."""
     return factor * site.slopes(course, altitude)[is_descent]
 
 

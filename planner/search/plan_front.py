@@ -556,7 +556,10 @@ def _drop_dominated(plans: list[FrontPlan], fourth: str, amounts: Floats) -> lis
 
 
 def _make_plan(task: FrontTask, path: Floats, template: Plan) -> Plan:
-    """Make the plan of a path (w, 3) with its scores and certificate; copy all other fields from the template."""
+    """Make the plan of a path (w, 3) with its scores and certificate.
+
+    Copy all other fields from the template.
+    """
     counts, objectives = paper_scores(task.problem.certified, path[None])
     return replace(
         template,

@@ -283,7 +283,9 @@ def _run_attempt(search: Search, attempt: int, previous_path: Floats | None) -> 
 
 
 def _finish_search(search: Search, last_vector: Floats | None) -> None:
-    """Shorten the best path and the path of the last generation; move waypoints if this finds no finished path.
+    """Shorten the best path and the path of the last generation.
+
+    Move waypoints if this finds no finished path.
 
     last_vector: vector (d,) of the best path of the last generation, or None.
     """

@@ -212,7 +212,7 @@ def climb_altitudes(
 def descent_altitudes(
     points: Sequence[MapPoint], start_altitude: float, climb: SlopeOnCourse, dive: SlopeOnCourse, end_altitude: float
 ) -> Floats:
-    """Compute the altitude at each point of a path that descends as late, or climbs as early, as possible, (n,).
+    """Compute the altitudes (n,) of a path that descends as late, or climbs as early, as possible.
 
     climb, dive: functions that return the slope on a course.
 

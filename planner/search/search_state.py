@@ -121,7 +121,7 @@ class Archive:
         return len(self.scores) > 0 and not are_violated(self.scores[0])
 
     def insert(self, vectors: Floats, scores: Floats) -> None:
-        """Insert new rows in the order of their rank; of equal rows, older ones stay first.
+        """Insert new paths in the order of their rank; of equal paths, older ones stay first.
 
         As soon as one row is feasible, infeasible rows are dropped, because there may be thousands of them to rank. A
         full archive accepts only rows that are better than its last row.

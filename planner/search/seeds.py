@@ -195,7 +195,7 @@ def search_other_sides(search: Search) -> None:
 
 
 def _try_grids(search: Search, grids: tuple[tuple[int, float, float], ...]) -> list[Floats]:
-    """Shorten the routes on other sides that some grids propose; return the routes as paths (w, 3).
+    """Shorten the routes past other sides of obstacles that grids propose; return the routes (w, 3).
 
     grids: as in `GRIDS`: number of stages, reduction of the spheres, and spacing across as a fraction of a step.
 
@@ -324,7 +324,9 @@ def may_turn_back(search: Search, certificate: Certificate) -> bool:
 
 
 def search_turning_back(search: Search, best: tuple[Floats, Certificate]) -> tuple[Floats, Certificate]:
-    """Search along a route that may turn back; return the better of the new path and `best`, with its certificate.
+    """Search along a route that may turn back.
+
+    Return the better of the new path and `best`, with its certificate.
 
     best: best path so far, with its certificate.
     """

@@ -121,7 +121,7 @@ def _closed_heights(zones: ZonesWithMargins, line: MapSegment, lateral: float, g
 
 @inner
 def _step_slopes(data: ProblemArrays, frame: RotatedFrame, step: float, amsl: float, fraction: float) -> Floats:
-    """Return the tangents of the steepest climb and dive for each number of cells across per stage, (sideways, 2).
+    """Return tangents of the steepest climb and dive, (sideways, 2), by the cells across per stage.
 
     step: length of a step along the line, m.
     amsl: altitude of the slope limits, m.

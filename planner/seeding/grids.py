@@ -376,7 +376,9 @@ def prune_cells(
     first_across: int,
     last_across: int,
 ) -> None:
-    """Set to inf the costs of cells from which the destination cannot be reached within the bound; fill the spans.
+    """Set to inf the costs of cells from which the destination cannot be reached within the bound.
+
+    Fill the spans.
 
     spans: `SPAN` records (layers,) to fill with the remaining cells.
     goal_distances: (across,) horizontal distance to the destination, m.

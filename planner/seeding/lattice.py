@@ -389,7 +389,9 @@ def cheapest_lattice_route(
     max_states: int,
     pause: Callable[[], None] = lambda: None,
 ) -> tuple[Records, int]:
-    """Find the cheapest route over a lattice; return its `LATTICE_CELL` records and the number of expanded states.
+    """Find the cheapest route over a lattice.
+
+    Return its `LATTICE_CELL` records and the number of expanded states.
 
     max_turn: largest turn per step, in units of 45 degrees.
     max_states: maximum number of expanded states.
@@ -438,7 +440,9 @@ def lattice_route(
 def ceiling_route(
     data: ProblemArrays, frame: RotatedFrame, step: float, depth: float, pause: Callable[[], None] = lambda: None
 ) -> Floats:
-    """Find a route at the altitude of the ceiling; return its world points (k, 3), m, or (0, 3) without a route.
+    """Find a route at the altitude of the ceiling.
+
+    Return its world points (k, 3), m, or (0, 3) without a route.
 
     step: spacing of the lattice, m.
     depth: depth to which the route may enter the missiles' spheres, m.

@@ -220,7 +220,7 @@ def _evaluate_merit(
 
 @inner
 def _merit_of_scores(violations: Record, objectives: Record) -> tuple[float, bool]:
-    """Return the merit of scores (length ratio plus prices of violations), and True if they show no violation."""
+    """Return the merit of scores (length ratio plus priced violations), and True without violations."""
     price, is_feasible = EXPOSURE_PRICE * objectives.kill_exposure, True
     if objectives.kill_exposure > 0.0:
         price += ANY_EXPOSURE_PRICE

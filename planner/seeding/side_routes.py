@@ -150,7 +150,7 @@ CELLS_PER_PAUSE = 100_000
 def grid_costs(
     data: ProblemArrays, frame: RotatedFrame, grid: Grid, bound: float, pause: Callable[[], None] = lambda: None
 ) -> GridCosts:
-    """Compute the costs of the cheapest routes from the start to each cell of a grid, and on to the destination.
+    """Compute the costs of the cheapest routes to each cell of a grid, and on to the destination.
 
     bound: upper limit on the cost of a whole route.
     pause: called after every `CELLS_PER_PAUSE` cells; an exception raised there stops the search.
@@ -389,7 +389,7 @@ def closest_places(data: ProblemArrays, path: Floats, distance: float) -> Floats
 
 
 def close_places(data: ProblemArrays, places: Floats, radius: float) -> ProblemArrays:
-    """Return data with additional missile spheres around places (k, 3), so that grids and lattices avoid them.
+    """Add missile spheres around places (k, 3) to the data, so that grids and lattices avoid them.
 
     radius: radius of the spheres, m.
     """
