@@ -179,10 +179,7 @@ def score_missiles(
     violations: Record,
     objectives: Record,
 ) -> None:
-    """Set the exposure to missiles, and add the clearance violations of corners.
-
-    This is the third part of `score_path`.
-    """
+    """Set the exposure to missiles, and add the clearance violations of corners, as part of `score_path`."""
     # Take arrays out of the data once, because passing the data on costs more than evaluating a leg.
     heights, to_pixel, missiles = data.heights, data.to_pixel, data.missiles
     slope_bounds, aircraft, required, margin = data.slope_bounds, data.aircraft, limits.required, data.kill_margin
