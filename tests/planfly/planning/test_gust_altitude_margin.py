@@ -233,7 +233,7 @@ MAST = {"name": "mast", "kind": "exclusion", "east_m": 4000.0, "north_m": 0.0, "
 @pytest.mark.parametrize(
     ("tables", "into"),
     [
-        ({"threats": [SAM]}, "the reach of sam"),
+        ({"threats": [SAM]}, "the kill zone of sam"),
         ({"zones": [MAST | {"ceiling_amsl_m": GROUND + 100.0}]}, "mast"),
     ],
     ids=["missile", "zone"],
@@ -245,7 +245,7 @@ def test_what_lies_below_counts(tables: dict[str, Any], into: str) -> None:
     plan = plan_along(uav, scenario, [scenario.start, scenario.destination])
     assert plan.safe
     (problem,) = ensure_altitude_margin(plan, uav).certificate.problems
-    assert f"downdrafts may take the aircraft {needed(uav) - 20.0:.0f} m into {into} on leg 0;" in problem
+    assert f"downdrafts may move the aircraft {needed(uav) - 20.0:.0f} m into {into} on leg 0." in problem
     made = make_plan(scenario, uav, SEED)
     assert made.safe
     assert ensure_altitude_margin(made, uav) is made
