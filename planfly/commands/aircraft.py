@@ -201,9 +201,9 @@ def _make_folder(args: argparse.Namespace) -> int:
 
 def _print_parameters(args: argparse.Namespace) -> None:
     """Print the values of a parameter file that were used, and those that the data sheet overrides."""
-    from planfly.workflow.data_sheets import overridden_texts, stated_parameters
+    from planfly.workflow.data_sheets import overridden_texts, read_aircraft_parameters
 
-    stated = stated_parameters(Path(args.params))
+    stated = read_aircraft_parameters(Path(args.params))
     values_text = ", ".join(stated.texts.values()) or "no value differs from its default"
     print(f"  params   {args.params}: {values_text}")
     if overridden := overridden_texts(vars(args), stated):

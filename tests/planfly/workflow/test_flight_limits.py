@@ -52,7 +52,7 @@ def test_a_log_has_a_limit(long: Path, capsys: pytest.CaptureFixture[str]) -> No
     argv = ["fly", long.name, "--scenario", "field.toml", "--guidance", "path", "--log", "f.mcap"]
     argv += ["--max-log", "1.5"]
     assert main(argv) == 4
-    assert "log limit: 1.5 MB are written; --max-log raises it" in capsys.readouterr().out
+    assert "log limit: the log has reached 1.5 MB; --max-log raises the limit" in capsys.readouterr().out
     log = read_log(Path("f.mcap"))
     assert log.complete
     assert 1.5e6 < Path("f.mcap").stat().st_size < 2.5e6
