@@ -19,7 +19,7 @@ from planner.evaluation.paper_scores import paper_scores
 from planner.evaluation.problem import make_problem
 from planner.plan import GIVEN_WAYPOINTS, Certificate, Objectives, Plan, Violations
 from planner.search.algorithms import Algorithm, find_algorithm, limits_for
-from planner.search.generations import may_try_again, path_generations, waypoint_generations
+from planner.search.generations import may_try_again, run_path_generations, run_waypoint_generations
 from planner.search.infeasibility_proof import is_closed
 from planner.search.search_cheapest import make_objective_cost, search_cheapest_path
 from planner.search.search_state import (
@@ -91,7 +91,7 @@ def plan_path(
     first_safe: bool = False,
     previous: Floats | None = None,
 ) -> Plan:
-    """Plan a path. The same scenario, limits, algorithm and seed give the same plan.
+    """Plan a path through a scenario; the same scenario, limits, algorithm and seed give the same plan.
 
     >>> from planfly.workflow.uav import load_uav
     >>> from world.scenario import load_scenario
@@ -177,16 +177,19 @@ def _other_waypoint_counts(scenario: Scenario, algorithm: Algorithm, previous_pa
 def _needs_other_count(best: _Result, count: int) -> bool:
     """Return True if a search with another number of waypoints may find a better path than the best so far.
 
-    Another number is tried if no path is safe, unless it is proven that there is none. Fewer waypoints are also tried
-    if the best path is long, or longer than the straight line among zones, where paths are not shortened.
+    Another number is tried if no path is safe, unless it is proven that there is none. If the shortest path is sought,
+    fewer waypoints are also tried if the best path is long, or longer than the straight line among zones, where paths
+    are not shortened.
     """
     search, waypoints, certificate = best
     if not search.meets_goal(certificate):
         return not search.is_closed
+    if search.first_safe or (search.problem.scenario.planner.objective or "length") != "length":
+        return False
     is_among_zones = is_limited(search.problem.search.airspace)
     max_excess = MIN_DETOUR_FRACTION if is_among_zones else LONG_PATH_EXCESS_FRACTION
     max_length = (1.0 + max_excess) * math.dist(waypoints[0], waypoints[-1])
-    return not search.first_safe and count < search.encoding.waypoints and bool(path_length(waypoints) > max_length)
+    return count < search.encoding.waypoints and bool(path_length(waypoints) > max_length)
 
 
 def _is_better(result: _Result, other: _Result) -> bool:
@@ -214,7 +217,7 @@ def with_waypoints(path: Floats, count: int) -> Floats:
 
 
 def certify_waypoints(scenario: Scenario, limits: Limits, waypoints: Floats, *, seed: int) -> Plan:
-    """Return the plan of given waypoints (w, 3), m, with scores and certificate; no search takes place.
+    """Make a plan from given waypoints (w, 3), m, with scores and certificate, without a search.
 
     The limits are those of the scenario's algorithm.
 
@@ -281,15 +284,16 @@ def _search_repeatedly(search: Search, previous_path: Floats | None) -> tuple[Fl
 def _check_options(scenario: Scenario, airspeed: float) -> None:
     """Raise ScenarioError for the first reason why no path can be searched.
 
-    The reasons are too much wind for the airspeed (m/s), too many values in a population, a budget below the
-    population, and a start or destination inside a missile's kill radius.
+    The wind may be too strong for the airspeed (m/s), the population too large, the budget smaller than the population,
+    or the start or destination inside a missile's kill radius.
     """
     if scenario.wind.speed > MAX_WIND_FRACTION * airspeed:
         raise ScenarioError.at(
             scenario.name,
             "wind.speed_mps",
             scenario.wind.speed,
-            f"allowed at most {MAX_WIND_FRACTION:.0%} of the airspeed {airspeed:g}, so that every course can be flown",
+            f"allowed at most {MAX_WIND_FRACTION:.0%} of the airspeed of {airspeed:g} m/s, so that every course can be"
+            " flown",
             shown=f"{scenario.wind.speed:g}",
         )
     settings = scenario.planner
@@ -358,17 +362,19 @@ def _run_attempt(search: Search, attempt: int, previous_path: Floats | None) -> 
     if algorithm.optimiser == "waypoints":
         # With a safe path and other sides tried, generations would shorten it by only 1e-4.
         if not (algorithm.seeded and search.has_safe()):
-            waypoint_generations(search, population, settings.generations)
+            run_waypoint_generations(search, population, settings.generations)
     else:
-        last_vector = path_generations(search, population, settings.generations, starts)
+        last_vector = run_path_generations(search, population, settings.generations, starts)
     if algorithm.final_shortening and search.end_reason == "completed":
         _finish_search(search, last_vector)
 
 
 def _finish_search(search: Search, last_vector: Floats | None) -> None:
-    """Shorten the best path, and the path of the last generation; if there is none, move waypoints instead.
+    """Shorten the best path and the path of the last generation.
 
-    last_vector: vector (d,) of that path.
+    Move waypoints if this finds no finished path.
+
+    last_vector: vector (d,) of the best path of the last generation, or None.
     """
     if search.can_shorten:
         if last_vector is not None:

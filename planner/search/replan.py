@@ -133,7 +133,7 @@ def _check_first_waypoint(scenario: Scenario, old_plan: Plan, leg: int) -> None:
     missile = int(np.argmax(np.where(threats.kill_radius > 0.0, depths, -math.inf))) if len(depths) else -1
     if missile >= 0 and threats.kill_radius[missile] > 0.0 and depths[missile] >= 0.0:
         raise MissionError(
-            f"{scenario.name}: leg {leg}: its first waypoint, {leg}, is {depths[missile]:.0f} m inside the kill "
+            f"{scenario.name}: leg {leg}: it starts at waypoint {leg}, {depths[missile]:.0f} m inside the kill "
             f"radius of {threats.names[missile]} ({threats.kill_radius[missile]:.0f} m): no path from there is safe",
             file=scenario.name,
             field="leg",
@@ -141,6 +141,6 @@ def _check_first_waypoint(scenario: Scenario, old_plan: Plan, leg: int) -> None:
         )
     zone_names = violated_zones(scenario, old_plan.waypoints[[leg, leg]])
     if zone_names:
-        reason = f"its first waypoint, {leg}, violates {zone_names[0]}"
-        message = f"{scenario.name}: leg {leg}: {reason}, so every path from there violates it"
+        reason = f"it starts at waypoint {leg}, which violates {zone_names[0]}"
+        message = f"{scenario.name}: leg {leg}: {reason}; every path from there violates this zone"
         raise MissionError(message, file=scenario.name, field="leg", value=leg)

@@ -140,7 +140,7 @@ def test_a_wind_of_more_than_eighty_percent_of_the_airspeed_is_refused(
 ) -> None:
     flight = {"airspeed_mps": 25.0}
     scenario = small(wind={"speed_mps": 20.1}, flight=flight)
-    with pytest.raises(ScenarioError, match=r"small: wind\.speed_mps: 20\.1: .* at most 80% of the airspeed 25"):
+    with pytest.raises(ScenarioError, match=r"small: wind\.speed_mps: 20\.1: .* at most 80% of the airspeed of 25 m/s"):
         plan_path(scenario, make_limits(scenario), seed=1)
     strong = small(wind={"speed_mps": 20.0}, flight=flight, planner={"waypoints": 4, "population": 4, "generations": 1})
     assert plan_path(strong, make_limits(strong), seed=1).waypoints.shape == (4, 3)
