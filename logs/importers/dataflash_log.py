@@ -40,7 +40,7 @@ _HOME = 1
 
 
 def dataflash_missions(commands: Messages, time: Floats, origins: Messages, source: str) -> Iterator[LoggedMission]:
-    """Yield the missions in the order of the log; items that were logged again when flown are merged.
+    """Yield the missions of a log in their order; an item that is logged again when it is flown is merged.
 
     commands: CMD messages.
     time: time of each CMD message, s, (n,).
@@ -162,7 +162,8 @@ class _Reader:
         if "position" not in series:
             names = ", ".join(sorted(self._index.names)[:12])
             raise LogError(
-                f"{self._source}: no POS, AHR2 or GPS message: the flown position is unknown (has {names or 'none'})",
+                f"{self._source}: no POS, AHR2 or GPS message: the flown position is unknown"
+                f" (the log has {names or 'no known messages'})",
                 file=self._source,
             )
         return RawLog(
@@ -224,7 +225,7 @@ class _Reader:
         return np.asarray(raw_time + shifts[np.clip(np.searchsorted(starts, messages.starts), 0, len(shifts) - 1)])
 
     def _message_table(self, name: str, columns: Iterable[str], scale: float = 1.0) -> LogSeries | None:
-        """Return fields of a message as columns, times `scale`; None if the log lacks one of them."""
+        """Return fields of a message as columns, multiplied by `scale`; None if the log lacks one of them."""
         columns = tuple(columns)
         messages = self._messages(name)
         if not messages.has(*columns) or not (messages.has("TimeUS") or messages.has("TimeMS")):
@@ -246,9 +247,10 @@ class _Reader:
         yield "throttle", self._throttle()
 
     def _first_table(self, choices: Iterable[tuple[str, tuple[str, ...]]], scale: float = 1.0) -> LogSeries | None:
-        """Return the first of several tables that has rows, times `scale`; None if all are empty.
+        """Return the fields of the first of several messages that the log contains; None if it has none.
 
-        choices: name of a message and its fields, for each table.
+        choices: for each message its name, and the names of the fields.
+        scale: factor by which the values are multiplied.
         """
         for name, columns in choices:
             table = self._message_table(name, columns, scale)
@@ -309,11 +311,11 @@ class _Reader:
         if airspeed is None or not len(airspeed.time) or not np.any(airspeed.values):
             return None
         return LogSeries(
-            airspeed.source, airspeed.time, airspeed.values * self._true_by_equivalent(airspeed.time)[:, None]
+            airspeed.source, airspeed.time, airspeed.values * self._true_airspeed_ratio(airspeed.time)[:, None]
         )
 
-    def _true_by_equivalent(self, time: Floats) -> Floats:
-        """Return the ratio of true to equivalent airspeed at given times, (n,).
+    def _true_airspeed_ratio(self, time: Floats) -> Floats:
+        """Return the ratio of true to equivalent airspeed at each time, (n,).
 
         The logged ratio is used, or else the ratio in the standard atmosphere at the logged altitude.
         """
@@ -394,7 +396,7 @@ class _Reader:
             yield from zip(self._time(messages).tolist(), messages.texts("Message"), strict=True)
 
     def _utc_start(self) -> float:
-        """Return time 0 of the log's clock as given by the first GPS fix, s since 1970; NaN if not logged."""
+        """Return the UTC time at time 0 of the log's clock, s since 1970; NaN if the log has no GPS fix."""
         messages = self._messages("GPS")
         for weeks, millis in (("GWk", "GMS"), ("Week", "TimeMS")):
             if messages.has(weeks, millis, "TimeUS"):

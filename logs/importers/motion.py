@@ -22,7 +22,7 @@ _STANDING_SPEED_MPS = 2.0
 
 @dataclass(frozen=True, slots=True)
 class Samples:
-    """Rows of one kind.
+    """Rows of one quantity, or of several quantities that are measured together.
 
     time: increasing times on the log's clock, s, (n,).
     values: columns of the rows, (n, k).
@@ -100,7 +100,7 @@ class MotionLog:
 
 
 def first_ground_position(position: Samples, velocity: Samples) -> tuple[float, float, float] | None:
-    """Return the latitude, longitude and altitude at which a vehicle first stood still, or None.
+    """Return latitude, longitude (deg) and altitude (m) where a vehicle first stood still, or None.
 
     position: latitude and longitude (deg) and altitude (m), (n, 3).
     velocity: ground velocity, m/s, (n, 3).

@@ -122,11 +122,12 @@ class _DataflashMotionReader:
         return messages
 
     def _first_samples(self, choices: Iterable[tuple[str, tuple[str, ...]]], scale: float = 1.0) -> Samples:
-        """Return the fields of the first of several messages that the log has, times `scale`.
+        """Return the fields of the first of several messages that the log has.
 
         The result has no rows if the log has none of the messages.  Servo outputs that RCOU lacks are 0.
 
-        choices: name of a message and its fields.
+        choices: for each message its name, and the names of the fields.
+        scale: factor by which the values are multiplied.
         """
         for name, columns in choices:
             messages = self._messages(name)

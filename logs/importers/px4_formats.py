@@ -1,7 +1,7 @@
 """Count the fields in the message formats of a PX4 log, before pyulog creates them.
 
-A format may contain other formats, and arrays of them (PX4, "ULog File Format", Message Format): forty formats of which
-each contains the next one twice take a kilobyte and define 2^40 fields.  pyulog creates every field of a topic when the
+A format may contain other formats, and arrays of them (PX4, "ULog File Format", Message Format).  Forty formats that
+each contain the next one twice take a kilobyte, but define 2^40 fields.  pyulog creates every field of a topic when the
 log declares the topic.
 """
 

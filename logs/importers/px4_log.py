@@ -172,48 +172,48 @@ _IS_CUT = 4
 def _walk_records(data: Bytes, stop: int, state: Ints, letters: Bytes) -> None:
     """Walk over the records up to byte ``stop``, and count damaged places and lost bytes.
 
-    The walk continues from ``state``, and updates it.
-
+    state: progress of the walk, by the indices above; the walk continues from it and updates it.
     letters: letters of all kinds of records.
     """
     is_known_letter = np.zeros(256, np.bool_)
     for letter in letters:
         is_known_letter[letter] = True
-    k, places, size, reading, cut = (
+    k, damaged_places, lost_bytes, is_reading, is_cut = (
         state[_NEXT_BYTE],
         state[_DAMAGED_PLACES],
         state[_LOST_BYTES],
         state[_IS_READING],
         state[_IS_CUT],
     )
-    while k + 3 <= data.size and k < stop and not cut:
+    while k + 3 <= data.size and k < stop and not is_cut:
         length = data[k] + 256 * data[k + 1]
-        after = k + 3 + length
-        if is_known_letter[data[k + 2]] and after > data.size:
+        record_end = k + 3 + length
+        if is_known_letter[data[k + 2]] and record_end > data.size:
             # Nothing can follow a cut record.
-            cut = 1
+            is_cut = 1
             break
-        follows = after + 3 > data.size or is_known_letter[data[after + 2]]
-        if is_known_letter[data[k + 2]] and follows:
-            k = after
-            reading = 1
+        is_followed = record_end + 3 > data.size or is_known_letter[data[record_end + 2]]
+        if is_known_letter[data[k + 2]] and is_followed:
+            k = record_end
+            is_reading = 1
         else:
-            places += reading
-            reading = 0
-            size += 1
+            damaged_places += is_reading
+            is_reading = 0
+            lost_bytes += 1
             k += 1
     state[_NEXT_BYTE], state[_DAMAGED_PLACES], state[_LOST_BYTES], state[_IS_READING], state[_IS_CUT] = (
         k,
-        places,
-        size,
-        reading,
-        cut,
+        damaged_places,
+        lost_bytes,
+        is_reading,
+        is_cut,
     )
 
 
 def _instance_table(topic: str, data: dict[str, Any], choices: Iterable[tuple[str, ...]]) -> LogSeries | None:
-    """Return fields of one instance of a topic as columns; None if it lacks them.
+    """Return fields of one instance of a topic as columns; None if the instance lacks them.
 
+    topic: name of the topic, for the result.
     data: values of the instance by field.
     choices: alternative groups of fields; the first group that the instance has is returned.
     """
@@ -267,7 +267,7 @@ class Topics:
         return self._source
 
     def table(self, topic: str, *choices: tuple[str, ...]) -> LogSeries | None:
-        """Return fields of a topic as columns; None if the log lacks them.
+        """Return fields of a topic's first instance as columns; None if the log lacks them.
 
         choices: alternative groups of fields; the first group that the topic has is returned.
         """
@@ -276,7 +276,7 @@ class Topics:
     def _series(self) -> Iterable[tuple[str, LogSeries | None]]:
         """Yield the name and the values of each series of a `RawLog`; None for a series that the log lacks."""
         position = self.table("vehicle_global_position", ("lat", "lon", "alt"), ("latitude", "longitude", "altitude"))
-        yield "position", position if position is not None else self._gps()
+        yield "position", position if position is not None else self._gps_position()
         yield "velocity", self._velocity()
         yield "attitude", self.attitude()
         yield "airspeed", self._airspeed()
@@ -285,8 +285,8 @@ class Topics:
         yield "battery", self._battery_with_energy()
         yield "throttle", self.table("actuator_controls_0", ("control[3]",))
 
-    def _gps(self) -> LogSeries | None:
-        """Return latitude (deg), longitude (deg) and altitude (m AMSL) of GPS, (n, 3); None if not logged."""
+    def _gps_position(self) -> LogSeries | None:
+        """Return latitude, longitude (deg) and altitude (m AMSL) from GPS, (n, 3); None if not logged."""
         for topic in ("vehicle_gps_position", "sensor_gps"):
             position = self.table(topic, ("latitude_deg", "longitude_deg", "altitude_msl_m"))
             if position is not None:
@@ -362,7 +362,7 @@ class Topics:
 
     def _heights(self) -> Iterable[HeightSource]:
         """Yield the altitudes in the log other than the altitude of the position."""
-        gps = self._gps()
+        gps = self._gps_position()
         if gps is not None and "vehicle_global_position" in self._data:
             yield HeightSource(f"{gps.source}.alt", "amsl", LogSeries(gps.source, gps.time, gps.values[:, 2:]))
         baro = self.table("vehicle_air_data", ("baro_alt_meter",))
@@ -394,9 +394,9 @@ class Topics:
         return "unknown"
 
     def _missions(self) -> Iterable[LoggedMission]:
-        """Yield the mission, made of the items that became current, with the length from mission_result.
+        """Yield the mission, which consists of the items that became current.
 
-        Nothing is yielded if the log has neither.
+        The number of items comes from mission_result.  Nothing is yielded if the log has neither.
         """
         items = self._items()
         stamps = self._data.get("navigator_mission_item", {}).get("timestamp", [0.0])
@@ -456,7 +456,7 @@ class Topics:
         )
 
     def parameters(self) -> dict[str, float]:
-        """Return the last value of each parameter by name, without values that are not finite numbers."""
+        """Return the last value of each parameter by name; values that are not finite numbers are left out."""
         values = dict(self._log.initial_parameters)
         values |= {name: value for _, name, value in self._log.changed_parameters}
         # A damaged parameter may be a text.
@@ -472,7 +472,7 @@ class Topics:
         return name
 
     def _utc_start(self) -> float:
-        """Return time 0 of the log's clock as given by the first GPS time, s since 1970; NaN if not logged."""
+        """Return the UTC time at time 0 of the log's clock, s since 1970; NaN if no GPS time is logged."""
         for topic in ("vehicle_gps_position", "sensor_gps"):
             data = self._data.get(topic, {})
             if "time_utc_usec" in data:

@@ -123,9 +123,9 @@ def read_px4_motion(path: Path, digest: str) -> MotionLog:
 
 
 def _samples(topics: Topics, topic: str, *choices: tuple[str, ...]) -> Samples:
-    """Return fields of a topic, sorted by time: the first of several choices that the topic has.
+    """Return fields of a topic, sorted by time; no rows if the topic has none of the groups of fields.
 
-    There are no rows if the topic has none of the choices.
+    choices: alternative groups of fields; the first group that the topic has is returned.
     """
     table = topics.table(topic, *choices)
     return NO_SAMPLES if table is None else sort_samples(table.time, table.values)
@@ -163,7 +163,7 @@ def _wind(topics: Topics) -> Samples:
 
 
 def _airspeed(topics: Topics) -> tuple[Samples, Samples]:
-    """Return the measured calibrated airspeed, m/s, and the ratio of true to calibrated airspeed.
+    """Return the measured calibrated airspeed (m/s), and the ratio of true to calibrated airspeed.
 
     Rows whose airspeed is not from a sensor are left out.
     """
@@ -188,7 +188,7 @@ def _airspeed(topics: Topics) -> tuple[Samples, Samples]:
 
 
 def _hover_periods(topics: Topics) -> Iterable[tuple[float, float]]:
-    """Yield the start and end (s) of each period in which a VTOL was not a plane, or was in transition."""
+    """Yield start and end (s) of each period in which a VTOL flew on lifting motors or in transition."""
     kinds = topics.table("vehicle_status", ("vehicle_type", "in_transition_mode"), ("vehicle_type",))
     if kinds is None:
         return
@@ -204,8 +204,8 @@ def _hover_periods(topics: Topics) -> Iterable[tuple[float, float]]:
 def _controls(topics: Topics, parameters: Mapping[str, float]) -> tuple[Samples, bool]:
     """Return pitch, roll, yaw (fractions of travel) and throttle, (n, 4), and True if there are elevons.
 
-    The deflection of a surface is positive up or to the right.  The torque scales of a surface (CA_SV_CSn_TRQ_*) state
-    its effect on each axis; the deflection of an axis is the mean of the surfaces, weighted by these scales.  Raises
+    The deflection of a surface is positive up or to the right.  The parameters CA_SV_CSn_TRQ_* of a surface state its
+    effect on each axis.  The deflection about an axis is the mean of all surfaces, weighted by these effects.  Raises
     LogError for surfaces that cannot be modelled.
     """
     servos = _actuators(topics, "actuator_servos", _SERVOS)
@@ -243,7 +243,7 @@ def _controls(topics: Topics, parameters: Mapping[str, float]) -> tuple[Samples,
     for axis, row in zip(("elevator", "aileron"), scales, strict=False):
         if not row.any():
             allowed = "expected CA_SV_CSn_TYPE with CA_SV_CSn_TRQ_P and CA_SV_CSn_TRQ_R"
-            raise LogError(f"{topics.source}: no surface controls the {axis}; {allowed}", file=topics.source)
+            raise LogError(f"{topics.source}: no surface acts as {axis}; {allowed}", file=topics.source)
     sums = np.abs(scales).sum(axis=1, keepdims=True)
     axis_deflections = np.nan_to_num(servos.values) @ (scales / np.where(sums > 0.0, sums, 1.0)).T
     # A motor below 2 % of its thrust is stopped, which is NaN (PX4's control allocator).
@@ -265,16 +265,19 @@ def _forward_motors(topics: Topics, airframe: int, parameters: Mapping[str, floa
             [abs(parameters.get(f"CA_ROTOR{k}_A{axis}", up)) for axis, up in (("X", 0.0), ("Z", 1.0))]
             for k in range(count)
         ]
-        ahead = [k for k, (x, z) in enumerate(axes) if x > z]
-        if not ahead:
-            allowed = "expected one with |CA_ROTORn_AX| above |CA_ROTORn_AZ|"
+        forward_rotors = [k for k, (x, z) in enumerate(axes) if x > z]
+        if not forward_rotors:
+            allowed = "expected a rotor with |CA_ROTORn_AX| above |CA_ROTORn_AZ|"
             raise _parameter_error(topics, "CA_ROTOR_COUNT", count, f"no rotor pushes forward; {allowed}")
-        return ahead
+        return forward_rotors
     return list(range(count)) or np.flatnonzero(np.isfinite(motors.values).any(axis=0)).tolist()
 
 
 def _check_flaperon(topics: Topics, parameters: Mapping[str, float], surface: int) -> None:
-    """Raise LogError if a surface is also deflected as a flap or a spoiler during the flight."""
+    """Raise LogError if a control surface is also deflected as a flap or a spoiler during the flight.
+
+    surface: number of the surface in PX4's parameters, from 0.
+    """
     for name, (title, topic) in _ALSO_MOVE.items():
         deflection_ratio = parameters.get(f"CA_SV_CS{surface}_{name}", 0.0)
         setpoints = _samples(topics, topic, ("normalized_setpoint",)).values
@@ -284,7 +287,7 @@ def _check_flaperon(topics: Topics, parameters: Mapping[str, float], surface: in
 
 
 def _actuators(topics: Topics, topic: str, size: int) -> Samples:
-    """Return the outputs of a topic's actuators, (n, size), sorted by time; no rows if the log lacks the topic.
+    """Return the outputs of the actuators in a topic, (n, size), by time; no rows without the topic.
 
     NaN stands for an unused or stopped actuator.
     """

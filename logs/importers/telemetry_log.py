@@ -313,7 +313,7 @@ def vehicle_messages(path: Path) -> tuple["VehicleMessages", Damage]:
         if any(_is_vehicle(heartbeat) for _, heartbeat in messages.named("HEARTBEAT"))
     ]
     if not vehicles:
-        raise LogError(f"{path}: no HEARTBEAT of a vehicle: nothing says what flew", file=path)
+        raise LogError(f"{path}: no HEARTBEAT of a vehicle: the kind of vehicle is unknown", file=path)
     # Of several vehicles take the one with the most messages.
     return VehicleMessages(max(vehicles, key=len), items, str(path)), reader.damage()
 
@@ -331,19 +331,19 @@ class VehicleMessages:
 
         items: messages on missions with their times of reception, s since 1970.
         """
-        self._source, self._found = source, messages
+        self._source, self._messages = source, messages
         clock = messages.boot_clock()
         self._offset, self.jumps, self._times = clock.offset, clock.jumps, clock.time
         # Missions are sent to the vehicle: their messages come from the station.
         self._items = [(stamp - self._offset, message) for stamp, message in items]
-        self._own = {
+        self._named_messages = {
             name: [(float(self._times[k]), message) for k, message in messages.named(name)] for name in _KEPT_MESSAGES
         }
 
     def to_raw_log(self, damage: Damage) -> RawLog:
         """Return the log with all data that a verdict needs.  Raises LogError for a log without positions."""
         series = {name: log_series for name, log_series in self._series() if log_series is not None}
-        heartbeats = [message for _, message in self._own.get("HEARTBEAT", []) if _is_vehicle(message)]
+        heartbeats = [message for _, message in self._named_messages.get("HEARTBEAT", []) if _is_vehicle(message)]
         if "position" not in series:
             raise LogError(
                 f"{self._source}: no GLOBAL_POSITION_INT or GPS_RAW_INT with a fix: the flown position is unknown",
@@ -360,15 +360,21 @@ class VehicleMessages:
             modes=tuple(self._modes()),
             missions=tuple(self._missions()),
             parameters=self._parameters(),
-            events=tuple((time, _text(message.text)) for time, message in self._own.get("STATUSTEXT", [])),
+            events=tuple(
+                (time, _decode_text(message.text)) for time, message in self._named_messages.get("STATUSTEXT", [])
+            ),
             utc_start=self._offset,
             clock_jumps=self.jumps,
             damage=damage,
         )
 
     def table(self, name: str, columns: Iterable[str]) -> LogSeries | None:
-        """Return columns of a message in the units as sent, by the vehicle's clock; None if it was never sent."""
-        rows = self._found.table(name)
+        """Return fields of a message in the units in which they were sent; None if the message was never sent.
+
+        name: name of the message, a key of `NUMBERS`.
+        columns: names of the fields.
+        """
+        rows = self._messages.table(name)
         if not len(rows):
             return None
         column_numbers = [1 + NUMBERS[name].index(column) for column in columns]
@@ -406,9 +412,9 @@ class VehicleMessages:
         yield "battery", self._battery_with_energy()
 
     def _gps_position(self) -> LogSeries | None:
-        """Return the positions of GPS with a 3-D fix; None without a fix.
+        """Return the GPS positions with a 3-D fix: latitude and longitude (deg) and altitude (m), (n, 3).
 
-        They are latitude (deg), longitude (deg) and altitude (m), (n, 3).
+        Return None if the receiver never had a fix.
         """
         table = self.table("GPS_RAW_INT", ("lat", "lon", "alt", "fix_type"))
         if table is None:
@@ -420,7 +426,7 @@ class VehicleMessages:
         return LogSeries("GPS_RAW_INT", table.time[has_fix], scaled)
 
     def _wind(self) -> LogSeries | None:
-        """Return the wind velocity to east and north, m/s, (n, 2); None if no wind was sent or all of it is 0."""
+        """Return the wind velocity to east and north, m/s, (n, 2); None if it was not sent or is always 0."""
         wind = self.table("WIND", ("direction", "speed"))
         if wind is not None and np.any(wind.values[:, 1]):
             # The direction is the direction from which the wind blows.
@@ -446,7 +452,7 @@ class VehicleMessages:
         return LogSeries(table.source, table.time, table.values * np.array([1e-3, 0.01]))
 
     def _measured_table(self, name: str, columns: tuple[str, ...]) -> LogSeries | None:
-        """Return columns of a battery message, only with measured values; None if no row has them."""
+        """Return fields of a battery message, only the rows with measurements; None if there are none."""
         table = self.table(name, columns)
         if table is None:
             return None
@@ -456,7 +462,7 @@ class VehicleMessages:
     def _heights(self) -> Iterable[HeightSource]:
         """Yield the altitudes in the log other than the altitude of the position."""
         gps = self._gps_position()
-        if gps is not None and len(self._found.table("GLOBAL_POSITION_INT")):
+        if gps is not None and len(self._messages.table("GLOBAL_POSITION_INT")):
             yield HeightSource("GPS_RAW_INT.alt", "amsl", LogSeries(gps.source, gps.time, gps.values[:, 2:]))
         hud = self.table("VFR_HUD", ("alt",))
         if hud is not None:
@@ -465,7 +471,7 @@ class VehicleMessages:
     def _modes(self) -> Iterable[ModeChange]:
         """Yield the changes of the vehicle's mode, the first mode included."""
         last_mode: tuple[str, bool] | None = None
-        for time, heartbeat in self._own.get("HEARTBEAT", []):
+        for time, heartbeat in self._named_messages.get("HEARTBEAT", []):
             if not _is_vehicle(heartbeat):
                 continue
             mode = px4_mode(heartbeat.custom_mode) if heartbeat.autopilot == _PX4 else plane_mode(heartbeat.custom_mode)
@@ -489,16 +495,18 @@ class VehicleMessages:
                 )
                 begins_mission = False
         for logged in combine_items(rows):
-            mission = (_px4_mission if self.is_px4 else make_logged_mission)(logged, self._source, "mission items")
+            mission = (_make_px4_mission if self.is_px4 else make_logged_mission)(logged, self._source, "mission items")
             if mission is not None:
                 yield replace(mission, mission=self._with_home(mission.mission))
 
     def _with_home(self, mission: Mission) -> Mission:
-        """Return a mission with the home that the vehicle reported last; unchanged if it reported none.
+        """Replace a mission's home by the last home that the vehicle reported, if it reported any.
 
-        The home in an uploaded mission is only an assumption of the station.
+        The home in an uploaded mission is only an assumption of the ground station.
         """
-        reports = [message for _, message in self._own["HOME_POSITION"] if message.latitude or message.longitude]
+        reports = [
+            message for _, message in self._named_messages["HOME_POSITION"] if message.latitude or message.longitude
+        ]
         if not reports:
             return mission
         report = reports[-1]
@@ -507,43 +515,45 @@ class VehicleMessages:
 
     def mode_numbers(self) -> Iterator[tuple[float, int]]:
         """Yield the time and the mode number of each heartbeat of the vehicle."""
-        for time, heartbeat in self._own.get("HEARTBEAT", []):
+        for time, heartbeat in self._named_messages.get("HEARTBEAT", []):
             if _is_vehicle(heartbeat):
                 yield time, int(heartbeat.custom_mode)
 
     @property
     def is_px4(self) -> bool:
-        """True if PX4 flew."""
-        return any(heartbeat.autopilot == _PX4 for _, heartbeat in self._own["HEARTBEAT"] if _is_vehicle(heartbeat))
+        """True if the vehicle's autopilot is PX4."""
+        return any(
+            heartbeat.autopilot == _PX4 for _, heartbeat in self._named_messages["HEARTBEAT"] if _is_vehicle(heartbeat)
+        )
 
     def _parameters(self) -> dict[str, float]:
         """Return the last finite value of each parameter that the vehicle sent."""
         values: dict[str, float] = {}
-        for _, message in self._own.get("PARAM_VALUE", []):
-            name = _text(message.param_id)
+        for _, message in self._named_messages.get("PARAM_VALUE", []):
+            name = _decode_text(message.param_id)
             if name and math.isfinite(message.param_value):
                 values[name] = float(message.param_value)
         return values
 
     def _program(self, heartbeat: Any) -> str:
         """Return ArduPilot's start message with its version, or the autopilot's name; "" if unknown."""
-        for _, message in self._own.get("STATUSTEXT", []):
-            text = _text(message.text)
+        for _, message in self._named_messages.get("STATUSTEXT", []):
+            text = _decode_text(message.text)
             if "Ardu" in text and " V" in text:
                 return text
         return _NAMES.get(heartbeat.autopilot, "")
 
 
-def _text(value: str | bytes) -> str:
+def _decode_text(value: str | bytes) -> str:
     """Return a text field up to its first zero byte, without surrounding spaces."""
     text = value.decode("latin-1") if isinstance(value, bytes) else value
     return text.partition("\0")[0].strip()
 
 
 def _parse_item(message: Any, *, scaled: bool) -> MissionItem:
-    """Return the item of a mission message.
+    """Convert a MAVLink mission message to a mission item.
 
-    scaled: True if its coordinates are integers of 1e-7 degrees.
+    scaled: True if latitude and longitude are integers of 1e-7 degrees.
     """
     command, frame = int(message.command), int(message.frame)
     lat, lon = (message.x * 1e-7, message.y * 1e-7) if scaled else (float(message.x), float(message.y))
@@ -553,8 +563,8 @@ def _parse_item(message: Any, *, scaled: bool) -> MissionItem:
     )
 
 
-def _px4_mission(logged: LoggedItemGroup, source: str, origin: str) -> LoggedMission | None:
-    """Make a mission of PX4 items, which are numbered from 0 and contain no home.
+def _make_px4_mission(logged: LoggedItemGroup, source: str, origin: str) -> LoggedMission | None:
+    """Make a mission from logged items of PX4, which are numbered from 0 and contain no home.
 
     Return None if the mission is complete but has fewer than two items.
     """

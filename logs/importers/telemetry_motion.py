@@ -30,7 +30,7 @@ def read_telemetry_motion(path: Path, digest: str) -> MotionLog:
     """
     messages, damage = vehicle_messages(path)
     if messages.is_px4:
-        advice = "a .ulg of the same flight does"
+        advice = "use the .ulg of the same flight"
         raise LogError(f"{path}: telemetry of PX4 does not state what its outputs move; {advice}", file=path)
     raw = messages.to_raw_log(damage)
     velocity = _select_columns(raw.series.get("velocity"), [1, 0, 2], [1.0, 1.0, -1.0])
@@ -64,26 +64,26 @@ def read_telemetry_motion(path: Path, digest: str) -> MotionLog:
 
 
 def _select_columns(series: LogSeries | None, columns: list[int], factors: list[float] | None = None) -> Samples:
-    """Return columns of a series, sorted by time, each times its factor; no rows without a series."""
+    """Return columns of a series, sorted by time, multiplied by one factor each; no rows without series."""
     if series is None:
         return NO_SAMPLES
     return sort_samples(series.time, series.values[:, columns] * np.array([1.0] if factors is None else factors))
 
 
 def _message_times(time: Floats, microseconds: Floats) -> Floats:
-    """Return the times at which messages were made, instead of the times of their reception, s, (n,).
+    """Return the times at which the vehicle made its messages, s, (n,), instead of their reception.
 
     time: times of reception on the vehicle's clock, s, (n,).
     microseconds: times in the messages since the vehicle was switched on, us, (n,); the count may wrap after 32 bits.
 
-    If both times differ too much, the time of reception is kept.
+    The time of reception is returned where the two times differ by `_MAX_CLOCK_DIFFERENCE_S` or more.
 
     >>> _message_times(np.array([4300.0, 4300.3]), np.array([5.1e6, 5.2e6])).round(3).tolist()
     [4300.067, 4300.167]
     """
-    own_time = microseconds * 1e-6
-    own_time = own_time + _WRAP_S * np.round((time - own_time) / _WRAP_S)
-    return np.asarray(np.where(np.abs(own_time - time) < _MAX_CLOCK_DIFFERENCE_S, own_time, time))
+    message_time = microseconds * 1e-6
+    message_time = message_time + _WRAP_S * np.round((time - message_time) / _WRAP_S)
+    return np.asarray(np.where(np.abs(message_time - time) < _MAX_CLOCK_DIFFERENCE_S, message_time, time))
 
 
 def _inertial(messages: VehicleMessages) -> Samples:

@@ -85,7 +85,7 @@ class _Pair(NamedTuple):
     series: values of the quantity.
     expected: values that follow from the partner, at the times of the grid, (n,).
     exact: True if both must be equal, False if they only vary together.
-    at_once: True if both vary at the same time, without a delay of the motion.
+    simultaneous: True if both vary at the same time, False if the motion delays the partner.
     """
 
     quantity: str
@@ -93,7 +93,7 @@ class _Pair(NamedTuple):
     series: Series
     expected: Floats
     exact: bool = True
-    at_once: bool = True
+    simultaneous: bool = True
 
 
 def check_signs_and_units(log: ColumnLog) -> None:
@@ -101,7 +101,7 @@ def check_signs_and_units(log: ColumnLog) -> None:
 
     The message names the key of the table to check.  Nothing is checked for a log with too few rows in flight.
     """
-    grid = _flying_grid(log)
+    grid = _make_flying_grid(log)
     if len(grid) < _MIN_ROWS:
         return
     for quantity in _SENSORS:
@@ -121,7 +121,7 @@ def check_signs_and_units(log: ColumnLog) -> None:
         _check_delay(log, pair, grid)
 
 
-def _flying_grid(log: ColumnLog) -> Floats:
+def _make_flying_grid(log: ColumnLog) -> Floats:
     """Return the times of a regular grid at which the aircraft flies and the log has rows, s, (n,).
 
     The grid is empty for a log without ground velocity and ground speed.
@@ -143,7 +143,7 @@ def _flying_grid(log: ColumnLog) -> Floats:
 
 
 def _finite_rows(series: Series) -> tuple[Floats, Floats]:
-    """Return the times and values of a series, only for the rows with a finite value."""
+    """Return the times (s) and the values of the rows of a series that have a finite value."""
     is_known = np.isfinite(series.values)
     return series.time[is_known], series.values[is_known]
 
@@ -194,7 +194,7 @@ def _pairs_to_check(log: ColumnLog, grid: Floats) -> Iterator[_Pair]:
         yield _Pair("throttle", "the current", log.series("throttle"), current, exact=False)
     if log.has("pitch", "altitude"):
         climb = _rate_of_change(log.series("altitude"), grid)
-        yield _Pair("pitch", "the change of altitude", log.series("pitch"), climb, exact=False, at_once=False)
+        yield _Pair("pitch", "the change of altitude", log.series("pitch"), climb, exact=False, simultaneous=False)
     if (triangle := _velocity_triangle(log, grid)) is not None:
         air = np.abs(triangle.velocity - triangle.wind)
         yield _Pair("airspeed", "ground velocity and heading", log.series("airspeed"), air, exact=False)
@@ -219,7 +219,7 @@ def _attitude_pairs(log: ColumnLog, grid: Floats) -> Iterator[_Pair]:
     for name, values in expected.items():
         if log.has(name):
             yield _Pair(name, "the change of roll, pitch and yaw", log.series(name), values)
-    yield _Pair("roll", "the turn that yaw shows", angles["roll"], yaw_change, exact=False, at_once=False)
+    yield _Pair("roll", "the turn that yaw shows", angles["roll"], yaw_change, exact=False, simultaneous=False)
 
 
 def _acceleration_pairs(log: ColumnLog, grid: Floats) -> Iterator[_Pair]:
@@ -270,10 +270,10 @@ class _Triangle(NamedTuple):
 
 
 def _velocity_triangle(log: ColumnLog, grid: Floats) -> _Triangle | None:
-    """Return the wind triangle that fits ground velocity, heading and airspeed best, or None.
+    """Fit the wind triangle: ground velocity = factor * airspeed along the heading + wind.
 
-    The triangle is unknown without these quantities, and in a flight without turns, because only turns distinguish the
-    wind from an error of the airspeed.  All velocities are complex numbers, as in `_Triangle`.
+    Return None if the log lacks one of these quantities.  Return None also for a flight without turns, because only
+    turns distinguish the wind from an error of the airspeed.  All velocities are complex numbers, as in `_Triangle`.
     """
     velocity = _ground_velocity(log, grid)
     if velocity is None or not log.has("airspeed", "yaw"):
@@ -290,7 +290,7 @@ def _velocity_triangle(log: ColumnLog, grid: Floats) -> _Triangle | None:
 
 
 def _correlate(values: Floats, expected: Floats) -> float:
-    """Return the correlation coefficient of two series; 0 if one of them is constant."""
+    """Return the correlation coefficient of two series of equal length; 0 if one of them is constant."""
     values, expected = values - values.mean(), expected - expected.mean()
     norm_product = float(np.sqrt((values @ values) * (expected @ expected)))
     return float(values @ expected) / norm_product if norm_product > 0.0 else 0.0
@@ -326,14 +326,14 @@ def _check_not_frozen(log: ColumnLog, quantity: str, grid: Floats) -> None:
         end = float(time[min(lasts[k] + 1, len(time) - 1)])
         flight_time = np.count_nonzero((grid > start) & (grid < end)) * _STEP_S
         if flight_time > limit and not (quantity == "current" and values[firsts[k]] == 0.0):
-            hint = "expected a sensor that works; leave its cells empty, or read a part (span_s)"
+            hint = "expected a sensor that works; leave its cells empty, or read another part of the log (span_s)"
             raise _contradiction_error(
                 log, quantity, f"is stuck at one value from {start:.6g} to {end:.6g} s, in flight", hint
             )
 
 
 def _check_pair(log: ColumnLog, pair: _Pair, grid: Floats) -> None:
-    """Raise LogError if two measurements differ in sign, do not correlate, or differ by a factor.
+    """Raise LogError if two measurements have opposite signs, do not correlate, or differ by a factor.
 
     With errors in both measurements, the factor lies between r c and r / c, where r is the ratio of the standard
     deviations and c the correlation (Frisch 1934).
@@ -361,7 +361,7 @@ def _check_delay(log: ColumnLog, pair: _Pair, grid: Floats) -> None:
     after it, because it then does not compare the same motion.
     """
     is_inner = (grid > grid[0] - _SHIFTS_S[0]) & (grid < grid[-1] - _SHIFTS_S[-1])
-    if not pair.at_once or np.count_nonzero(is_inner) < _MIN_ROWS:
+    if not pair.simultaneous or np.count_nonzero(is_inner) < _MIN_ROWS:
         return
     expected, inner_grid = pair.expected[is_inner], grid[is_inner]
     correlations = [
@@ -379,7 +379,10 @@ def _check_delay(log: ColumnLog, pair: _Pair, grid: Floats) -> None:
 
 
 def _check_force(log: ColumnLog, force: float) -> None:
-    """Raise LogError for an implausible median of the specific force down in flight, m/s²."""
+    """Raise LogError for an implausible specific force down.
+
+    force: median of the specific force down in flight, m/s².
+    """
     low, high = _FORCE_RANGE_MPS2
     if not low <= force <= high:
         entry = log.table.columns["acceleration_down"][0]
@@ -404,14 +407,14 @@ def _check_airspeed(log: ColumnLog, grid: Floats) -> None:
     if triangle is None:
         return
     if not 1.0 / _MAX_AIRSPEED_RATIO <= triangle.factor <= _MAX_AIRSPEED_RATIO:
-        message = f"is {1.0 / triangle.factor:.3g} times the airspeed of ground velocity and heading"
+        message = f"is {1.0 / triangle.factor:.3g} times the airspeed that follows from ground velocity and heading"
         raise _contradiction_error(log, "airspeed", message, f"check unit ({log.unit('airspeed')}) and scale")
     if abs(triangle.wind) > _CLEAR_WIND_MPS:
         for quantity, wind in _logged_winds(log, grid):
             wind_ratio = (wind / triangle.wind).real
             low, high = _WIND_RATIO_RANGE
             if not low <= wind_ratio <= high:
-                message = f"states {wind_ratio:.2g} times the wind of airspeed, heading and ground velocity"
+                message = f"states {wind_ratio:.2g} times the wind that follows from airspeed, heading and velocity"
                 raise _contradiction_error(log, quantity, message, "check unit and frame (from, to)")
 
 
@@ -433,7 +436,7 @@ def _check_throttle(log: ColumnLog, grid: Floats) -> None:
     throttle, current = (_mean_on_grid(log.series(name), grid) for name in ("throttle", "current"))
     low, high = np.percentile(current, [5.0, 95.0]).tolist()
     if np.ptp(throttle) < _MIN_THROTTLE_RANGE and high - low > _MIN_CURRENT_RANGE_A:
-        message = f"stays at {throttle[0]:.3g} in flight, and the current goes from {low:.3g} to {high:.3g} A"
+        message = f"stays at {throttle[0]:.3g} in flight while the current goes from {low:.3g} to {high:.3g} A"
         raise _contradiction_error(log, "throttle", message, "check the column")
 
 

@@ -25,7 +25,7 @@ from logs.importers.columns.quantities import (
     QUATERNION,
     UNIT_ZEROS,
     UNITS,
-    likelier_unit,
+    find_likelier_unit,
     to_default_frame,
 )
 from world.arrays import Flags, Floats
@@ -135,7 +135,7 @@ class ColumnLog:
         Raises LogError for a missing column, text in place of numbers, and implausible values.
         """
         if self._is_from_quaternion(quantity):
-            return self._angle_of_quaternion(quantity)
+            return self._angle_from_quaternion(quantity)
         entries = self.table.columns[quantity]
         parts = [self._entry_series(quantity, entry) for entry in entries]
         if len(parts) == 1:
@@ -144,14 +144,15 @@ class ColumnLog:
         values = parts[0].values.copy()
         for entry, part in zip(entries[1:], parts[1:], strict=True):
             if len(part.time) != len(time):
-                raise self._error(f"columns.{quantity}.clock", entry.clock, "all entries of a quantity share one clock")
+                raise self._error(f"columns.{quantity}.clock", entry.clock, "expected one clock for all entries")
             values = np.where(np.isfinite(values), values, part.values)
         return Series(time, values)
 
-    def _angle_of_quaternion(self, angle: str) -> Series:
-        """Return roll, pitch or yaw from the quaternion from FRD to NED, or from FLU to ENU.
+    def _angle_from_quaternion(self, angle: str) -> Series:
+        """Compute roll, pitch or yaw, rad, from the logged attitude quaternion.
 
-        Raises LogError if the parts have different times, and for a quaternion whose norm is not 1.
+        The quaternion leads from body axes FRD to NED, or from FLU to ENU.  Raises LogError if its components have
+        different times, or if its norm is not 1.
         """
         parts = [self.series(name) for name in QUATERNION]
         time = parts[0].time
@@ -172,11 +173,11 @@ class ColumnLog:
         factor, offset = to_default_frame(angle, self.frame("quaternion_w"))
         return Series(time, factor * angles[angle]() + offset)
 
-    def raw(self, quantity: str) -> tuple[Floats, Column]:
+    def raw_values(self, quantity: str) -> tuple[Floats, Column]:
         """Return the times and the unconverted values of a quantity, such as the names or numbers of modes."""
         entry = self.table.columns[quantity][0]
         clock = self._clock(entry.clock)
-        return self._times(entry.clock), self._column_on_clock(
+        return self._aligned_times(entry.clock), self._column_on_clock(
             clock, entry.column or "", f"columns.{quantity}.column", entry.clock
         )
 
@@ -192,7 +193,9 @@ class ColumnLog:
             self._column_by_name(data, column, "parameter_columns") for column in self.table.parameter_columns
         )
         if len(names) != len(values):
-            raise self._error("parameter_columns", f"{len(names)} names", f"{len(values)} values: expected as many")
+            raise self._error(
+                "parameter_columns", f"{len(names)} names", f"{len(values)} values: expected equal numbers"
+            )
         numbers = _numbers(values, self._location(data, self.table.parameter_columns[1]))
         stored = {cell_text(name): value for name, value in zip(names, numbers.tolist(), strict=True)}
         return {name: value for name, value in stored.items() if math.isfinite(value)} | self.table.parameters
@@ -201,7 +204,7 @@ class ColumnLog:
     # Files and clocks.
 
     def _error(self, field: str, value: Any, allowed: str) -> LogError:
-        """Return the error for a field of the table."""
+        """Return the error for a wrong value of a field of the table, with the allowed values."""
         return LogError.at(self.table_path, field, value, allowed)
 
     def _data_path(self, clock: ClockTable) -> Path:
@@ -236,7 +239,7 @@ class ColumnLog:
         """
         data, field = self._data_file(clock), f"clocks.{name}"
         if clock.column is None:
-            lengths = [len(self._column_by_name(data, column)) for column in self._clock_columns(name)]
+            lengths = [len(self._column_by_name(data, column)) for column in self._columns_of_clock(name)]
             rate = clock.rate or 1.0
             return _Clock(data, np.arange(max(lengths, default=0)) / rate + clock.offset_s, rate)
         values = self._column_by_name(data, clock.column, f"{field}.column")
@@ -251,7 +254,7 @@ class ColumnLog:
         decreasing_rows = np.flatnonzero(np.diff(time) < 0.0)
         if decreasing_rows.size:
             k = int(decreasing_rows[0]) + 1
-            allowed = f"after {time[k - 1]:.6g} s: expected rising times"
+            allowed = f"after {time[k - 1]:.6g} s:expected increasing times"
             raise LogError.at(data.path, f"{clock.column}[{k}]", f"{time[k]:.6g} s", allowed)
         if len(time) < 2 or time[-1] <= time[0]:
             raise LogError.at(data.path, clock.column, len(time), "expected at least two rows at different times")
@@ -281,20 +284,20 @@ class ColumnLog:
         """Name of the main clock: "main", or else the name of the first clock."""
         return MAIN_CLOCK if MAIN_CLOCK in self.table.clocks else next(iter(self.table.clocks))
 
-    def _times(self, name: str) -> Floats:
+    def _aligned_times(self, name: str) -> Floats:
         """Return the times of a clock, converted to the main clock, s."""
         self._check_overlap(name)
-        return self._own_times(name) + self._clock_shift(name)
+        return self._unaligned_times(name) + self._clock_shift(name)
 
     def _check_overlap(self, name: str) -> None:
         """Raise LogError for a clock that is not aligned and has no time in common with the main clock."""
-        time, main = self._own_times(name), self._own_times(self._main_clock)
+        time, main = self._unaligned_times(name), self._unaligned_times(self._main_clock)
         if self.table.clocks[name].align is None and (time[0] > main[-1] or time[-1] < main[0]):
             spans = f"{time[0]:.6g} to {time[-1]:.6g} s, {self._main_clock} from {main[0]:.6g} to {main[-1]:.6g} s"
-            allowed = f"runs from {spans}, without overlap: expected the same clock, `offset_s` or `align`"
+            allowed = f"runs from {spans}, without overlap: use one clock, or set `offset_s` or `align`"
             raise self._error(f"clocks.{name}", self.table.clocks[name].column or "rows", allowed)
 
-    def _own_times(self, name: str) -> Floats:
+    def _unaligned_times(self, name: str) -> Floats:
         """Return the times of a clock before its alignment, s.
 
         Dates become seconds since the start of the main clock.
@@ -303,9 +306,10 @@ class ColumnLog:
         return time - self.start if time[0] > _UTC_AFTER_S else time
 
     def _clock_shift(self, name: str) -> float:
-        """Return the shift that aligns a clock's column with its partner, s; 0 for a clock without `align`.
+        """Return the time to add to a clock to align it with the main clock, s; 0 without `align`.
 
-        Raises LogError if the correlation is too small at every shift.
+        The shift is the one with the best correlation between the two signals in `align`.  Raises LogError if the
+        correlation is too small at every shift.
         """
         align = self.table.clocks[name].align
         if align is None:
@@ -318,7 +322,7 @@ class ColumnLog:
             )
             partner = self._alignment_partner(align.partner, field)
             is_known = np.isfinite(values)
-            time = self._own_times(name)[is_known]
+            time = self._unaligned_times(name)[is_known]
             best = find_clock_shift(time, values[is_known], *partner, align.within_s)
             if best.correlation < _MIN_CORRELATION:
                 message = f"{align.column} and {align.partner} have a correlation of at most {best.correlation:.2f}"
@@ -339,14 +343,14 @@ class ColumnLog:
         else:
             clock = self._clock(self._main_clock)
             column = self._column_on_clock(clock, name, f"{field}.with", self._main_clock)
-            series = Series(self._times(self._main_clock), _numbers(column, self._location(clock.data, name)))
+            series = Series(self._aligned_times(self._main_clock), _numbers(column, self._location(clock.data, name)))
         known = np.isfinite(series.values)
         return series.time[known], series.values[known]
 
     # ------------------------------------------------------------------
     # Columns.
 
-    def _clock_columns(self, clock: str) -> list[str]:
+    def _columns_of_clock(self, clock: str) -> list[str]:
         """Return the names of the columns that use a clock."""
         return [
             entry.column
@@ -382,12 +386,12 @@ class ColumnLog:
         """
         values = self._column_by_name(clock.data, name, field)
         if len(values) != len(clock.time):
-            allowed = f"{len(values)} rows, and the clock {clock_name} has {len(clock.time)}: expected as many"
+            allowed = f"{len(values)} rows, but the clock {clock_name} has {len(clock.time)}: expected equal numbers"
             raise self._error(field, name, allowed)
         return values
 
     def _location(self, data: DataFile, name: str) -> str:
-        """Return file and column as the start of a message."""
+        """Return the path of a data file and the name of a column, as the start of a message."""
         return f"{data.path}: {name}"
 
     def _entry_series(self, quantity: str, entry: ColumnTable) -> Series:
@@ -396,7 +400,7 @@ class ColumnLog:
         Only the time span that the table names is read.  Rows that do not meet the entry's condition are NaN.
         """
         if entry.value is not None:
-            time = self._times(self._main_clock)
+            time = self._aligned_times(self._main_clock)
             return Series(time, np.full(len(time), self._convert(quantity, entry, np.array([entry.value]))[0]))
         field = f"columns.{quantity}"
         clock = self._clock(entry.clock)
@@ -407,14 +411,14 @@ class ColumnLog:
             partner = self._column_on_clock(clock, entry.when.column, f"{field}.when.column", entry.clock)
             values = np.where(_mask_equal(partner, entry.when.value), values, np.nan)
         self._check_plausible(quantity, entry, values)
-        time = self._times(entry.clock)
+        time = self._aligned_times(entry.clock)
         if entry.rate is not None:
             time, values = self._changed_rows(quantity, entry, time, values)
         if self.table.span_s is not None:
             start, end = self.table.span_s
             is_in_span = (time >= start) & (time <= end)
             if not is_in_span.any():
-                allowed = f"no rows of {quantity}, which has {time[0]:.6g} to {time[-1]:.6g} s"
+                allowed = f"{quantity} has no rows in this span, only from {time[0]:.6g} to {time[-1]:.6g} s"
                 raise self._error("span_s", f"{start:g} to {end:g} s", allowed)
             time, values = time[is_in_span], values[is_in_span]
         return Series(time, values)
@@ -443,7 +447,7 @@ class ColumnLog:
         factor = UNITS[limits.dimension][entry.unit]
         largest = float(known[np.argmax(np.abs(known))])
         zero = UNIT_ZEROS.get(entry.unit, 0.0)
-        unit = likelier_unit(quantity, entry.unit, float(np.quantile(np.abs(known - zero), 0.98)) / factor)
+        unit = find_likelier_unit(quantity, entry.unit, float(np.quantile(np.abs(known - zero), 0.98)) / factor)
         hint = f"; is it in {unit}?" if unit else ""
         shown = f"{(largest - zero) / factor:.4g} {entry.unit}".rstrip()
         bounds = " to ".join(f"{(limit - zero) / factor:.4g}" for limit in (limits.low, limits.high))
@@ -456,13 +460,13 @@ class ColumnLog:
         They are the measurements of a column that is written more often than it is measured.  Raises LogError if the
         value changes more often than the stated rate.
         """
-        changes: Flags = np.concatenate([[True], np.diff(values) != 0.0]) & np.isfinite(values)
-        rate = changes.sum() / max(1e-9, float(np.ptp(time)))
+        is_changed: Flags = np.concatenate([[True], np.diff(values) != 0.0]) & np.isfinite(values)
+        rate = is_changed.sum() / max(1e-9, float(np.ptp(time)))
         stated_rate = entry.rate or 0.0
         if rate > _MAX_RATE_RATIO * stated_rate:
-            allowed = f"it changes {rate:.3g} times a second"
+            allowed = f"the value changes {rate:.3g} times a second"
             raise self._error(f"columns.{quantity}.rate", f"{stated_rate:g} Hz", allowed)
-        return time[changes], values[changes]
+        return time[is_changed], values[is_changed]
 
 
 def _mask_equal(values: Column, wanted: float | str) -> Flags:

@@ -194,9 +194,10 @@ def _logged_wind(log: ColumnLog) -> Samples:
 
 
 def _airspeed_ratio_at(ratio: Samples, height: Samples, time: Floats) -> Floats:
-    """Return the ratio of true to indicated airspeed at the given times, (n,).
+    """Return the ratio of true to indicated airspeed at each time, (n,).
 
-    Without rows in `ratio`, the ratio of the standard atmosphere at the altitude is returned.
+    ratio: logged ratio, (k, 1); if it has no rows, the ratio of the standard atmosphere at the altitude is returned.
+    height: altitude, m AMSL, (m, 1); 0 if it has no rows.
     """
     if len(ratio.time):
         return np.asarray(np.interp(time, ratio.time, ratio.values[:, 0]))
@@ -205,11 +206,11 @@ def _airspeed_ratio_at(ratio: Samples, height: Samples, time: Floats) -> Floats:
 
 
 def _controls(log: ColumnLog) -> tuple[Samples, tuple[bool, bool, bool], bool]:
-    """Return the controls, flags for the controls that are angles, and True if the aircraft has elevons.
+    """Return the controls, three flags for controls that are angles, and True if the aircraft has elevons.
 
-    The controls and the flags of the three surfaces are those of `MotionLog.controls` and `MotionLog.angles`.  Left and
-    right halves become one surface: the elevator is their mean, the aileron half their difference.  There are no rows
-    if elevator, aileron or throttle is missing; a missing rudder is 0.
+    The controls and the flags are defined at `MotionLog.controls` and `MotionLog.angles`.  Left and right halves become
+    one surface: the elevator is their mean, the aileron half their difference.  There are no rows if elevator, aileron
+    or throttle is missing.  A missing rudder is 0.
     """
     has_elevons = log.has("elevon_left", "elevon_right")
     elevator = _surface_deflections(
@@ -223,8 +224,10 @@ def _controls(log: ColumnLog) -> tuple[Samples, tuple[bool, bool, bool], bool]:
         return NO_SAMPLES, (False, False, False), has_elevons
     (elevator_series, elevator_unit), (aileron_series, aileron_unit) = elevator, aileron
     rudder_series, rudder_unit = rudder or (Series(elevator_series.time, 0.0 * elevator_series.values), "rad")
-    negated = Series(elevator_series.time, -elevator_series.values), Series(rudder_series.time, -rudder_series.values)
-    samples = join_series([negated[0], aileron_series, negated[1], log.series("throttle")])
+    # The elevator is positive with its trailing edge down, the rudder with its trailing edge to the left.
+    pitch_up = Series(elevator_series.time, -elevator_series.values)
+    yaw_right = Series(rudder_series.time, -rudder_series.values)
+    samples = join_series([pitch_up, aileron_series, yaw_right, log.series("throttle")])
     angles = tuple(unit not in FRACTION_UNITS for unit in (elevator_unit, aileron_unit, rudder_unit))
     return samples, (angles[0], angles[1], angles[2]), has_elevons
 

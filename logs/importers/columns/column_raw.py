@@ -16,6 +16,7 @@ from world.arrays import Floats
 from world.errors import LogError
 
 FORMAT = "table of columns"
+_POSITIONS_NEEDED = "expected a column, because a flight is judged by its positions"
 _DATUMS: dict[str, VerticalDatum] = {"amsl": "amsl", "ellipsoid": "ellipsoid", "start": "unstated"}
 
 
@@ -29,7 +30,7 @@ def read_columns(path: Path) -> RawLog:
     log = ColumnLog(path)
     for quantity in ("latitude", "longitude"):
         if not log.has(quantity):
-            raise LogError.at(log.table_path, f"columns.{quantity}", "missing", "a flight is judged by its positions")
+            raise LogError.at(log.table_path, f"columns.{quantity}", "missing", _POSITIONS_NEEDED)
     check_signs_and_units(log)
     position = _position(log)
     return RawLog(
@@ -109,7 +110,7 @@ def _modes(log: ColumnLog) -> Iterator[ModeChange]:
     """Yield each change of the quantity `mode`, with the mode's name from the table's [modes]."""
     if not log.has("mode"):
         return
-    time, values = log.raw("mode")
+    time, values = log.raw_values("mode")
     names, automatic = log.table.modes.names, log.table.modes.automatic
     previous = None
     for start, value in zip(time.tolist(), values.tolist(), strict=True):

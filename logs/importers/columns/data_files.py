@@ -93,7 +93,7 @@ def _read_csv(path: Path) -> DataFile:
     if rows and not any(_NUMBER.fullmatch(cell) for cell in rows[0][1].split(separator) if cell.strip()):
         cells = [cell.strip().strip('"[]()') for cell in rows.pop(0)[1].split(separator)]
         units = dict(zip(names, cells, strict=False))
-    _check_widths(path, rows, separator, len(names))
+    _check_cell_counts(path, rows, separator, len(names))
     decimal = "," if separator == ";" and any("," in line for _, line in rows[:10]) else "."
     from io import StringIO
 
@@ -116,8 +116,8 @@ def _is_remark(line: str, next_lines: list[str]) -> bool:
     return widths[0] == 0 or widths[0] != widths[-1] or not next_lines
 
 
-def _check_widths(path: Path, rows: list[tuple[int, str]], separator: str, width: int) -> None:
-    """Raise LogError if a row has another number of cells than the header.
+def _check_cell_counts(path: Path, rows: list[tuple[int, str]], separator: str, width: int) -> None:
+    """Raise LogError if a row of a CSV file has another number of cells than the header.
 
     rows: number and text of each line.
     width: number of cells in the header.
@@ -162,9 +162,7 @@ def _read_mat(path: Path) -> DataFile:
 
 
 def _mat_columns(name: str, value: Any, labels: Any = None) -> Iterator[tuple[str, Column]]:
-    """Yield the names and values of a variable's columns.
-
-    They are the fields of a struct, or the columns of a matrix.
+    """Yield name and values of the columns of a MATLAB variable: a struct's fields or a matrix's columns.
 
     labels: names of a matrix's columns, if known.
     """
@@ -182,9 +180,10 @@ def _mat_columns(name: str, value: Any, labels: Any = None) -> Iterator[tuple[st
 
 
 def _array_columns(name: str, array: Column, titles: list[str] | None = None) -> Iterator[tuple[str, Column]]:
-    """Yield an array of one dimension, or each column of a matrix, with their names; ignore other arrays.
+    """Yield name and values of each column of an array; ignore arrays of more than two dimensions.
 
-    The longer axis of a matrix is taken as its rows, unless the number of titles shows which axis has the columns.
+    An array of one dimension is one column.  The longer axis of a matrix is taken as its rows, unless the number of
+    titles shows which axis has the columns.
     """
     if array.ndim < 2:
         values = np.atleast_1d(array)

@@ -50,13 +50,13 @@ def test_of_a_zipped_file_the_first_kml_is_read(tmp_path: Path) -> None:
 
 
 def test_a_zipped_file_that_is_none_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(LogError, match=r"a zipped file without a \.kml in it"):
+    with pytest.raises(LogError, match=r"the zipped file contains no \.kml"):
         track_text(zipped(tmp_path / "a.kmz", image_png="x"), xml=True)
     path = zipped(tmp_path / "b.kmz", doc_kml="<kml>" + "0123456789" * 100 + "</kml>")
     data = bytearray(path.read_bytes())
     data[50] ^= 0xFF
     path.write_bytes(bytes(data))
-    with pytest.raises(LogError, match="an unreadable zipped file"):
+    with pytest.raises(LogError, match="the zipped file cannot be unpacked"):
         track_text(path, xml=True)
 
 
@@ -78,7 +78,7 @@ def test_a_zipped_file_is_refused_in_one_line_whatever_packed_it(
     path.write_bytes(data[:begins] + bytes(size) + data[begins + size :])
     assert main(["check", str(path)]) == 2
     told = capsys.readouterr().err
-    assert told.startswith(f"planfly: {path}: an unreadable zipped file: ")
+    assert told.startswith(f"planfly: {path}: the zipped file cannot be unpacked: ")
     assert told.count("\n") == 1
 
 
@@ -303,6 +303,6 @@ def test_as_many_times_as_places_are_expected(tmp_path: Path) -> None:
     path = kml(tmp_path / "a.kml")
     path.write_text(re.sub("<when>[^<]*10:00:10Z</when>", "", path.read_text()))
     with pytest.raises(
-        LogError, match=r"a track of \d+ times \(when\) and \d+ positions \(gx:coord\): expected equal numbers"
+        LogError, match=r"a track has \d+ times \(when\) and \d+ positions \(gx:coord\): expected equal numbers"
     ):
         read_kml(path)
