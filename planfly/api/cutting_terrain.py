@@ -111,7 +111,9 @@ def _mission_box(file: Path) -> Box:
     lons = [first_lon + (lon - first_lon + 180.0) % 360.0 - 180.0 for _, lon in positions]
     if max(abs(lat) for lat in lats) > _MAX_LATITUDE_DEG or max(lons) - min(lons) > 30.0:
         raise PlanflyError(
-            f"{file}: its positions are too far apart, or beyond {_MAX_LATITUDE_DEG:g} degrees of latitude", file=file
+            f"{file}: the positions are more than 30 degrees of longitude apart, or beyond"
+            f" {_MAX_LATITUDE_DEG:g} degrees of latitude",
+            file=file,
         )
     return Box(min(lats), min(lons), max(lats), max(lons))
 

@@ -108,7 +108,7 @@ class _SourceContent:
     aircraft: str = ""
 
     def of_plan(self) -> "_SourceContent":
-        """Return the content of a plan in memory, whose messages do not name its temporary file."""
+        """Return the content with "the plan" as its source in messages, instead of the plan's temporary file."""
         return replace(self, mission=replace(self.mission, source="the plan"))
 
 
@@ -132,9 +132,10 @@ def export(
     fence: files of fences or zones in addition to those of the source.
     at: time of the flight, see `planfly.plan`; the files omit zones that are inactive at that time.
     scenario: scenario of a mission or plan, as for `planfly.fly`.
-    aircraft: a name, or a folder: the aircraft whose cruise speed a .plan states, and to which the parameters apply.
-    autopilot, params: the autopilot, or a parameter file of it, that a .plan is for (its firmwareType), and with whose
-    values a mission or plan is judged for a .parm; None for the autopilot of the source.
+    aircraft: name or folder of the aircraft, whose cruise speed a .plan states, and to which the parameters apply.
+    autopilot: the autopilot for which a .plan is written (its firmwareType), and whose parameters a .parm contains;
+    None for the autopilot of the source.
+    params: a file of this autopilot's parameters, which replaces the parameters of the source.
     overwrite: True replaces existing files.
     Raises a `planfly.PlanflyError` for bad input; then nothing is written.
 
@@ -161,7 +162,7 @@ def export(
         source_content = read_content.of_plan() if isinstance(source, Plan) else read_content
         if any(target.suffix.lower() == ".plan" for target in targets):
             source_content = _with_plan_notes(source_content, chosen_autopilot, fence)
-        contents = [_target_content(source_content, target) for target in targets]
+        contents = [_make_target_content(source_content, target) for target in targets]
     for target, (data, _) in zip(targets, contents, strict=True):
         write_atomically(target, data)
     loss = "" if source_content.log is None else loss_text(source_content.log)
@@ -188,14 +189,14 @@ def _chosen_autopilot(autopilot: str | None, params: str | Path | None) -> str:
         return ""
     origin = read_origin(Path(params))
     if not origin.autopilot:
-        allowed = "--autopilot names the autopilot"
+        allowed = "name the autopilot with --autopilot"
         message = f"{params}: {origin.evidence or 'not clearly the file of one autopilot'}: {allowed}"
         raise ParameterError(message, file=params, field="autopilot", value=origin.evidence, allowed=allowed)
     return origin.autopilot
 
 
 def _with_plan_notes(source: _SourceContent, autopilot: str, fence: FencePaths) -> _SourceContent:
-    """Return a source with the autopilot of a .plan, and with notes on what the .plan cannot store.
+    """Add to a source the autopilot for a .plan, and notes on content that the .plan will not have.
 
     The .plan has the autopilot that the user named, or else the source's autopilot, or else `DEFAULT_AUTOPILOT`.
 
@@ -211,7 +212,7 @@ def _with_plan_notes(source: _SourceContent, autopilot: str, fence: FencePaths) 
         )
     fence_files = [fence] if isinstance(fence, str | Path) else fence
     notes += [
-        f"{file}: its rally points ({len(rally)}) are not taken: --fence reads only the fence"
+        f"{file}: {count_text(len(rally), 'rally point')} not exported: --fence reads only the fence"
         for file in fence_files
         if not source.mission.rally
         and Path(file).suffix.lower() == ".plan"
@@ -289,10 +290,9 @@ def _needs_kml(targets: tuple[Path, ...]) -> bool:
 
 
 def _with_returns(source: _SourceContent, setup: FlightSetup, track: Track | None) -> _SourceContent:
-    """Return a source with the returns and glides from a few points, for a map.
+    """Add returns and glides from a few points of the flight to a source, for a map.
 
-    The points are on the flight, or on the planned path if `track` is None.  The source is unchanged if they cannot be
-    judged.
+    If `track` is None, they start on the planned path.  The source is unchanged if returns cannot be judged.
     """
     with stage("flying returns for the map"):
         drawn_returns = return_summary(setup, track).data_for_pictures()
@@ -358,13 +358,13 @@ def _read_mission(path: Path, options: MissionOptions, *, needs_world: bool, nee
 
 
 def _with_zones(source: _SourceContent, scenario: Scenario) -> _SourceContent:
-    """Return a source with the zones of its scenario added to the fences of its mission."""
+    """Add a scenario's zones to the fences of a source's mission, and note zones that a fence lacks."""
     fence_items, notes = zone_fences(scenario.zones, scenario.origin)
     mission = replace(source.mission, fences=number_items([*source.mission.fences, *fence_items]))
     return replace(source, mission=mission, fence_notes=tuple(notes))
 
 
-def _target_content(source: _SourceContent, target: Path) -> tuple[str | bytes, str]:
+def _make_target_content(source: _SourceContent, target: Path) -> tuple[str | bytes, str]:
     """Return the content of a target file, and a description of the content, such as "23 items"."""
     suffix, mission = target.suffix.lower(), source.mission
     if suffix in LOG_SUFFIXES and source.log is not None:
@@ -396,13 +396,13 @@ def _target_content(source: _SourceContent, target: Path) -> tuple[str | bytes, 
 
 
 def _cruise_speed(source: _SourceContent) -> tuple[float, str]:
-    """Return the cruiseSpeed of a .plan, m/s, and its source.
+    """Return the cruiseSpeed of a .plan, m/s, and a text on where it comes from.
 
     It is the mission's cruise speed, or else the airspeed at which planfly flies the mission.  Without a scenario or a
     plan, this is the cruise airspeed of the default aircraft.
     """
     if (mission_speed := stated_cruise_speed(source.mission)) is not None:
-        return mission_speed, "the mission's"
+        return mission_speed, "from the mission"
     if source.airspeed is not None:
         return source.airspeed, f"from {source.aircraft}"
     aircraft = load_aircraft(FlightTable().aircraft)
@@ -428,12 +428,12 @@ def judging_parameters_text(
     omitted = ""
     if values.get("RTL_AUTOLAND") == 0.0 and any(item.command == Command.DO_LAND_START for item in mission.items):
         del values["RTL_AUTOLAND"]
-        omitted = ", without RTL_AUTOLAND 0, because it does not arm with that value"
+        omitted = ", without RTL_AUTOLAND 0, because the autopilot does not arm with that value"
     title = f"{autopilot.title}: take-off, landing and returns "
     title += (
         "with which planfly judges the mission"
         if has_own_parameters
-        else "by planfly's defaults for this mission; a parameter file of your own wins (export ... --params FILE)"
+        else "by planfly's defaults for this mission; name your own parameter file with export ... --params FILE"
     )
     return parameters_text(values, title), f"{count_text(len(values), 'parameter')} of {autopilot.title}{omitted}"
 

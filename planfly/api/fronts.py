@@ -51,7 +51,7 @@ def plan_front(
     stop: Callable[[], bool] | None = None,
     **options: Unpack[FlightOptions],
 ) -> Front:
-    """Plan a Pareto front: a set of plans of which none is better than another in every criterion.
+    """Plan a Pareto front: safe plans, none of which is better than another in every criterion.
 
     The criteria are length, exposure to radars, minimum height above ground, and energy.  Time replaces energy if the
     scenario's ``[planner] objective`` is "time" or the power of the aircraft is unknown.  Each plan has its own

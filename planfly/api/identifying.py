@@ -106,7 +106,9 @@ def identify_aircraft(
     until: float | None = None,
     overwrite: bool = False,
 ) -> IdentifiedAircraft:
-    """Make the folder of an aircraft from flight logs of ArduPlane or PX4, with a list of uncertain properties.
+    """Make the folder of an aircraft from flight logs of ArduPlane or PX4.
+
+    The folder contains a list of uncertain properties.
 
     logs: `.BIN` or `.ulg` of one aircraft with one mass, with inertial sensors and servo outputs.
     folder: the folder to make.  overwrite: True replaces the folder of an aircraft.
@@ -134,8 +136,8 @@ def identify_aircraft(
         motion_logs = [read_motion(path) for path in paths]
         check_motion = None if check is None else read_motion(Path(check))
         _check_distinct([*motion_logs, *([] if check_motion is None else [check_motion])])
-        log_parts = [(log, *records_and_outputs(log, prior, until=until)) for log in motion_logs]
-        checked = [] if check_motion is None else records_and_outputs(check_motion, prior, MIN_CHECK_SECONDS)[0]
+        log_parts = [(log, *read_records_and_outputs(log, prior, until=until)) for log in motion_logs]
+        checked = [] if check_motion is None else read_records_and_outputs(check_motion, prior, MIN_CHECK_SECONDS)[0]
     records = [record for _, stretches, _ in log_parts for record in stretches]
     check_battery(records, volts)
     check_commands(records)
@@ -158,7 +160,7 @@ def identify_aircraft(
 def _make_result(
     aircraft: Aircraft, identified: Identified, predicted: PredictedLog, records: Sequence[FlightRecord]
 ) -> IdentifiedAircraft:
-    """Return the result of an identification, with the performance and the gaps in the logs."""
+    """Return the result of an identification, with the performance and the deficiencies of the logs."""
     climb, sink, power = _performance_intervals(identified)
     return IdentifiedAircraft(
         aircraft=aircraft,
@@ -167,8 +169,8 @@ def _make_result(
         sink=sink,
         power=power,
         predicted=predicted,
-        without_current=without_current(records),
-        slow=slow_logs(identified.logs),
+        without_current=find_logs_without_current(records),
+        slow=find_slow_logs(identified.logs),
         wide=_find_wide_numbers(identified),
         conflict=identified.power_conflict(),
     )
@@ -177,7 +179,8 @@ def _make_result(
 def _find_battery(prior: Aircraft, battery: str | None) -> tuple[float, float]:
     """Return voltage (V) and energy (J) of the battery.
 
-    battery: volts and capacity, such as "44.4V,888Wh"; None takes the battery of the base.
+    prior: base aircraft, whose battery is used if `battery` is None.
+    battery: volts and capacity, such as "44.4V,888Wh".
     """
     if battery is None:
         return prior.battery_voltage, prior.battery_energy
@@ -232,11 +235,13 @@ def _check_distinct(logs: Sequence[MotionLog]) -> None:
             if log.sha256 == earlier_log.sha256 and overlap > 0.0:
                 allowed = "name each log only once, and use another log to check the result"
                 raise LogError(
-                    f"{log.source}: the same bytes as {earlier_log.source}: {allowed}", file=log.source, allowed=allowed
+                    f"{log.source}: has the same bytes as {earlier_log.source}: {allowed}",
+                    file=log.source,
+                    allowed=allowed,
                 )
 
 
-def records_and_outputs(
+def read_records_and_outputs(
     log: MotionLog, prior: Aircraft, min_seconds: float = MIN_SECONDS, until: float | None = None
 ) -> tuple[list[FlightRecord], dict[str, ServoOutput]]:
     """Return the flight records of a log, and the servo outputs with which they were read.
@@ -256,7 +261,7 @@ def records_and_outputs(
     if LEFT in outputs:
         return flight_records(log, prior, outputs, min_seconds, end), dict(base_outputs)
     is_same = base_outputs.keys() == outputs.keys() and all(
-        _agree(base_outputs[name], output) for name, output in outputs.items()
+        _is_same_output(base_outputs[name], output) for name, output in outputs.items()
     )
     used_outputs = dict(base_outputs) if is_same else outputs
     return flight_records(log, prior, used_outputs if is_same else None, min_seconds, end), used_outputs
@@ -272,7 +277,7 @@ def _unmixed_outputs(log: MotionLog, prior: Aircraft) -> dict[str, int]:
     return {name: output.output for name, output in log_outputs(log, prior).items()}
 
 
-def _agree(first: ServoOutput, second: ServoOutput) -> bool:
+def _is_same_output(first: ServoOutput, second: ServoOutput) -> bool:
     """Return True if two servo outputs have the same number, pulse range and direction."""
     (first_low, *_, first_high), (second_low, *_, second_high) = first.value, second.value
     has_same_range = (first.pulse[0], first.pulse[-1]) == (second.pulse[0], second.pulse[-1])
@@ -308,7 +313,7 @@ def _report_page(identified: Identified, predicted: PredictedLog, check: str | P
 
 
 def _find_wide_numbers(identified: Identified) -> tuple[WideQuantity, ...]:
-    """Return sink rate and power, each if the logs determine it only within a wide interval."""
+    """Return those of the sink angle and the power that the logs determine only within a wide interval."""
     _, sink, power = _performance_intervals(identified)
     return wide_quantities(sink, power, with_current=identified.estimate.with_current)
 
@@ -325,7 +330,7 @@ def _performance_intervals(identified: Identified) -> tuple[Interval, Interval, 
     best, samples = identified.performance()
 
     def interval(value: Floats, sample_values: Floats, factor: float = 1.0) -> Interval:
-        """Return the 2.5 % quantile of the samples, the estimate and the 97.5 % quantile, times a factor."""
+        """Return the samples' 2.5 % quantile, the estimate and the 97.5 % quantile, times a factor."""
         lower, upper = np.percentile(sample_values, [2.5, 97.5])
         return factor * float(lower), factor * float(value[0]), factor * float(upper)
 
@@ -340,7 +345,7 @@ def _performance_intervals(identified: Identified) -> tuple[Interval, Interval, 
     )
 
 
-def without_current(records: Sequence[FlightRecord]) -> tuple[str, ...]:
+def find_logs_without_current(records: Sequence[FlightRecord]) -> tuple[str, ...]:
     """Return the names of the logs without battery current, if other logs have it.
 
     The result is empty if no log has battery current.
@@ -349,7 +354,7 @@ def without_current(records: Sequence[FlightRecord]) -> tuple[str, ...]:
     return tuple(lacking) if any(record.has_current for record in records) else ()
 
 
-def slow_logs(logs: Sequence[MotionLog]) -> tuple[SlowLog, ...]:
+def find_slow_logs(logs: Sequence[MotionLog]) -> tuple[SlowLog, ...]:
     """Return the logs whose sensors or servo outputs have fewer than `AMPLE_HZ` rows per second."""
     rates = [(log, slowest_log_rate(log)) for log in logs]
     return tuple(SlowLog(log.source, rate, recording_setting(log)) for log, rate in rates if rate < AMPLE_HZ)

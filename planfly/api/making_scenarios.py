@@ -29,21 +29,21 @@ def make_scenario(
     threats: GivenThreats | None = None,
     **tables: Any,
 ) -> Scenario:
-    """Return a scenario with other threats and other values.
+    """Make a scenario from another scenario, with other threats and other values.
 
-    It is a scenario for `planfly.plan`, for `scenario` of `planfly.fly` and other functions, and a target of
-    `planfly.campaign`; its method ``to_toml`` writes it to a file.
+    The result is a scenario for `planfly.plan`, `planfly.fly` and `planfly.campaign`.  Its method ``to_toml`` writes it
+    to a file.
 
     base: a built-in scenario's name, a TOML file's path, or a `Scenario`.
-    threats: threats that replace the base's threats; None keeps these.  A pandas data frame or a mapping of columns,
-    named as the keys of [[threats]]; a list of mappings with these keys; or an array (n, 4) of east, north, kill radius
-    and detection radius, m.  A radius that is 0 or None means no such zone; a scale that is None is a quarter of the
-    kill radius and a third of the detection radius.  NaN is refused.
-    tables: values of other tables, as mappings with the keys of a scenario file, whose lists may be arrays, and its
-    name and description; other keys of a table stay, except for a position, and a table of another kind or file, which
-    are replaced as a whole.
-    Another elevation file replaces the base's origin, too, unless an origin is given: the middle of its
-    latitudes and longitudes becomes the origin.
+    threats: threats that replace the base's threats; None keeps the base's threats.  They are a pandas data frame or a
+    mapping of columns, named as the keys of [[threats]]; a list of mappings with these keys; or an array (n, 4) of
+    east, north, kill radius and detection radius, m.  A radius that is 0 or None means no such zone.  A scale that is
+    None is a quarter of the kill radius, or a third of the detection radius.  NaN is refused.
+    tables: values of other tables, as mappings with the keys of a scenario file, whose lists may be arrays; also name
+    and description.  Keys of a table that are not named keep their values.  A position, and a table of another kind or
+    file, are replaced as a whole.
+    With another elevation file, the center of its latitudes and longitudes becomes the origin, unless an origin is
+    named.
     Raises a `planfly.PlanflyError` for values that a scenario file must not have.
 
     >>> import planfly
@@ -75,7 +75,7 @@ def make_scenario(
 
 
 def _check_terrain(table: Any) -> None:
-    """Raise ArgumentError for an array in place of [terrain] or of its file."""
+    """Raise ArgumentError if [terrain] or its file is an array, and say how to write a file from it."""
     for name, value in (
         ("terrain", table),
         ("terrain.path", table.get("path") if isinstance(table, Mapping) else None),

@@ -163,8 +163,8 @@ class Optimiser:
 
         objective: maps points, (n, d), to values, (n,).
         generations: number of generations.
-        evaluations: total number of evaluations at which to stop, instead of `generations`; of the last generation only
-        the first points are evaluated, so that the number is exact.
+        evaluations: total number of evaluations at which to stop, instead of `generations`.  The last generation is
+        evaluated only in part, so that the number is exact.
 
         Raises ArgumentError for numbers below 1.
         """
@@ -196,7 +196,7 @@ def optimise(
     seed: int | np.random.Generator = 1,
     initial: ArrayLike | None = None,
 ) -> Optimiser:
-    """Return an ask/tell optimiser that uses one of the planner's algorithms, for any function within bounds.
+    """Return an ask/tell optimiser for any function within bounds, with an algorithm of the planner.
 
     lower, upper: bounds of the box, (d,).
     model: "umda", the paper's univariate Gaussians; "emna", one Gaussian with full covariance; "multistart", Gaussians
@@ -208,7 +208,8 @@ def optimise(
     initial: first points in the box, (population, d); None draws uniform points.
     Raises a `planfly.PlanflyError`, which is also a ValueError, for invalid bounds or another invalid argument.
 
-    Minimum of a bowl at (1, 2); and, if a line separates it from the feasible side, a minimum of 0.5 at (0.5, 1.5):
+    Find the minimum of a bowl, at (1, 2).  With a constraint that excludes this point, the minimum is 0.5 at
+    (0.5, 1.5):
 
     >>> import planfly
     >>> search = planfly.optimise([-5, -5], [5, 5], seed=1)
@@ -224,7 +225,8 @@ def optimise(
     >>> search.best.feasible, round(search.best.value, 1)
     (True, 0.5)
 
-    Eight waypoints through a wall with gaps 0.02 wide at 0.2 to each side: length 1.08, or 2.3 around the wall:
+    Find a path of eight waypoints past a wall with gaps of width 0.02, at 0.2 to each side.  Its length is 1.08 through
+    a gap, and 2.3 around the wall:
 
     >>> def length(across):
     ...     wall = abs(across[:, 3] + across[:, 4]) / 2
@@ -250,7 +252,10 @@ def optimise(
 
 
 def _parse_initial(initial: ArrayLike, population: int, lower: Floats, upper: Floats) -> Floats:
-    """Return first points as an array (population, d).  Raises ArgumentError for another shape or outside the box."""
+    """Return the first points as an array (population, d).
+
+    Raises ArgumentError for another shape, and for points outside the box.
+    """
     points, expected_shape = _parse_numbers("initial", initial), (population, lower.size)
     if points.shape != expected_shape or not np.isfinite(points).all():
         allowed = f"expected finite numbers of shape {expected_shape}"

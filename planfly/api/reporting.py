@@ -94,7 +94,7 @@ def report(
     overwrite: bool = False,
     command: str = "planfly.report",
 ) -> WrittenReport:
-    """Write ``report.html``, ``map.png`` and ``profile.png`` into a folder, which is made if it is missing.
+    """Write ``report.html``, ``map.png`` and ``profile.png`` into a folder, made if missing.
 
     source: see `planfly.figures`.
     out: the folder.
@@ -182,7 +182,7 @@ def compare(
 
 
 def _report_content(source: Source) -> _ReportContent:
-    """Return the flight or plan that a report shows, with its setup and verdict.
+    """Return the setup, track and verdict of a flight or plan, for a report.
 
     A plan is judged by its geometry, a log by its rows.
     """

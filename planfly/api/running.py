@@ -80,7 +80,7 @@ class RunResult:
     seed: seed of planner and turbulence.
     folder: the folder of the files; the files of earlier rounds are in its subfolders round-0, round-1, ...
     rounds: one or more rounds; the verdict on the last round is the answer.
-    ended: reason why no further round followed.
+    ended: reason why the last round was the last.
     """
 
     scenario: str
@@ -207,10 +207,11 @@ def run_command_line(scenario: str, seed: int, options: Mapping[str, Any]) -> st
 def _fly_rounds(
     task: _RunTask, refine: int, locks: contextlib.ExitStack, on_round: Callable[[Round], None] | None
 ) -> RunResult:
-    """Plan and fly rounds until one is flyable or none is left.
+    """Plan and fly rounds until a flight is flyable, or the maximum number of rounds is reached.
 
-    After a failure, the limits of the next round are tightened.
+    After a failed flight, the next round is planned within tighter limits.
 
+    refine: maximum number of additional rounds.
     locks: exit stack that holds the lock of the folder from the first plan on.
     """
     scenario, uav, folder = task.scenario, task.uav, task.folder

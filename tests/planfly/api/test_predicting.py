@@ -17,13 +17,13 @@ from world.errors import LogError, PlanflyError
 THOR = Path(__file__).parents[3] / "examples" / "real" / "thor75" / "thor_flight75.columns.toml"
 # Number of flights in a test of everything but the bands.
 _FEW = 3
-_drawn_flights = predicting.drawn_flights
+_drawn_flights = predicting.draw_flight_variations
 
 
 @pytest.fixture
 def few_draws(monkeypatch: pytest.MonkeyPatch) -> None:
     """Fly few draws."""
-    monkeypatch.setattr(predicting, "drawn_flights", lambda aircraft: _drawn_flights(aircraft, _FEW))
+    monkeypatch.setattr(predicting, "draw_flight_variations", lambda aircraft: _drawn_flights(aircraft, _FEW))
 
 
 def _with_posterior(aircraft: Aircraft, folder: Path, log: str) -> Aircraft:
@@ -50,7 +50,7 @@ def test_a_real_flight_by_its_controls(tmp_path: Path) -> None:
 
 def test_draws_differ_in_all_that_is_not_known() -> None:
     """Aircraft, wind, turbulence and the error of logged positions differ, and the winds have the stated deviation."""
-    draws = predicting.drawn_flights(load_aircraft("aerosonde"))
+    draws = predicting.draw_flight_variations(load_aircraft("aerosonde"))
     assert len(draws) == 40
     assert {draw.turbulence for draw in draws} == {"none", "light", "moderate"}
     assert len({draw.variation.drag for draw in draws}) == 40
