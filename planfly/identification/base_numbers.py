@@ -72,7 +72,7 @@ def varied_model(aircraft: Aircraft, variation: Variation) -> BaseModel:
 
 
 class _Probe:
-    """Coefficients of a model's forces and moments at given flow angles, rates and surface deflections."""
+    """JSBSim model of an aircraft, evaluated at chosen flow angles, angular rates and surface deflections."""
 
     def __init__(self, aircraft: Aircraft, variation: Variation | None = None) -> None:
         self._aircraft = aircraft
@@ -136,9 +136,9 @@ class _Probe:
         )
 
     def coefficients(self) -> Coefficients:
-        """Return the aerodynamic coefficients, by central differences at closed throttle.
+        """Return the aerodynamic coefficients from central differences about zero angle of attack.
 
-        The differences are about zero angle of attack.  The propeller may windmill.
+        The throttle is closed, and the propeller may windmill.
         """
         at_zero = self._coefficients_at(0.0)
         # Fit drag over lift on the straight part of the lift curve.
@@ -196,7 +196,7 @@ class _Probe:
         return self._coefficients_at(0.0, rates=rate * np.eye(3)[axis])
 
     def _derivative(self, function: Callable[[float], Floats], step: float) -> Floats:
-        """Return the derivative (6,) of a function at 0 by a central difference."""
+        """Return the derivative (6,) of a function of one number at 0, by a central difference."""
         return np.asarray((function(step) - function(-step)) / (2.0 * step))
 
     def _coefficients_at(
@@ -248,7 +248,7 @@ def _parse_model(aircraft: Aircraft) -> ElementTree.Element | None:
 
 
 def read_motor(aircraft: Aircraft) -> Motor | None:
-    """Return the motor or propeller disc with the constants of a model.
+    """Read the constants of the electric motor or the propeller disc from an aircraft's JSBSim model.
 
     Returns None for a motor model of another form.
     """
@@ -295,6 +295,7 @@ def _read_electric_motor(functions: dict[str, ElementTree.Element], volts: float
         """Return the numbers in the JSBSim function with this name."""
         return _function_values(functions[name])
 
+    # Propeller torque: q2 times speed squared, q1 times speed times airspeed, and q0 times airspeed squared.
     (q2,), (q1,), (q0,) = (numbers(f"motor/q{k}") for k in (2, 1, 0))
     (damping,) = numbers("motor/b")
     speed_constants = numbers("motor/driven-rad_sec")

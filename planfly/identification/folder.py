@@ -200,9 +200,7 @@ def _check_level_flight_at_cruise(identified: Identified, aircraft: Aircraft) ->
 
 
 def _airspeeds(log: MotionLog, base: Aircraft) -> tuple[float, float, float]:
-    """Return cruise, minimum and maximum airspeed from a log's parameters, as true airspeeds at `AMSL`.
-
-    The unit is m/s.
+    """Return cruise, minimum and maximum airspeed (m/s, true at `AMSL`) from a log's parameters.
 
     Airspeeds that the log does not state are those of the base.  ArduPlane's parameters are equivalent airspeeds.
     """
@@ -227,7 +225,7 @@ def _metadata_text(
     battery: voltage, V, and energy, J.
     min_level_speed, max_level_speed: minimum and maximum airspeed of level flight, m/s.
     """
-    base, value = identified.base, flown_parameters(identified.logs[-1]).get
+    base, get_parameter = identified.base, flown_parameters(identified.logs[-1]).get
     _, stated_min, stated_max = _airspeeds(identified.logs[-1], base)
     min_airspeed = max(min(stated_min, identified.cruise), min_level_speed + 0.1)
     cruise = max(identified.cruise, min_airspeed)
@@ -242,7 +240,7 @@ def _metadata_text(
         "airspeed_min_mps": min_airspeed,
         "airspeed_max_mps": max_airspeed,
         "stall_speed_mps": stall,
-        "max_bank_deg": value("ROLL_LIMIT_DEG", math.degrees(base.max_bank)),
+        "max_bank_deg": get_parameter("ROLL_LIMIT_DEG", math.degrees(base.max_bank)),
         "max_pitch_deg": math.degrees(base.max_pitch),
         "max_elevator_deg": math.degrees(base.max_elevator),
         "max_aileron_deg": math.degrees(base.max_aileron),
@@ -254,7 +252,7 @@ def _metadata_text(
         "battery_wh": energy / 3600.0,
     }
     lines = [
-        "# What planner, guidance and verdict need to know of the aircraft; posterior.toml says what was estimated.",
+        "# Data of the aircraft for planner, guidance and verdict; posterior.toml states what was estimated.",
         f'title = "aircraft of {identified.numbers.mass:.3g} kg, identified from flight logs"',
         *(f"{key} = {number:.6g}" for key, number in rows.items()),
     ]
@@ -320,8 +318,8 @@ def posterior_text(identified: Identified) -> str:
     fastest = max_level_speeds(identified.numbers, identified.draws, DENSITY)
     log_fractions = estimate.log_fractions()
     lines = [
-        "# What flight logs say of this aircraft.  Each property is one of the model's: a factor on the base's",
-        "# coefficient, or an offset to it; the model's own value of it is the estimate.",
+        "# Result of the identification of this aircraft from flight logs.  Each quantity is a property of the model:",
+        "# a factor on a coefficient of the base, or an offset to it.  Its value in the model is the estimate.",
         "",
         'source = "flight logs"',
         f"climb_sd_deg = {climb:.3f}    # of the steepest climb at cruise, one standard deviation",
@@ -352,7 +350,7 @@ def posterior_text(identified: Identified) -> str:
     if not estimate.with_current:
         numbers = 1.0, EFFICIENCY_LOG_SD, 1.0, EFFICIENCY_LOG_SD, 0.0
         lines += _quantity_lines(
-            DRIVE_POWER, "factor", numbers, "battery power of the motor, which only the current shows"
+            DRIVE_POWER, "factor", numbers, "battery power of the motor, which only a logged current shows"
         )
         correlation = np.block([[correlation, np.zeros((len(correlation), 1))], [np.zeros(len(correlation)), 1.0]])
     lines += ["", "[correlation]", "# Rows and columns in the order of the quantities.", "matrix = ["]
@@ -376,7 +374,7 @@ def _quantity_lines(name: str, unit: str, numbers: tuple[float, float, float, fl
         f"prior_sd = {prior_sd:g}",
         f"estimate = {value:.6g}",
         f"sd = {sd:.4g}",
-        f"of_log = {log_share:.3f}  # share of the interval that is the logs'",
+        f"of_log = {log_share:.3f}  # fraction of the prior variance that the logs removed",
         f'reason = "{reason}"',
     ]
 

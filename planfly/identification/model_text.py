@@ -220,7 +220,12 @@ _AIR = "<p> motor/airspeed-mps </p>"
 
 
 def _reactions_text(numbers: BaseModel, values: Floats, base_properties: list[ElementTree.Element]) -> str:
-    """Return the text of ``<external_reactions>``: properties, and forces of motor and propeller."""
+    """Return the text of ``<external_reactions>``: properties, and forces of motor and propeller.
+
+    numbers: model values of the base, scaled to the aircraft.
+    values: estimated values of `PARAMETERS`, (n,), which become properties.
+    base_properties: properties of the base's model that are kept.
+    """
     identified_text = "\n".join(
         f'<property value="{values[INDEX[parameter.name]]:.9g}"> {parameter.property_name} </property>'
         for parameter in PARAMETERS
@@ -329,7 +334,7 @@ def _electric_functions(motor: ElectricMotor) -> dict[str, str]:
     """
     q2, q1, q0 = (number(value) for value in motor.torque)
     kv, resistance = motor.back_voltage, motor.resistance
-    # Divide by the factor on motor speed: KV is divided by it, and its square is KQ KV.
+    # The factor on motor speed divides the torques at a given voltage, and its square divides the damping.
     speed = "<p> ident/motor-speed </p>"
     loss_torque = f"<quotient> <v> {number(kv * motor.idle_current)} </v> {speed} </quotient>"
     drive_torque = (
@@ -341,7 +346,7 @@ def _electric_functions(motor: ElectricMotor) -> dict[str, str]:
     )
 
     def positive_root(b: str, c: str) -> str:
-        """Return the XML of the positive root of the quadratic equation with terms `b` and `c`."""
+        """Return the XML of the positive root w of q2 w^2 + b w + (q0 + c) = 0, for XML terms `b` and `c`."""
         discriminant = f"""<difference> <product> {b} {b} </product>
           <product> <v> 4 </v> <p> motor/q2 </p> <sum> <p> motor/q0 </p> {c} </sum> </product> </difference>"""
         return f"""<quotient> <difference> <sqrt> <max> <v> 0 </v> {discriminant} </max> </sqrt> {b} </difference>

@@ -139,23 +139,23 @@ def flight_records(
         source=log.source,
     )
     records = [flight.rows(slice(begin, end)) for begin, end in _find_segments(usable)]
-    _check_duration(log, records, min_seconds, until, cut=bool(_vtol_rows(log, grid, pulses).any()))
+    _check_duration(log, records, min_seconds, until, has_vtol_flight=bool(_vtol_rows(log, grid, pulses).any()))
     return records
 
 
 def _check_duration(
-    log: MotionLog, records: list[FlightRecord], min_seconds: float, until: float, *, cut: bool
+    log: MotionLog, records: list[FlightRecord], min_seconds: float, until: float, *, has_vtol_flight: bool
 ) -> None:
     """Raise LogError if the segments are shorter in total than `min_seconds`.
 
     until: time in the log from which rows are not used, s.
-    cut: True if flight on lifting motors was cut.
+    has_vtol_flight: True if the log contains flight on lifting motors, which was cut.
     """
     seconds = sum(record.seconds for record in records)
     if seconds < min_seconds:
-        vtol_note = "; flight on lifting motors is not used" if cut else ""
+        vtol_note = "; flight on lifting motors is not used" if has_vtol_flight else ""
         until_note = f" before {until:g} s" if math.isfinite(until) else ""
-        message = f"only {seconds:.0f} s{until_note} are usable wing-borne flight{vtol_note}"
+        message = f"only {seconds:.0f} s of usable wing-borne flight{until_note}{vtol_note}"
         allowed = f"at least {min_seconds:g} s are needed"
         if min_seconds == MIN_SECONDS:
             allowed += f" to identify an aircraft, and {MIN_CHECK_SECONDS:g} s to check one"
@@ -167,6 +167,7 @@ def _pulses_to_controls(outputs: Mapping[str, ServoOutput], pulses: Floats) -> F
     """Return the controls (n, 4) at the logged pulses: elevator, aileron, rudder (rad) and throttle.
 
     With elevons, elevator and aileron are half the sum and half the difference of the elevons.
+
     pulses: pulses of the m servo outputs, (n, m) us.
     """
     controls = {name: output.control(pulses[:, output.output - 1]) for name, output in outputs.items()}
@@ -182,6 +183,7 @@ def _fractions_to_controls(fractions: Floats, aircraft: Aircraft, angles: tuple[
 
     The controls are elevator, aileron, rudder (rad) and throttle.  Full travel is the maximum deflection of the base
     aircraft.
+
     fractions: elevator, aileron, rudder and throttle of the log, (n, 4).
     angles: True for each surface whose values are angles, rad.
     """
@@ -236,7 +238,7 @@ _SERIES = {
 def _check_usable(log: MotionLog) -> None:
     """Raise LogError for a log that no identification can use.
 
-    These are logs of other vehicles, without a required series, and with a flap that moves in flight.
+    Unusable are logs of other vehicles, logs without a required series, and logs in which a flap moves in flight.
     """
     if log.vehicle not in ("plane", "unknown"):
         raise LogError(f"{log.source}: flown by a {log.vehicle} ({log.program}): expected a plane", file=log.source)
@@ -277,7 +279,7 @@ def recording_setting(log: MotionLog) -> str:
 
 
 def _recording_hint(log: MotionLog) -> str:
-    """Return a hint for a log without a required series: the setting that records the series."""
+    """Return the setting that records a missing series, as the end of an error message."""
     if log.program_kind == "columns":
         return "expected in [columns] of its table"
     if log.program_kind == "telemetry":
@@ -285,7 +287,7 @@ def _recording_hint(log: MotionLog) -> str:
     if log.program_kind == "px4":
         return f"{recording_setting(log)}, the default set at a high rate, records them (PX4 1.14 or later)"
     mask = log.parameters.get("LOG_BITMASK")
-    return f"{recording_setting(log)} records them{'' if mask is None else f' (it is {mask:.0f})'}"
+    return f"{recording_setting(log)} records them{'' if mask is None else f' (the log has {mask:.0f})'}"
 
 
 def _pulse_range(log: MotionLog, number: int) -> tuple[float, float]:
@@ -296,7 +298,10 @@ def _pulse_range(log: MotionLog, number: int) -> tuple[float, float]:
 
 
 def _servo_functions(log: MotionLog) -> dict[int, int]:
-    """Return SERVOn_FUNCTION by output number, or ArduPlane's defaults if the log has no such parameter."""
+    """Return the function number of each servo output (SERVOn_FUNCTION), by output number.
+
+    A log without these parameters has ArduPlane's defaults.
+    """
     functions = {
         k: int(log.parameters[f"SERVO{k}_FUNCTION"])
         for k in range(1, log.outputs.values.shape[1] + 1)
@@ -368,15 +373,15 @@ def _pulse_travel(log: MotionLog, number: int) -> tuple[float, float, float, flo
 
     The sign is -1 if the output is reversed, otherwise 1.
     """
-    value = log.parameters.get
-    min_pulse = value(f"SERVO{number}_MIN", 1100.0)
-    max_pulse = value(f"SERVO{number}_MAX", 1900.0)
-    trim_pulse = min(max(value(f"SERVO{number}_TRIM", 1500.0), min_pulse + 1.0), max_pulse - 1.0)
-    return min_pulse, trim_pulse, max_pulse, -1.0 if value(f"SERVO{number}_REVERSED", 0.0) > 0.0 else 1.0
+    get_parameter = log.parameters.get
+    min_pulse = get_parameter(f"SERVO{number}_MIN", 1100.0)
+    max_pulse = get_parameter(f"SERVO{number}_MAX", 1900.0)
+    trim_pulse = min(max(get_parameter(f"SERVO{number}_TRIM", 1500.0), min_pulse + 1.0), max_pulse - 1.0)
+    return min_pulse, trim_pulse, max_pulse, -1.0 if get_parameter(f"SERVO{number}_REVERSED", 0.0) > 0.0 else 1.0
 
 
 def _time_grid(log: MotionLog) -> Floats:
-    """Return the times (n,) of the common grid, s: at `GRID_HZ` over the period that all series cover."""
+    """Return times (n,), s, with the rate `GRID_HZ` over the period that all series of a log cover."""
     series = (log.inertial, log.surface_commands, log.attitude, log.velocity, log.height, log.airspeed, log.wind)
     start_time = max(samples.time[0] for samples in series)
     end_time = min(samples.time[-1] for samples in series)
@@ -389,7 +394,7 @@ def _interpolate(samples: Samples, grid: Floats) -> Floats:
 
 
 def _hold_samples(samples: Samples, grid: Floats) -> Floats:
-    """Resample at the times of the grid, holding each sample until the next sample; return (n, columns)."""
+    """Resample at the times of the grid, (n, columns): each sample holds until the next sample."""
     rows = np.clip(np.searchsorted(samples.time, grid, side="right") - 1, 0, len(samples.time) - 1)
     return np.asarray(samples.values[rows])
 
@@ -445,17 +450,19 @@ def _settled_flight_rows(log: MotionLog, grid: Floats, equivalent_airspeed: Floa
 def _blocked_airspeed_rows(airspeed: Floats, air_velocity: Floats, heading: Floats) -> Flags:
     """Return a boolean mask (n,): True where the airspeed sensor is blocked.
 
-    In a window with a blocked sensor the airspeed hardly varies, although the ground velocity minus wind does.
+    In a window with a blocked sensor the airspeed hardly varies, although the ground velocity minus wind along the
+    heading varies.
+
     air_velocity: ground velocity minus wind, to north and east, (n, 2) m/s.
     heading: (n,) rad.
     """
-    along = air_velocity[:, 0] * np.cos(heading) + air_velocity[:, 1] * np.sin(heading)
-    length = round(_COMPARED_WINDOW_S * GRID_HZ)
+    air_speed_ahead = air_velocity[:, 0] * np.cos(heading) + air_velocity[:, 1] * np.sin(heading)
+    window_rows = round(_COMPARED_WINDOW_S * GRID_HZ)
     is_blocked = np.zeros(len(airspeed), np.bool_)
     # Windows overlap by nine tenths.
-    for begin in range(0, len(airspeed) - length + 1, length // 10):
-        rows = slice(begin, begin + length)
-        if airspeed[rows].std() < _BLOCKED_AIRSPEED_SD_MPS and along[rows].std() > _MOVING_AIRSPEED_SD_MPS:
+    for begin in range(0, len(airspeed) - window_rows + 1, window_rows // 10):
+        rows = slice(begin, begin + window_rows)
+        if airspeed[rows].std() < _BLOCKED_AIRSPEED_SD_MPS and air_speed_ahead[rows].std() > _MOVING_AIRSPEED_SD_MPS:
             is_blocked[rows] = True
     return is_blocked
 
@@ -471,7 +478,7 @@ def _cut_blocked_rows(log: MotionLog, usable: Flags, is_blocked: Flags) -> Flags
     seconds = float(usable.sum()) / GRID_HZ
     if blocked_seconds > _MAX_BLOCKED_FRACTION * seconds:
         shown = f"hardly varies for {blocked_seconds:.0f} s of {seconds:.0f} s of flight"
-        allowed = "ground velocity minus wind does: check the sensor"
+        allowed = "the ground velocity minus wind varies: check the sensor"
         raise LogError.at(log.source, "airspeed", blocked_seconds, allowed, shown=shown)
     return usable & ~is_blocked
 

@@ -184,8 +184,8 @@ class ServedFlights:
     def prepare(self, request: JudgeMission) -> tuple[PreparedFlight | None, MissionJudged]:
         """Judge the geometry of a mission, and check that its flight can start.
 
-        Returns the prepared flight and the answer for the vehicle; None and an answer with the reason for a mission
-        that cannot be flown.
+        Returns the prepared flight, and the answer for the vehicle.  For a mission that cannot be flown, the flight is
+        None and the answer states the reason.
         """
         served_scenario = self._served
         try:
@@ -216,6 +216,7 @@ class ServedFlights:
 
         In AUTO the mission is flown from its first item, in RTL the aircraft returns home, and in other modes it
         loiters for `LOITER_DURATION_S`.
+
         position: east, north and altitude AMSL, (3,) m.
         """
         served_scenario = self._served
@@ -288,8 +289,9 @@ class ServedLog:
     def finish(self, end_reason: str, should_abort: Callable[[], bool]) -> FlightJudged:
         """Judge the flight and close the log.
 
-        If the path was abandoned within a second, the log is deleted.  If the process is to end, an abandoned path is
-        not judged; `planfly check` can judge it.
+        If the aircraft left the path within a second, the log is deleted.  If the process must end, a path that was
+        left is not judged; `planfly check` can judge it later.
+
         should_abort: see `planfly.workflow.reference_flights.explain_verdict`.
         """
         track = join_tracks(self._track_blocks)
@@ -363,9 +365,9 @@ def verdict_texts(basis: str, verdict: Verdict) -> tuple[StatusText, ...]:
 
 
 def _finding_texts(findings: Sequence[Finding]) -> list[StatusText]:
-    """Return a text for each of the first findings, then the number of other findings.
+    """Return a text for each of the first `_MAX_TEXTS_PER_VERDICT` findings, then the number of others.
 
-    At most `_MAX_TEXTS_PER_VERDICT` findings are named.  The place is left out if the reason names it.
+    The place of a finding is left out if its reason names it.
     """
     texts = []
     for finding in findings[:_MAX_TEXTS_PER_VERDICT]:

@@ -56,7 +56,11 @@ def serve_vehicle(
 def _make_vehicle(
     link: Link, pool: "_FlightPool", served_scenario: ServedScenario, speed: float, on_message: Callable[[str], None]
 ) -> Vehicle:
-    """Return the vehicle for the stations, still without a mission.  speed: multiple of real time."""
+    """Make the vehicle that ground stations see, still without a mission.
+
+    pool: flight processes, which fly the missions.
+    speed: multiple of real time.
+    """
     uav = served_scenario.uav
     autopilot_settings = uav.autopilot.parameters
     parameters = vehicle_parameters(

@@ -158,7 +158,7 @@ class _Broadcast:
         self._waiting: list[tuple[float, str]] = []
 
     def record_scenes_until(self, messages: Iterator[LogMessage], start_ns: int) -> Iterator[LogMessage]:
-        """Store the newest scene of each topic before `start_ns`, and return the messages from `start_ns` on."""
+        """Store each topic's last scene before `start_ns`, and return the messages from `start_ns` on."""
         for message in messages:
             if message.log_time >= start_ns:
                 return itertools.chain([message], messages)

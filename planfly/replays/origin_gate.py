@@ -96,7 +96,7 @@ class OriginGate:
         self._thread.start()
 
     def close(self) -> None:
-        """Forward pending messages, and close all connections; the server must be stopped before."""
+        """Forward pending messages, and close all connections; stop the server first."""
         if self._thread.is_alive():
             self._loop.call_soon_threadsafe(self._closed.set)
             self._thread.join(2.0 * _CLOSE_TIMEOUT_S)
@@ -146,7 +146,7 @@ class OriginGate:
             await asyncio.gather(_forward_data(reader, server_writer), _forward_data(server_reader, writer))
 
     def _report_refusal(self, reason: str) -> None:
-        """Report a reason for a refusal once; after too many different reasons, report nothing."""
+        """Report each reason for a refusal once, up to `_MAX_REPORTED` different reasons."""
         if reason not in self._reported and len(self._reported) < _MAX_REPORTED:
             self._reported.add(reason)
             self._on_refused(reason)

@@ -122,8 +122,7 @@ def test_a_log_becomes_a_folder_that_flies(
         ),
         (
             ["--identify", "a.BIN", *ARGUMENTS, "--out", "./mine"],
-            "0 s are usable wing-borne flight: at least 180 s are needed to identify an aircraft, and"
-            " 30 s to check one",
+            "0 s of usable wing-borne flight: at least 180 s are needed to identify an aircraft, and 30 s to check one",
         ),
         (["aerosonde", "--check", "a.BIN"], "only with --identify"),
         (["--new", "./mine", "--mass", "2", "--until", "20"], "only with --identify"),
@@ -180,7 +179,7 @@ def test_only_the_rows_before_until_are_used(
     # Rows are 0.02 s apart.
     assert end - 0.05 < last < end
     message = refused(["--identify", "a.BIN", *ARGUMENTS, "--until", "100", "--out", "./mine"], capsys)
-    assert "s before 100 s are usable wing-borne flight: at least 180 s" in message
+    assert "s of usable wing-borne flight before 100 s: at least 180 s" in message
 
 
 @pytest.mark.parametrize("again", [["--identify", "a.BIN", "b.BIN"], ["--identify", "a.BIN", "--check", "b.BIN"]])

@@ -28,7 +28,10 @@ def changed(parameters: Mapping[str, float] = {}, **fields: Any) -> MotionLog:
 @pytest.mark.parametrize(
     ("log", "said"),
     [
-        (lambda: changed(inertial=NONE), "no IMU, the inertial sensors: LOG_BITMASK 65535 records them (it is 65535)"),
+        (
+            lambda: changed(inertial=NONE),
+            "no IMU, the inertial sensors: LOG_BITMASK 65535 records them (the log has 65535)",
+        ),
         (lambda: changed(outputs=NONE), "no RCOU, the servo outputs: LOG_BITMASK 65535"),
         (lambda: changed(attitude=NONE), "no ATT"),
         (lambda: changed(airspeed=NONE), "no ARSP of a sensor in use (U = 1), the airspeed"),
