@@ -61,7 +61,7 @@ def make_two_flights_chart(flights: tuple[NamedFlight, NamedFlight]) -> Chart:
     along = np.linspace(0.0, max(float(distance[-1]) for distance in distances), _POINTS)
 
     def flight_lines(values: list[Floats]) -> tuple[Layer, ...]:
-        """Return a line for each flight: its values of a quantity over the distance flown."""
+        """Make a line for each flight, from its values of one quantity, over the distance flown."""
         return tuple(
             series(shorten(flight.name, 22), role, along / 1e3, np.interp(along, distance, value, right=np.nan))
             for flight, role, distance, value in zip(flights, ROLES, distances, values, strict=True)

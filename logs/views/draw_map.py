@@ -72,8 +72,8 @@ def make_map_axes(east: tuple[float, float], north: tuple[float, float], legend_
     frame_height = max(height, _MIN_HEIGHT)
     figure_height = _TOP + frame_height + _BOTTOM + legend_height
     figure = new_figure(figure_height)
-    base = legend_height + _BOTTOM + 0.5 * (frame_height - height)
-    axes = figure.add_axes((_LEFT / WIDTH, base / figure_height, _MAP_WIDTH / WIDTH, height / figure_height))
+    axes_bottom = legend_height + _BOTTOM + 0.5 * (frame_height - height)
+    axes = figure.add_axes((_LEFT / WIDTH, axes_bottom / figure_height, _MAP_WIDTH / WIDTH, height / figure_height))
     axes.set(xlim=east, ylim=north, aspect="equal", facecolor=theme.colour("unknown"))
     step = nice_step(max(east[1] - east[0], north[1] - north[0]), 14)
     kilometres = FuncFormatter(lambda value, _: f"{value / 1000.0:g}".replace("-", "\N{MINUS SIGN}"))

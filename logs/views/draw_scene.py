@@ -51,17 +51,18 @@ _MAX_NAMES = 30
 class Projection:
     """A parallel projection.
 
-    azimuth: direction from the center to the viewer, rad, from east to north.  middle: center (3,), m.  stretch: factor
-    on heights.
+    azimuth: direction from the center to the viewer, rad, counter-clockwise from east.
+    center: position shown at the center of the picture, m, (3,).
+    stretch: factor by which heights are exaggerated.
     """
 
     azimuth: float
-    middle: Floats
+    center: Floats
     stretch: float
 
     def project(self, points: Floats) -> Floats:
         """Return picture coordinates and depth towards the viewer, m: (..., 3) from points (..., 3)."""
-        east, north, up = np.moveaxis(points - self.middle, -1, 0)
+        east, north, up = np.moveaxis(points - self.center, -1, 0)
         cos_azimuth, sin_azimuth = math.cos(self.azimuth), math.sin(self.azimuth)
         across = -sin_azimuth * east + cos_azimuth * north
         toward = cos_azimuth * east + sin_azimuth * north
@@ -142,7 +143,11 @@ def _compass_name(azimuth: float) -> str:
 def _make_axes(
     setup: FlightSetup, projection: Projection, bounds: Floats, grid: GroundGrid | None
 ) -> tuple[Figure, Any]:
-    """Make a figure and axes, with equal scales, into which route, threats and ground fit."""
+    """Make a figure with axes of equal scales, whose limits contain route, threats and ground.
+
+    bounds: range of the scene, (2, 2), m: rows east and north, columns minimum and maximum.
+    grid: ground of the scene; None without terrain.
+    """
     min_altitude = float(np.nanmin(grid.heights)) if grid is not None else float(setup.route.positions[:, 2].min())
     corners = np.array([[east, north, min_altitude] for east in bounds[0] for north in bounds[1]])
     threats = setup.scenario.threats
@@ -186,7 +191,7 @@ def _draw_ground(axes: Any, projection: Projection, grid: GroundGrid | None, bou
     Without terrain, draw a level plane.  Return the legend's handles.
     """
     if grid is None:
-        level_altitude = float(projection.middle[2])
+        level_altitude = float(projection.center[2])
         corners = np.array(
             [
                 [east, north, level_altitude]
@@ -263,9 +268,9 @@ def _draw_threats(axes: Any, projection: Projection, setup: FlightSetup, failed:
 
 
 def _draw_zones(axes: Any, projection: Projection, setup: FlightSetup) -> list[Any]:
-    """Draw the walls of the zones, from ground or floor to the ceiling, or to above the path.
+    """Draw the walls of the zones, and return their legend handles.
 
-    Return the legend's handles.
+    A wall reaches from the floor of the zone, or the ground, to its ceiling.  Without a ceiling it ends above the path.
     """
     zones, route = setup.scenario.zones, setup.route.positions
     min_altitude, max_altitude = float(route[:, 2].min()), float(route[:, 2].max()) + 50.0

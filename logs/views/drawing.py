@@ -234,14 +234,14 @@ def draw_chart(chart: Chart) -> Figure:
     legend_height = _legend_height(entries, columns)
     rows = 1 if chart.widths else len(panels)
     gap = _GAP if chart.shared else _OWN_AXIS_GAP
-    total = top_margin + _BOTTOM + legend_height + max(1, rows) * chart.print_height + max(0, rows - 1) * gap
+    total_height = top_margin + _BOTTOM + legend_height + max(1, rows) * chart.print_height + max(0, rows - 1) * gap
     with clean_style():
-        figure = new_figure(total)
+        figure = new_figure(total_height)
         for k, panel in enumerate(panels):
             row = 0 if chart.widths else k
-            base = _BOTTOM + legend_height + (rows - 1 - row) * (chart.print_height + gap)
+            panel_bottom = _BOTTOM + legend_height + (rows - 1 - row) * (chart.print_height + gap)
             left, width = _panel_extent(chart, k, right_margin)
-            axes = figure.add_axes((left, base / total, width, chart.print_height / total))
+            axes = figure.add_axes((left, panel_bottom / total_height, width, chart.print_height / total_height))
             _draw_panel(axes, chart, panel, has_leg_numbers=k == 0)
             if chart.legend == "beside" and not has_shared_legend:
                 _add_legend_beside(axes)
@@ -250,18 +250,22 @@ def draw_chart(chart: Chart) -> Figure:
             else:
                 axes.set_xlabel(_axis_label(chart, panel, axes))
         text_style: dict[str, Any] = {"fontsize": 11, "fontweight": "bold", "va": "center"}
-        figure.text(_LEFT / WIDTH, 1 - 0.3 / total, chart.title, **text_style)
+        figure.text(_LEFT / WIDTH, 1 - 0.3 / total_height, chart.title, **text_style)
         if has_shared_legend:
-            _add_legend_above(figure, 1 - 0.45 / total)
+            _add_legend_above(figure, 1 - 0.45 / total_height)
         if entries:
             draw_legend(
-                figure, [legend_handle(entry) for entry in entries], _LEFT, (legend_height - 0.02) / total, columns
+                figure,
+                [legend_handle(entry) for entry in entries],
+                _LEFT,
+                (legend_height - 0.02) / total_height,
+                columns,
             )
     return figure
 
 
 def _panel_extent(chart: Chart, k: int, right_margin: float) -> tuple[float, float]:
-    """Return a panel's left edge and width as fractions of the picture's width."""
+    """Return the left edge and the width of panel number `k` as fractions of the picture's width."""
     total_width = WIDTH - _LEFT - right_margin
     if not chart.widths:
         return _LEFT / WIDTH, total_width / WIDTH
@@ -287,16 +291,16 @@ def _axis_label(chart: Chart, panel: Panel, axes: Any) -> str:
 
 
 def can_share_legend(panels: Sequence[Panel]) -> bool:
-    """Return True if all panels can share a legend.
+    """Return True if all panels can share one legend.
 
-    This is the case if, in all panels, each look has one meaning and each meaning one look, and some looks repeat.
+    In all panels, each look must have the same meaning, and each meaning the same look; some looks must repeat.
 
     >>> none = np.zeros(2)
-    >>> flown, asked = Layer("line", "flown", "flown", none, none), Layer("line", "asked", "commanded", none, none)
-    >>> can_share_legend([Panel("bank", "", (asked, flown)), Panel("speed", "", (asked, flown))])
+    >>> flown, wanted = Layer("line", "flown", "flown", none, none), Layer("line", "command", "commanded", none, none)
+    >>> can_share_legend([Panel("bank", "", (wanted, flown)), Panel("speed", "", (wanted, flown))])
     True
-    >>> own = Layer("line", "own", "flown", none, none)
-    >>> can_share_legend([Panel("bank", "", (flown,)), Panel("height", "", (own,))])
+    >>> height = Layer("line", "height", "flown", none, none)
+    >>> can_share_legend([Panel("bank", "", (flown,)), Panel("height", "", (height,))])
     False
     """
     entries: list[tuple[str, Any]] = [
@@ -312,7 +316,10 @@ def can_share_legend(panels: Sequence[Panel]) -> bool:
 
 
 def _draw_panel(axes: Any, chart: Chart, panel: Panel, *, has_leg_numbers: bool) -> None:
-    """Draw one panel of a chart: range, leg marks, layers, labels and note."""
+    """Draw one panel of a chart: range, leg marks, layers, labels and note.
+
+    has_leg_numbers: True to write the numbers of the legs above the panel.
+    """
     min_x, max_x = chart.shown_axis_range()
     if chart.shared:
         axes.set_xlim(min_x, max(max_x, min_x + 1e-3))

@@ -19,7 +19,7 @@ from logs.views.charts import Chart, chart_json
 from logs.views.envelope import envelope_chart
 from logs.views.failures import failures
 from logs.views.glides import glide_chart
-from logs.views.link import DrawnLink, draw_scenario_link, link_chart, link_map
+from logs.views.link import DrawnLink, compute_scenario_link, link_chart, link_map
 from logs.views.map import MapChart, flight_map, map_json
 from logs.views.moments import waypoint_names
 from logs.views.profile import profile_chart
@@ -86,7 +86,7 @@ class FigureEntry:
 
 
 def _path_arguments(subject: Subject) -> dict[str, Any]:
-    """Return the keyword arguments that the map and the profile share: plan, route, track, verdict, stops."""
+    """Return keyword arguments for `flight_map` and `profile_chart`: plan, route, track, verdict, stops."""
     plan = subject.setup.plan
     return {
         "plan_waypoints": plan.waypoints if plan is not None else None,
@@ -151,7 +151,7 @@ def _link_caption(subject: Subject) -> str:
     findings = [finding for finding in subject.verdict.findings if finding.rule == "link"]
     heading = "".join(_as_sentence(finding.reason) for finding in findings)
     height_text = "" if subject.link is None else f" at {subject.link.coverage.height.text}"
-    return f"{heading}Areas: the link of an aircraft{height_text}, the median of this flight."
+    return f"{heading}The areas show the link of an aircraft{height_text}, the median height of this flight."
 
 
 def _fixed_caption(text: str) -> Callable[[Subject], str]:
@@ -160,7 +160,7 @@ def _fixed_caption(text: str) -> Callable[[Subject], str]:
 
 
 def _returning_autopilot(subject: Subject) -> str:
-    """Return the autopilot whose returns are drawn, in a caption."""
+    """Name the autopilot whose returns are drawn, as the words before "model" in a caption."""
     return "the autopilot's" if subject.returns is None else f"the {subject.returns.returns.autopilot}"
 
 
@@ -263,9 +263,9 @@ FIGURES = (
             "the engine."
         ),
         caption=_fixed_caption(
-            "Lowest safe height: the lowest height from which a return is safe. Where a return "
-            "from the flight's height is not safe, it is the nearest safe height above the "
-            "flight. Left over: the flight's height minus the height that a glide needs; below "
+            "The limit line is the lowest altitude from which a return is safe. Where a return "
+            "from the flight's altitude is not safe, the line is the nearest safe altitude above the "
+            "flight. Altitude to spare: the flight's altitude minus the altitude that a glide needs; below "
             "zero the glide does not arrive."
         ),
     ),
@@ -294,8 +294,8 @@ FIGURES = (
             "Each survey's photo lines from above: the usable parts, the lost parts, and the flown track."
         ),
         caption=_fixed_caption(
-            "Broad: flown on the line, level, at its height above ground and with the camera on. "
-            "Marked: lost. The axes have different scales."
+            "Broad line: flown on the photo line, level, at its height above ground and with the camera on. "
+            "Marked line: lost. The axes have different scales."
         ),
     ),
     FigureEntry(
@@ -317,8 +317,8 @@ FIGURES = (
             "station."
         ),
         caption=_fixed_caption(
-            "Margin: what is left above the fade margin. Fresnel clearance: height of the line of sight above the "
-            "ground, in radii of the first Fresnel zone; below 0 the terrain hides the aircraft."
+            "Link margin: strength of the signal above the fade margin. Fresnel clearance: height of the line of sight "
+            "above the ground, in radii of the first Fresnel zone; below 0 the terrain hides the aircraft."
         ),
     ),
     FigureEntry(
@@ -329,8 +329,8 @@ FIGURES = (
             "Plots over time: airspeed, bank, load factor, cross-track error, height error, height above ground."
         ),
         caption=_fixed_caption(
-            "Cross-track and height error are those of the guidance, relative to the path with "
-            "its corners rounded. Height above ground is computed from track and terrain."
+            "Cross-track and height error are errors of the guidance, relative to the path with "
+            "rounded corners. Height above ground is computed from track and terrain."
         ),
     ),
     FigureEntry(
@@ -342,8 +342,8 @@ FIGURES = (
         ),
         caption=_fixed_caption(
             "Strength is the sum over all units of (scale/distance)⁴ inside their reach: 1 where "
-            "distance equals scale (Yang, Tang and Lozano 2014, eq. 9 and 10, as a density). So "
-            "far: its integral over time."
+            "distance equals scale (Yang, Tang and Lozano 2014, eq. 9 and 10, as a density). The panels "
+            "“so far” show the integral of the strength over time."
         ),
     ),
     FigureEntry(
@@ -387,7 +387,7 @@ def make_subject(
     """Return the subject of the figures; a track without rows is omitted."""
     track = track if track is not None and len(track) else None
     setup = with_fence_zones(setup)
-    return Subject(setup, track, verdict, returns, draw_scenario_link(setup, track))
+    return Subject(setup, track, verdict, returns, compute_scenario_link(setup, track))
 
 
 def figure_views(subject: Subject) -> dict[str, View]:

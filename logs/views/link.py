@@ -63,8 +63,8 @@ class DrawnLink:
     is_flown: bool
 
 
-def draw_link(setup: FlightSetup, along: LinkAlongPath, antenna: Floats, *, is_flown: bool) -> DrawnLink | None:
-    """Compute the data of a radio link's pictures; None if link, terrain or path is missing.
+def compute_link(setup: FlightSetup, along: LinkAlongPath, antenna: Floats, *, is_flown: bool) -> DrawnLink | None:
+    """Compute the data for pictures of a radio link; None if link, terrain or path is missing.
 
     along: the link along the path.
     antenna: position of the station's antenna, m, (3,).
@@ -78,7 +78,7 @@ def draw_link(setup: FlightSetup, along: LinkAlongPath, antenna: Floats, *, is_f
     return DrawnLink(along, antenna, coverage, extent, is_flown)
 
 
-def draw_scenario_link(setup: FlightSetup, track: Track | None) -> DrawnLink | None:
+def compute_scenario_link(setup: FlightSetup, track: Track | None) -> DrawnLink | None:
     """Compute the data of the pictures of the scenario's radio link along a flight.
 
     Return None without a link, a terrain, or a known position of the station.
@@ -94,7 +94,7 @@ def draw_scenario_link(setup: FlightSetup, track: Track | None) -> DrawnLink | N
         along = link_along_path(link, terrain, antenna, path.times, path.points)
     else:
         along = link_along_path(link, terrain, antenna, track.time, track.position)
-    return draw_link(setup, along, antenna, is_flown=track is not None)
+    return compute_link(setup, along, antenna, is_flown=track is not None)
 
 
 def link_chart(setup: FlightSetup, drawn: DrawnLink) -> Chart:
@@ -162,7 +162,7 @@ def _coverage_layers(coverage: LinkCoverage) -> list[Layer]:
     is_weak = (coverage.margin >= 0.0) & (coverage.margin < WEAK_MARGIN_DB)
     height_text = coverage.height.text
     areas = (
-        (f"at {height_text}: less than {WEAK_MARGIN_DB:.0f} dB left", "coverage-weak", is_weak),
+        (f"at {height_text}: less than {WEAK_MARGIN_DB:.0f} dB above the fade margin", "coverage-weak", is_weak),
         (f"at {height_text}: below the fade margin", "coverage-lost", coverage.margin < 0.0),
         (f"ground above {height_text}", "coverage-ground", coverage.is_in_ground),
     )

@@ -86,12 +86,14 @@ def flight_map(
     waypoint_texts: Sequence[str] = (),
     stops: Sequence[int] | None = None,
 ) -> MapChart:
-    """Return the map of a plan, or of its flight.
+    """Make the map of a plan, or of its flight.
 
-    plan_waypoints: (p, 3) m or None; route_waypoints: (w, 3) m as flown, or None for a plan alone.  The route is
-    numbered and carries the verdict's marks; a plan that differs from it by more than 1 m is drawn as a second line.
-    Missiles are drawn as the outline of the sphere (line) and its section at the altitude of the nearest path point
-    (fill).
+    The waypoints of the route are numbered, and failures of the verdict are marked on it.  A plan that differs from the
+    route by more than 1 m is drawn as a second line.  A missile is drawn as a line around its sphere; the filled circle
+    is the section of the sphere at the altitude of the nearest path point.
+
+    plan_waypoints: waypoints of the plan, m, (p, 3), or None.
+    route_waypoints: waypoints of the flown route, m, (w, 3); None for a plan alone.
     waypoint_texts: text of the page on each waypoint.
     stops: displayed number of each waypoint of the route; None if each waypoint is a stop.
     """
@@ -120,7 +122,7 @@ def map_chart(
     waypoint_texts: Sequence[str] = (),
     stops: Sequence[int] | None = None,
 ) -> MapChart:
-    """Return a map as `flight_map` does, with any number of tracks and winds.
+    """Make a map as `flight_map` does, with any number of tracks and winds.
 
     subject: part of the title after the name of the scenario.
     """
@@ -159,10 +161,9 @@ def scenario_map(
     failing_threats: frozenset[int] = frozenset(),
     winds: Sequence[NamedWind] = (),
 ) -> MapChart:
-    """Return a map of a scenario with the given layers.
+    """Make a map of a scenario with additional layers, such as paths.
 
-    They are drawn above area, threats and zones, and below start and destination.
-
+    layers: additional layers, drawn above area, threats and zones, and below start and destination.
     labels: labels that take precedence over the names of threats and zones.
     extent: range as from `map_extent`.
     route: waypoints (w, 3), m, whose ends are start and destination, and whose altitudes determine the filled sections
@@ -204,8 +205,8 @@ def map_json(chart: MapChart) -> Json:
 def map_extent(scenario: Scenario, route: Floats | None, paths: Sequence[Floats]) -> Extent:
     """Return the east and north range that shows the scenario's area and all paths, with a margin, m.
 
-    Bounds that planfly made around an external mission are no limit: the range then covers the path, and the zones
-    within these bounds.
+    A mission without a scenario has no area: its range contains the paths, and the parts of zones within the bounds
+    that planfly made around the mission.
 
     paths: paths (t, 3), m; rows with NaN are ignored.
     """
@@ -229,9 +230,9 @@ def map_extent(scenario: Scenario, route: Floats | None, paths: Sequence[Floats]
 
 
 def _area_edge_layers(scenario: Scenario) -> list[Layer]:
-    """Return the layer of the edge of the scenario's area; [] for an external mission.
+    """Return the layer of the edge of the scenario's area; [] for a mission without a scenario.
 
-    The bounds that planfly makes around an external mission are no limit.
+    The bounds that planfly makes around such a mission do not limit the flight.
     """
     if scenario.external:
         return []
@@ -315,9 +316,9 @@ def end_labels(scenario: Scenario, route: Floats | None, stops: Sequence[int]) -
     return [replace(start, text=f"{start.text}, {destination.text}")]
 
 
-def _are_close(a: Floats, b: Floats) -> bool:
+def _are_close(first: Floats, second: Floats) -> bool:
     """Return True if two points lie within 50 m horizontally, so that one marker is enough for both."""
-    return float(np.hypot(*(a[:2] - b[:2]))) < 50.0
+    return float(np.hypot(*(first[:2] - second[:2]))) < 50.0
 
 
 def _waypoint_labels(route: Floats, stops: Sequence[int], failed: Failures) -> list[Label]:

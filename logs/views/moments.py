@@ -18,11 +18,11 @@ MAX_MOMENTS = 2000
 
 
 def flight_moments(setup: FlightSetup, track: Track, *, name: str = "flown", role: str = "flown") -> dict[str, Any]:
-    """Return columns of at most `MAX_MOMENTS` rows of a flight for the page, by name.
+    """Return at most `MAX_MOMENTS` rows of a flight as columns for the page, by name.
 
-    time (s); east, north, up (m AMSL), above (m above ground, null without terrain); airspeed, climb (m/s); bank (right
-    positive), pitch, heading (deg); leg.  Unknown values are null.  In addition, legs: names of the legs.  Rows without
-    a position are left out.
+    The columns are time (s); east, north (m), up (m AMSL) and above (m above ground); airspeed and climb (m/s); bank
+    (right positive), pitch and heading (deg); and leg.  The key "legs" has the names of the legs.  Unknown values are
+    null.  Rows without a position are left out.
 
     name, role: name and role of the line.
 

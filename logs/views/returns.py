@@ -283,7 +283,7 @@ def return_heights_chart(setup: FlightSetup, drawn_returns: DrawnReturns, track:
 
 
 def _path_positions(setup: FlightSetup, track: Track | None, first: float, last: float) -> tuple[Floats, Floats]:
-    """Return times, s, (t,), and positions, m, (t, 3), of the flown or planned path from one time to another.
+    """Return times, s, (t,), and positions, m, (t, 3), of the flown or planned path between two times (s).
 
     track: the flown track, whose rows are thinned; None for the planned path.
     """
@@ -298,7 +298,7 @@ def _path_positions(setup: FlightSetup, track: Track | None, first: float, last:
 
 
 def _glide_margin_panel(glides: Glides) -> Panel:
-    """Return a panel with the spare altitude of engine-out glides over time, by destination."""
+    """Make a panel with the altitude to spare of glides without engine over time, by destination."""
     time = np.array([glide.time for glide in glides.each])
 
     def line(name: str, role: str, values: list[float]) -> Layer:

@@ -55,7 +55,7 @@ def threat_circles(threats: Threats, route: Floats | None, failing_threats: froz
                     x,
                     y,
                     quiet=True,
-                    legend="radar: circle of its sphere (at altitude it reaches less far)",
+                    legend="radar: circle of its sphere (its reach is smaller at altitude)",
                 )
             )
         if radius_at_path[k] > 0.0:
@@ -166,7 +166,9 @@ def outline_label_position(
 class PathPlane:
     """Vertical plane through a path, for its profile.
 
-    kilometres: (s,) along the path.  points: (s, 3) m.  ground: (s,) m AMSL under the points, or None if unknown.
+    kilometres: distance of each sample along the path, km, (s,).
+    points: positions of the samples, m, (s, 3).
+    ground: ground altitude under the samples, m AMSL, (s,); None if unknown.
     min_altitude, max_altitude: altitude range of the profile, m AMSL.
     """
 
@@ -185,10 +187,11 @@ class PathPlane:
 def threat_cuts(
     threats: Threats, plane: PathPlane, labelled_elsewhere: frozenset[int]
 ) -> tuple[list[Layer], list[Label]]:
-    """Return layers of the missile and radar spheres cut by the plane, and labels of the units.
+    """Return layers of the sections of missile and radar spheres with a vertical plane, and their labels.
 
     Radars come first.
 
+    plane: vertical plane along the path.
     labelled_elsewhere: indices of threats with their own labels.
     """
     layers: list[Layer] = []
@@ -221,7 +224,10 @@ def threat_cuts(
 def entered_cuts(
     threats: Threats, failed: Failures, plane: PathPlane
 ) -> tuple[list[Layer], dict[int, tuple[float, float]]]:
-    """Return layers of the entered spheres cut by the plane, and label positions by index of the threat."""
+    """Return layers of the sections of entered spheres with a vertical plane, and label positions.
+
+    The label positions (km, m AMSL) are keyed by the index of the threat.
+    """
     layers, label_positions = [], {}
     for place in failed.threats:
         k = place.index or 0
@@ -311,9 +317,10 @@ class ZoneCut:
 
 
 def zone_cuts(zones: tuple[Zone, ...], plane: PathPlane) -> list[ZoneCut]:
-    """Return the parts of the plane that zones forbid; zones away from the path are left out.
+    """Return the parts of a vertical plane along a path that zones forbid.
 
-    An inclusion zone forbids the altitudes below its floor and above its ceiling, and everything outside it.
+    An inclusion zone forbids the altitudes below its floor and above its ceiling, and everything outside it.  Zones
+    away from the path are left out.
     """
     min_altitude, max_altitude, points = plane.min_altitude, plane.max_altitude, plane.points
     terrain = np.full(len(points), min_altitude)

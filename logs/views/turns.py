@@ -106,7 +106,8 @@ def _rule_panel(rule: str, title: str, unit: str, place: str, values: list[Place
 def _visible_limits(limits: Floats, rule: str, max_value: float) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
     """Return a mask (n,), True for limits to show.
 
-    A limit of a turn or corridor far above `max_value` would flatten the other values, and is hidden.
+    A limit of a turn or corridor far above the largest value `max_value` is hidden, because it would flatten the
+    values.
     """
     max_limit = _MAX_LIMIT_RATIO * max(max_value, 1e-9) if rule in ("turn", "corridor") else math.inf
     return np.asarray(limits <= max_limit, dtype=np.bool_)

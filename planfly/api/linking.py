@@ -181,11 +181,11 @@ def _write_pictures(result: LinkResult, folder: Path, *, overwrite: bool) -> Lin
     # Imported here: only pictures need matplotlib.
     from logs.views.exports.coverage_file import coverage_geotiff
     from logs.views.figures import View, draw_pictures
-    from logs.views.link import draw_link, link_chart, link_map
+    from logs.views.link import compute_link, link_chart, link_map
 
     setup = result.setup
     with stage("drawing", "drawing a link"):
-        drawn = draw_link(setup, result.along, result.antenna, is_flown=True)
+        drawn = compute_link(setup, result.along, result.antenna, is_flown=True)
         if drawn is None:
             return result
         views: dict[str, View] = {"link": link_chart(setup, drawn), "link-map": link_map(setup, drawn)}

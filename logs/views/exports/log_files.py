@@ -138,7 +138,13 @@ _DENSITY_EXPONENT = 4.2559
 
 
 class _Topic(NamedTuple):
-    """A topic: fields after the timestamp (numpy type, shape), and values for the valid rows of the log."""
+    """A ULog topic.
+
+    name: name of the topic.
+    period: interval of its messages, s; 0 for a message for each row.
+    fields: name, numpy type and, for an array, length of each field after the timestamp.
+    values: values of each field and of the timestamp, for the valid rows of the log.
+    """
 
     name: str
     period: float
@@ -182,7 +188,7 @@ def px4_log_bytes(log: FlightLog) -> bytes:
 
 
 def _encode_message(letter: bytes, body: bytes) -> bytes:
-    """Encode one message of a ULog file."""
+    """Encode one message of a ULog file: its length, the letter of its kind, and its content."""
     return struct.pack("<H", len(body)) + letter + body
 
 
@@ -233,6 +239,7 @@ def _make_topics(log: FlightLog, rows: NDArray[np.int64]) -> list[_Topic]:
     wind, battery = track.wind[rows], _battery_values(log, rows)
 
     def topic(name: str, period: float, fields: list[tuple[Any, ...]], **values: Any) -> _Topic:
+        """Make a topic with the timestamps of all rows."""
         return _Topic(name, period, fields, {"timestamp": stamp, **values})
 
     topics = [
@@ -315,7 +322,7 @@ def _make_topics(log: FlightLog, rows: NDArray[np.int64]) -> list[_Topic]:
 
 
 def _battery_values(log: FlightLog, rows: NDArray[np.int64]) -> dict[str, Columns]:
-    """Return the values of battery_status by field."""
+    """Return the values of PX4's topic battery_status at some rows, by field."""
     time, current = log.track.time[rows], log.track.current[rows].astype(np.float64)
     energy = log.track.energy[rows].astype(np.float64)
     charge = np.concatenate([[0.0], np.cumsum(np.diff(time) * current[1:])])[: len(rows)]  # As

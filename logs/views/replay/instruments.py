@@ -182,7 +182,7 @@ class Instruments:
             for m in np.flatnonzero((radii > 0.0) & (distances <= radii)).tolist()
         ]
         return _without_control_characters(
-            "within reach of: " + "; ".join(threats_in_reach) if threats_in_reach else "within no unit's reach"
+            "within reach of: " + "; ".join(threats_in_reach) if threats_in_reach else "outside the reach of all units"
         )
 
     def _latest_entries(self, time: float) -> list[str]:

@@ -160,7 +160,7 @@ def _leg_entries(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:
         if len(group) > 1:
             item, radius = int(route.items[leg]), route.arc_radii[leg]
             item_text = f"return of item {item}" if leg in route.rtl_legs else f"loiter of item {item}"
-            text = f"{item_text}: leg {route.leg_numbers[leg]} goes on around its circle, radius {radius:.0f} m"
+            text = f"{item_text}: leg {route.leg_numbers[leg]} continues around its circle, radius {radius:.0f} m"
             entries.append(TimelineEntry(float(log.track.time[part.first]), "leg", text))
             continue
         course = round(math.degrees(courses[leg])) % 360
@@ -197,7 +197,7 @@ def _turn_entries(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:
 
 
 def _clearance_entries(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:
-    """List the lowest height above ground of each leg, marked if it is below the required height."""
+    """List an entry for the lowest height above ground on each leg; it states if the height is too low."""
     terrain, track = log.setup.scenario.terrain, log.track
     if terrain is None:
         return [TimelineEntry(float(track.time[0]), "ground", "no terrain in the log: clearance is unknown")]
@@ -215,9 +215,9 @@ def _clearance_entries(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEn
             continue
         k = part.first + int(np.nanargmin(part_clearances))
         time = float(track.time[k] + fractions[k] * (track.time[k + 1] - track.time[k]))
-        below_text = "" if clearances[k] >= required else f", under the required {required:.0f} m"
+        below_text = "" if clearances[k] >= required else f", below the required {required:.0f} m"
         known_text = "" if np.isfinite(part_clearances).all() else ", where there is terrain data"
-        text = f"lowest of {name}: {clearances[k]:.1f} m above ground{below_text}{known_text}"
+        text = f"lowest height on {name}: {clearances[k]:.1f} m above ground{below_text}{known_text}"
         entries.append(TimelineEntry(time, "ground", text))
     return entries
 

@@ -162,7 +162,7 @@ def _measure_flight(setup: FlightSetup, track: Track) -> dict[tuple[str, str], f
 
 
 def _reduce_finite(reduce: Callable[[Floats], Any], values: NDArray[np.floating[Any]]) -> float:
-    """Apply a reduction to the finite values; NaN if there are none."""
+    """Apply a reduction, such as a mean or a maximum, to the finite values; NaN if there are none."""
     finite = values[np.isfinite(values)].astype(np.float64)
     return float(reduce(finite)) if finite.size else math.nan
 
@@ -196,8 +196,8 @@ def _difference_notes(first: FlightLog, second: FlightLog, names: tuple[str, str
     for log, name in zip((first, second), names, strict=True):
         if not np.isfinite(log.track.cross_track).any():
             notes.append(
-                f"cross-track and height error: guidance's own, which the log of {name} does not "
-                "contain; planfly refly measures an imported flight against its legs"
+                f"cross-track and height error: the log of {name} does not contain these errors of the guidance; "
+                "planfly refly measures an imported flight against its legs"
             )
     if first_setup.scenario.origin == second_setup.scenario.origin:
         first_positions, second_positions = (
@@ -210,7 +210,7 @@ def _difference_notes(first: FlightLog, second: FlightLog, names: tuple[str, str
                 f" {number(float(distances.max()))} m at most"
             )
     else:
-        notes.append("map origins differ: the tracks are not laid over each other")
+        notes.append("map origins differ: the distance between the tracks is not computed")
     return notes
 
 
@@ -254,9 +254,10 @@ def _wind_text(setup: FlightSetup) -> str:
 
 
 def difference_rows(comparison: Comparison) -> list[tuple[str, ...]]:
-    """Return the table of differences as text.
+    """Return the rows of the table of differences as text.
 
-    A row has quantity, unit, both values, and the second value minus the first.  The first row has both verdicts.
+    The first row has both verdicts.  Each other row has the quantity, its unit, the values of both flights, and the
+    second value minus the first.
     """
     first_answer, second_answer = (verdict.answer for verdict in comparison.verdicts)
     rows: list[tuple[str, ...]] = [("verdict", "", first_answer, second_answer, "")]

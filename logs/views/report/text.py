@@ -153,21 +153,6 @@ def _needed_decimals(finding: Finding) -> int | None:
     return next(sufficient_decimals, _MAX_DECIMALS)
 
 
-def _limit_text(finding: Finding, digits: int | None) -> str:
-    """Return the values that pass as text; an en dash without a limit."""
-    text = number(in_unit(finding.effective_limit, finding.unit)[0], digits=digits)
-    return text if text == NOTHING else f"{finding.limit_sign}\u00a0{text}"
-
-
-def _missed_text(finding: Finding) -> str:
-    """Return the distance of a failed finding from the values that pass; "" if no limit decides it."""
-    if finding.ok is not False or finding.margin is None or finding.effective_limit is None:
-        return ""
-    distance = -finding.margin - (finding.tolerance or 0.0)
-    # A count has no decimals.
-    return quantity_text(distance, finding.unit) if finding.unit == "legs" else quantity(distance, finding.unit)
-
-
 def missed_text(finding: Finding) -> str:
     """Return the distance of a failed finding from the values that pass; "" if no limit decides it."""
     if finding.ok is not False or finding.margin is None or finding.effective_limit is None:
@@ -178,7 +163,7 @@ def missed_text(finding: Finding) -> str:
 
 
 def rule_row(rule: RuleFindings) -> RuleRow:
-    """Return the row of one rule: the numbers of its findings, and the finding that stands for all."""
+    """Return the row of one rule: the numbers of its findings, and the values of a representative one."""
     head = (rule.state, _sign_and_word(rule.state), rule.words.word, rule.tally_text)
     if rule.shown is None:
         return RuleRow(*head, "" if rule.judged else rule.findings[0].reason)
@@ -245,7 +230,8 @@ def trust_line(reflight: Reflight) -> str:
     wind = reflight.setup.scenario.wind
     gust_text = "no gusts" if wind.turbulence == "none" else f"{wind.turbulence} turbulence"
     wind_text = f" in {wind.speed:.1f} m/s of wind, {gust_text}"
-    return f"Model {model_text}{wind_text}, against the flight, median (95 %): {', '.join(spread_texts)}{end_text}"
+    head = f"Median difference (95 %) between the flight and model {model_text}{wind_text}"
+    return f"{head}: {', '.join(spread_texts)}{end_text}"
 
 
 def not_reflown_lines(reflights: Sequence[Reflight], stretches: Sequence[MissionStretch], max_count: int) -> list[str]:

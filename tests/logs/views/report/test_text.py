@@ -172,11 +172,11 @@ def test_what_is_not_known_is_a_dash() -> None:
 def test_the_trust_is_a_line_with_medians() -> None:
     spread = (Spread("cross_track", "m", 0.5, 2.0),)
     line = trust_line(replace(AGAIN, spreads=spread))
-    blown = "Model aerosonde in 0.0 m/s of wind, no gusts, against the flight"
-    assert line == f"{blown}, median (95 %): cross-track 0.50 m (2.00 m)"
+    blown = "Median difference (95 %) between the flight and model aerosonde in 0.0 m/s of wind, no gusts: "
+    assert line == f"{blown}cross-track 0.50 m (2.00 m)"
     scenario = with_wind(AGAIN.setup.scenario, 4.0, 0.0, "light")
     gusty = replace(AGAIN, setup=replace(AGAIN.setup, scenario=scenario))
-    assert "in 4.0 m/s of wind, light turbulence, against" in trust_line(gusty)
+    assert "in 4.0 m/s of wind, light turbulence: cross-track" in trust_line(gusty)
     assert "used because no aircraft was named" in trust_line(replace(AGAIN, stands_in=True))
     assert "ended early: departure" in trust_line(replace(AGAIN, ended="departure"))
     assert "no part in common" in trust_line(replace(AGAIN, spreads=()))
