@@ -150,7 +150,7 @@ def clean_positions(series: LogSeries, earlier_jumps: tuple[float, ...] = ()) ->
     ([0.0, 1.0, 2.0, 3.0, 4.0, 9.0], 1, 1, (Gap(start=4.0, end=9.0),))
     """
     time, values = series.time, series.values
-    is_usable = _usable_rows(time, values)
+    is_usable = _find_usable_rows(time, values)
     unusable = int(is_usable.size - is_usable.sum())
     time, values = time[is_usable], values[is_usable]
     order = np.argsort(time, kind="stable")
@@ -188,14 +188,14 @@ def find_gaps(time: Floats) -> tuple[Gap, ...]:
     return tuple(Gap(float(time[k]), float(time[k + 1])) for k in np.flatnonzero(steps > max_step + 1e-6))
 
 
-def metres_between(lat: Floats, lon: Floats) -> Floats:
+def measure_steps(lat: Floats, lon: Floats) -> Floats:
     """Return the distances between n successive positions, m, (n - 1,), also across the 180th meridian."""
     north = np.diff(lat) * DEGREE_LENGTH_M
     east = (np.diff(lon) + 180.0) % 360.0 - 180.0
     return np.hypot(north, east * DEGREE_LENGTH_M * np.cos(np.radians(0.5 * (lat[1:] + lat[:-1]))))
 
 
-def _usable_rows(time: Floats, values: Floats) -> Flags:
+def _find_usable_rows(time: Floats, values: Floats) -> Flags:
     """Return a mask (n,): True for rows with a valid time, position and altitude.
 
     A position at latitude 0 and longitude 0 is invalid.  Rows without an altitude are valid only if all rows lack one.
@@ -222,7 +222,7 @@ def _find_glitches(time: Floats, values: Floats) -> Flags:
         return is_glitch
     lat, lon, up = values.T
     steps = np.diff(time)
-    speed = metres_between(lat, lon) / np.maximum(steps, 1e-3)
+    speed = measure_steps(lat, lon) / np.maximum(steps, 1e-3)
     max_speed = GLITCH_SPEED_MPS + GLITCH_SPEED_RATIO * float(np.median(speed))
     rise = np.abs(np.diff(up)) / np.maximum(steps, 1e-3)
     leaps = np.flatnonzero((speed > max_speed) | (np.nan_to_num(rise) > max_speed))
@@ -254,7 +254,7 @@ def _is_reachable(time: Floats, values: Floats, first: int, second: int, max_spe
     first, second: numbers of the rows.
     """
     pair = [first, second]
-    distance = float(metres_between(values[pair, 0], values[pair, 1])[0])
+    distance = float(measure_steps(values[pair, 0], values[pair, 1])[0])
     rise = abs(float(values[second, 2] - values[first, 2]))
     duration = float(time[second] - time[first])
     return max(distance, 0.0 if math.isnan(rise) else rise) <= max_speed * duration
@@ -283,7 +283,7 @@ def _remove_forward_jumps(time: Floats, values: Floats) -> tuple[Floats, tuple[t
     if time.size < 20:
         return time, ()
     steps = np.diff(time)
-    distances = metres_between(values[:, 0], values[:, 1])
+    distances = measure_steps(values[:, 0], values[:, 1])
     usual_step = float(np.median(steps))
     for k in np.flatnonzero(steps > max(MIN_CLOCK_JUMP_S, 2.0 * MAX_JUMP_STEPS * usual_step)).tolist():
         neighbours = slice(max(0, k - 5), k + 6)

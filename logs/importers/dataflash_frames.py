@@ -52,13 +52,13 @@ class MappedFile:
             self._map.madvise(mmap.MADV_DONTNEED)
 
 
-def piece_ends(size: int, release_memory: Callable[[], None]) -> Iterator[int]:
+def iterate_piece_ends(size: int, release_memory: Callable[[], None]) -> Iterator[int]:
     """Yield the end (byte number) of each piece of a file, and call `release_memory` after its use.
 
     size: size of the file, bytes; all pieces but the last have `PIECE_BYTES`.
-    >>> list(piece_ends(3, lambda: None))
+    >>> list(iterate_piece_ends(3, lambda: None))
     [3]
-    >>> list(piece_ends(PIECE_BYTES + 1, lambda: None)) == [PIECE_BYTES, PIECE_BYTES + 1]
+    >>> list(iterate_piece_ends(PIECE_BYTES + 1, lambda: None)) == [PIECE_BYTES, PIECE_BYTES + 1]
     True
     """
     end = 0
@@ -267,7 +267,7 @@ def _find_messages(data: Bytes, is_requested: NDArray[np.bool_], release_memory:
     counts = np.zeros(256, np.int64)
     state[_IS_READING], lengths[FMT_TYPE] = 1, _FMT_BYTES
     starts, kinds = [np.zeros(0, np.int64)], [np.zeros(0, np.uint8)]
-    for end in piece_ends(data.size, release_memory):
+    for end in iterate_piece_ends(data.size, release_memory):
         piece_starts, piece_kinds = _walk_messages(
             read_only(data), end, state, lengths, counts, HEADER_BYTES, FMT_TYPE, MAX_TRAILING_BYTES, is_requested
         )
@@ -309,7 +309,7 @@ def _read_messages(
         windows = np.lib.stride_tricks.sliding_window_view(data, dtype.itemsize)
         rows = np.empty(len(starts), dtype)
         first = 0
-        for end in piece_ends(data.size, release_memory):
+        for end in iterate_piece_ends(data.size, release_memory):
             last = int(np.searchsorted(starts, end))
             rows[first:last] = windows[starts[first:last] + HEADER_BYTES].view(dtype)[:, 0]
             first = last

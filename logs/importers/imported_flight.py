@@ -13,7 +13,7 @@ import numpy as np
 from flight.mission.items import Mission
 from flight.simulation.setup import DataKind, Gap, HeightOffset, Heights, MissionStretch, RowFaults
 from flight.simulation.track import THROTTLE, Track
-from logs.importers.clean_positions import DEGREE_LENGTH_M, CleanPositions, clean_positions, find_gaps, metres_between
+from logs.importers.clean_positions import DEGREE_LENGTH_M, CleanPositions, clean_positions, find_gaps, measure_steps
 from logs.importers.raw_log import COLUMNS, LoggedMission, LogSeries, ModeChange, RawLog, VehicleKind
 from world.arrays import Floats
 from world.errors import LogError
@@ -73,9 +73,9 @@ def find_flight_spans(time: Floats, lat: Floats, lon: Floats) -> list[tuple[floa
     """
     if time.size < 3:
         return []
-    speed = metres_between(lat, lon) / np.maximum(np.diff(time), 1e-3)
+    speed = measure_steps(lat, lon) / np.maximum(np.diff(time), 1e-3)
     width = max(1, int(_MEDIAN_WINDOW_S / max(1e-3, float(np.median(np.diff(time))))))
-    is_flying = _running_median(speed, width) > MIN_FLYING_SPEED_MPS
+    is_flying = _compute_running_median(speed, width) > MIN_FLYING_SPEED_MPS
     spans: list[list[float]] = []
     for k in np.flatnonzero(is_flying).tolist():
         if spans and time[k] - spans[-1][1] <= MAX_SLOW_TIME_S:
@@ -85,7 +85,7 @@ def find_flight_spans(time: Floats, lat: Floats, lon: Floats) -> list[tuple[floa
     return [(start, end) for start, end in spans if end - start >= MIN_FLIGHT_TIME_S]
 
 
-def _running_median(values: Floats, width: int) -> Floats:
+def _compute_running_median(values: Floats, width: int) -> Floats:
     """Return the median of the `width` values around each value, (n,); end values are repeated."""
     if width < 2 or values.size <= width:
         return values
@@ -112,9 +112,9 @@ def find_flight_parts(
         stretches = _find_stretches(start, end, modes, log_end)
         stretches_by_mission: dict[int, list[MissionStretch]] = {}
         for stretch in stretches:
-            stretches_by_mission.setdefault(_mission_at(stretch, missions), []).append(stretch)
+            stretches_by_mission.setdefault(_find_mission(stretch, missions), []).append(stretch)
         if not stretches_by_mission:
-            stretches_by_mission[_mission_at(MissionStretch(start, end, "", "log"), missions)] = []
+            stretches_by_mission[_find_mission(MissionStretch(start, end, "", "log"), missions)] = []
         parts += [
             FlightPart(start, end, number, tuple(mission_stretches))
             for number, mission_stretches in stretches_by_mission.items()
@@ -147,7 +147,7 @@ def _find_stretches(start: float, end: float, modes: Sequence[ModeChange], log_e
     return stretches
 
 
-def _mission_at(stretch: MissionStretch, missions: Sequence[LoggedMission]) -> int:
+def _find_mission(stretch: MissionStretch, missions: Sequence[LoggedMission]) -> int:
     """Return the index of the mission that a stretch of a flight followed, or -1 if unknown.
 
     It is the last mission logged up to a second after the start of the stretch, or else the first mission logged
@@ -255,7 +255,7 @@ def make_flight(raw: RawLog, number: int | None = None) -> LoggedFlight:
     positions = clean_positions(series, raw.clock_jumps)
     spans = find_flight_spans(positions.time, positions.lat, positions.lon)
     if not spans:
-        raise LogError(f"{raw.source}: contains no flight: {_reason_without_flight(positions)}", file=raw.source)
+        raise LogError(f"{raw.source}: contains no flight: {_explain_missing_flight(positions)}", file=raw.source)
     last = float(positions.time[-1])
     modes = [
         type(mode)(float(positions.to_steady_clock(np.array([mode.time]))[0]), mode.name, mode.automatic)
@@ -271,7 +271,7 @@ def make_flight(raw: RawLog, number: int | None = None) -> LoggedFlight:
     return _extract_flight(raw, positions, parts[index], index + 1, len(parts), other_flights)
 
 
-def _reason_without_flight(positions: CleanPositions) -> str:
+def _explain_missing_flight(positions: CleanPositions) -> str:
     """Return the reason why a log contains no flight, for a message."""
     if positions.time.size < 2:
         unusable_count = positions.faults.unusable
@@ -315,7 +315,7 @@ def _extract_flight(
         holds=tuple(available_quantities),
         stretches=part.stretches,
         mission=raw.missions[part.mission] if part.mission >= 0 else None,
-        heights=_heights(raw, positions, start),
+        heights=_compare_heights(raw, positions, start),
         gaps=find_gaps(time),
         faults=positions.faults,
         number=number,
@@ -369,7 +369,7 @@ def _interpolate_at(series: LogSeries | None, name: str, time: Floats, positions
     return interpolated
 
 
-def _heights(raw: RawLog, positions: CleanPositions, start: float) -> Heights:
+def _compare_heights(raw: RawLog, positions: CleanPositions, start: float) -> Heights:
     """Return the source of the positions' altitude, and the offsets of other altitudes from it, m.
 
     An offset is a median over the first `_COMPARED_TIME_S` seconds of the flight.

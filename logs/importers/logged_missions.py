@@ -114,10 +114,10 @@ def _is_same_item(first: MissionItem, second: MissionItem) -> bool:
 
     Their frames may differ.
     """
-    return _comparison_key(first) == _comparison_key(second)
+    return _make_comparison_key(first) == _make_comparison_key(second)
 
 
-def _comparison_key(item: MissionItem) -> tuple[object, ...]:
+def _make_comparison_key(item: MissionItem) -> tuple[object, ...]:
     """Return the values by which items are compared.
 
     Numbers become texts, so that unset numbers (NaN) are equal.
@@ -163,13 +163,13 @@ def make_logged_mission(logged: LoggedItemGroup, source: str, origin: str) -> Lo
     return without_gaps(LoggedMission(logged.time, mission, origin), logged.total, end)
 
 
-def px4_items(items: Iterable[MissionItem]) -> tuple[MissionItem, ...]:
+def renumber_px4_items(items: Iterable[MissionItem]) -> tuple[MissionItem, ...]:
     """Renumber items of PX4, which counts from 0, so that they count from 1.
 
     A vertical take-off becomes a take-off, because PX4 flies to the position of both in the same way (docs.px4.io,
     "Mission Mode (VTOL)").
 
-    >>> [(item.seq, item.command) for item in px4_items([MissionItem(0, 84, 0, (0.0,) * 4, 46.0, 8.0, 75.0)])]
+    >>> [(item.seq, item.command) for item in renumber_px4_items([MissionItem(0, 84, 0, (0.0,) * 4, 46.0, 8.0, 75.0)])]
     [(1, 22)]
     """
     vertical = Command.NAV_VTOL_TAKEOFF
@@ -190,13 +190,13 @@ def without_gaps(logged: LoggedMission, total: int, last_number: int) -> LoggedM
     missing = tuple(sorted(set(range(1, last_number + 1)) - numbers))
     if not missing:
         return logged if len(numbers) > 1 else None
-    run = _longest_run(logged.mission.items)
+    run = _find_longest_run(logged.mission.items)
     first, last = (run[0].seq, run[-1].seq) if run else (0, 0)
     missing_items = MissingItems(missing, total, first, last, last_number)
     return replace(logged, mission=replace(logged.mission, items=tuple(run)), missing=missing_items)
 
 
-def _longest_run(items: Sequence[MissionItem]) -> Sequence[MissionItem]:
+def _find_longest_run(items: Sequence[MissionItem]) -> Sequence[MissionItem]:
     """Return the longest run of consecutively numbered items.
 
     Each run is cut before its first DO_JUMP to an item outside the run.  Of equally long runs, the first is returned.
@@ -280,28 +280,28 @@ _PX4_MAIN = {1: "MANUAL", 2: "ALTCTL", 3: "POSCTL", 5: "ACRO", 6: "OFFBOARD", 7:
 _PX4_SUB = {2: "TAKEOFF", 3: "LOITER", 4: "MISSION", 5: "RTL", 6: "LAND", 7: "RTGS", 8: "FOLLOWME"}
 
 
-def plane_mode(number: int) -> tuple[str, bool]:
+def describe_plane_mode(number: int) -> tuple[str, bool]:
     """Return ArduPlane's name of a flight mode, and True if the mode follows the mission.
 
-    >>> plane_mode(10), plane_mode(5)
+    >>> describe_plane_mode(10), describe_plane_mode(5)
     (('AUTO', True), ('FBWA', False))
     """
     return _PLANE_MODES.get(number, f"mode {number}"), number == _PLANE_AUTO
 
 
-def px4_state(number: int) -> tuple[str, bool]:
+def describe_px4_state(number: int) -> tuple[str, bool]:
     """Return PX4's name of a navigation state, and True if the state follows the mission.
 
-    >>> px4_state(3), px4_state(5)
+    >>> describe_px4_state(3), describe_px4_state(5)
     (('MISSION', True), ('RTL', False))
     """
     return _PX4_STATES.get(number, f"state {number}"), number == _PX4_MISSION
 
 
-def px4_mode(custom_mode: int) -> tuple[str, bool]:
+def describe_px4_mode(custom_mode: int) -> tuple[str, bool]:
     """Return PX4's name of the mode in a heartbeat, and True if the mode follows the mission.
 
-    >>> px4_mode(4 << 24 | 4 << 16)
+    >>> describe_px4_mode(4 << 24 | 4 << 16)
     ('MISSION', True)
     """
     main, sub = custom_mode >> 16 & 0xFF, custom_mode >> 24 & 0xFF

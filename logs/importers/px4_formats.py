@@ -42,7 +42,7 @@ class MessageFormats:
         4
         """
         name, _, fields = text.partition(":")
-        self._formats[name] = list(_field_types(fields))
+        self._formats[name] = list(_parse_field_types(fields))
         self._counts.clear()
 
     def add_topic(self, name: str) -> None:
@@ -83,7 +83,7 @@ class MessageFormats:
         return self._counts[name]
 
 
-def _field_types(fields: str) -> Iterator[tuple[str, int]]:
+def _parse_field_types(fields: str) -> Iterator[tuple[str, int]]:
     """Yield the type of each field, and its number of elements: 1, or the length of an array."""
     for field in fields.split(";"):
         if match := _FIELD.match(field):

@@ -24,10 +24,10 @@ from logs.importers.logged_missions import (
     LoggedItem,
     LoggedItemGroup,
     combine_items,
+    describe_plane_mode,
+    describe_px4_mode,
     make_logged_mission,
-    plane_mode,
-    px4_items,
-    px4_mode,
+    renumber_px4_items,
     without_gaps,
 )
 from logs.importers.raw_log import (
@@ -95,7 +95,7 @@ class TelemetryReader:
             if position >= piece_end:
                 self.release_memory()
                 piece_end = position + PIECE_BYTES
-            length = self._record_length(position)
+            length = self._find_record_length(position)
             if length == 0:
                 self.places += is_in_record
                 self.size += 1
@@ -106,7 +106,7 @@ class TelemetryReader:
                 self.cut = True
                 break
             is_in_record = True
-            if self._message_number(position) in self.wanted:
+            if self._read_message_number(position) in self.wanted:
                 stamp = _STAMP.unpack_from(self.data, position)[0] * 1e-6
                 message = self._decode(bytes(self.data[position + _STAMP.size : position + length]))
                 if message is None:
@@ -119,7 +119,7 @@ class TelemetryReader:
         """Return the damage found so far."""
         return Damage(self.places, self.size, self.cut, self.unreadable)
 
-    def _record_length(self, position: int) -> int:
+    def _find_record_length(self, position: int) -> int:
         """Return the length of the record at a position, including its time, bytes.
 
         Return 0 if no record begins there.
@@ -136,7 +136,7 @@ class TelemetryReader:
             return _STAMP.size + _V2_FRAME + payload_size + signature_size
         return 0
 
-    def _message_number(self, position: int) -> int:
+    def _read_message_number(self, position: int) -> int:
         """Return the message number of the packet in the record at a position."""
         packet = position + _STAMP.size
         if self.data[packet] == _V1:
@@ -290,11 +290,11 @@ _MISSION_TYPE = 0
 
 def read_telemetry(path: Path) -> RawLog:
     """Read a telemetry log.  Raises LogError for a log without positions or without a vehicle."""
-    messages, damage = vehicle_messages(path)
+    messages, damage = read_vehicle_messages(path)
     return messages.to_raw_log(damage)
 
 
-def vehicle_messages(path: Path) -> tuple["VehicleMessages", Damage]:
+def read_vehicle_messages(path: Path) -> tuple["VehicleMessages", Damage]:
     """Return the messages of the vehicle with the most messages, and the damage of the file.
 
     Raises LogError for a log without a vehicle.
@@ -342,7 +342,7 @@ class VehicleMessages:
 
     def to_raw_log(self, damage: Damage) -> RawLog:
         """Return the log with all data that a verdict needs.  Raises LogError for a log without positions."""
-        series = {name: log_series for name, log_series in self._series() if log_series is not None}
+        series = {name: log_series for name, log_series in self._read_series() if log_series is not None}
         heartbeats = [message for _, message in self._named_messages.get("HEARTBEAT", []) if _is_vehicle(message)]
         if "position" not in series:
             raise LogError(
@@ -352,14 +352,14 @@ class VehicleMessages:
         return RawLog(
             source=self._source,
             format=FORMAT,
-            program=self._program(heartbeats[0]),
+            program=self._find_program(heartbeats[0]),
             vehicle=_TYPES.get(heartbeats[0].type, "unknown"),
             series=series,
-            heights=tuple(self._heights()),
+            heights=tuple(self._read_heights()),
             datum="amsl",
-            modes=tuple(self._modes()),
-            missions=tuple(self._missions()),
-            parameters=self._parameters(),
+            modes=tuple(self._read_modes()),
+            missions=tuple(self._read_missions()),
+            parameters=self._read_parameters(),
             events=tuple(
                 (time, _decode_text(message.text)) for time, message in self._named_messages.get("STATUSTEXT", [])
             ),
@@ -380,7 +380,7 @@ class VehicleMessages:
         column_numbers = [1 + NUMBERS[name].index(column) for column in columns]
         return LogSeries(name, self._times[rows[:, 0].astype(np.int64)], rows[:, column_numbers])
 
-    def _series(self) -> Iterable[tuple[str, LogSeries | None]]:
+    def _read_series(self) -> Iterable[tuple[str, LogSeries | None]]:
         """Yield the name and the values of each series of a `RawLog`; None for a series that the log lacks."""
         positions = self.table("GLOBAL_POSITION_INT", ("lat", "lon", "alt", "vy", "vx", "vz"))
         if positions is not None:
@@ -397,9 +397,9 @@ class VehicleMessages:
             yield "position", LogSeries(positions.source, positions.time, scaled[:, :3])
             yield "velocity", LogSeries(positions.source, positions.time, scaled[:, 3:])
         else:
-            yield "position", self._gps_position()
+            yield "position", self._read_gps_position()
         yield "attitude", self.table("ATTITUDE", ("roll", "pitch", "yaw"))
-        yield "wind", self._wind()
+        yield "wind", self._read_wind()
         hud = self.table("VFR_HUD", ("airspeed", "alt", "throttle", "groundspeed"))
         if hud is not None:
             # Some vehicles without an airspeed sensor send the ground speed instead.
@@ -409,9 +409,9 @@ class VehicleMessages:
                 ratio = np.array([eas_to_tas_ratio(float(height)) for height in up])
                 yield "airspeed", LogSeries("VFR_HUD", hud.time, hud.values[:, :1] * ratio[:, None])
             yield "throttle", LogSeries("VFR_HUD", hud.time, hud.values[:, 2:3] * 0.01)
-        yield "battery", self._battery_with_energy()
+        yield "battery", self._read_battery_with_energy()
 
-    def _gps_position(self) -> LogSeries | None:
+    def _read_gps_position(self) -> LogSeries | None:
         """Return the GPS positions with a 3-D fix: latitude and longitude (deg) and altitude (m), (n, 3).
 
         Return None if the receiver never had a fix.
@@ -425,7 +425,7 @@ class VehicleMessages:
         scaled = np.round(table.values[has_fix, :3] * np.array([1e-7, 1e-7, 1e-3]), 7)
         return LogSeries("GPS_RAW_INT", table.time[has_fix], scaled)
 
-    def _wind(self) -> LogSeries | None:
+    def _read_wind(self) -> LogSeries | None:
         """Return the wind velocity to east and north, m/s, (n, 2); None if it was not sent or is always 0."""
         wind = self.table("WIND", ("direction", "speed"))
         if wind is not None and np.any(wind.values[:, 1]):
@@ -435,9 +435,9 @@ class VehicleMessages:
         wind = self.table("WIND_COV", ("wind_y", "wind_x"))
         return wind if wind is not None and np.any(wind.values) else None
 
-    def _battery_with_energy(self) -> LogSeries | None:
+    def _read_battery_with_energy(self) -> LogSeries | None:
         """Return the battery's current (A) and the energy used (Wh), (n, 2); None if neither was measured."""
-        table = self._measured_table("BATTERY_STATUS", ("current_battery", "energy_consumed"))
+        table = self._read_measured_table("BATTERY_STATUS", ("current_battery", "energy_consumed"))
         if table is not None and np.any(table.values[:, 1] > 0.0):
             current = np.maximum(table.values[:, 0] * 0.01, 0.0)
             return LogSeries(table.source, table.time, np.stack([current, table.values[:, 1] / 36.0], axis=1))
@@ -446,12 +446,12 @@ class VehicleMessages:
 
     def battery(self) -> LogSeries | None:
         """Return the battery's voltage (V) and current (A), (n, 2); None if the current was not measured."""
-        table = self._measured_table("SYS_STATUS", ("voltage_battery", "current_battery"))
+        table = self._read_measured_table("SYS_STATUS", ("voltage_battery", "current_battery"))
         if table is None or not np.any(table.values[:, 1] > 0.0):
             return None
         return LogSeries(table.source, table.time, table.values * np.array([1e-3, 0.01]))
 
-    def _measured_table(self, name: str, columns: tuple[str, ...]) -> LogSeries | None:
+    def _read_measured_table(self, name: str, columns: tuple[str, ...]) -> LogSeries | None:
         """Return fields of a battery message, only the rows with measurements; None if there are none."""
         table = self.table(name, columns)
         if table is None:
@@ -459,27 +459,31 @@ class VehicleMessages:
         is_measured = np.all([table.values[:, k] != NOT_MEASURED[column] for k, column in enumerate(columns)], axis=0)
         return LogSeries(name, table.time[is_measured], table.values[is_measured]) if is_measured.any() else None
 
-    def _heights(self) -> Iterable[HeightSource]:
+    def _read_heights(self) -> Iterable[HeightSource]:
         """Yield the altitudes in the log other than the altitude of the position."""
-        gps = self._gps_position()
+        gps = self._read_gps_position()
         if gps is not None and len(self._messages.table("GLOBAL_POSITION_INT")):
             yield HeightSource("GPS_RAW_INT.alt", "amsl", LogSeries(gps.source, gps.time, gps.values[:, 2:]))
         hud = self.table("VFR_HUD", ("alt",))
         if hud is not None:
             yield HeightSource("VFR_HUD.alt", "amsl", hud)
 
-    def _modes(self) -> Iterable[ModeChange]:
+    def _read_modes(self) -> Iterable[ModeChange]:
         """Yield the changes of the vehicle's mode, the first mode included."""
         last_mode: tuple[str, bool] | None = None
         for time, heartbeat in self._named_messages.get("HEARTBEAT", []):
             if not _is_vehicle(heartbeat):
                 continue
-            mode = px4_mode(heartbeat.custom_mode) if heartbeat.autopilot == _PX4 else plane_mode(heartbeat.custom_mode)
+            mode = (
+                describe_px4_mode(heartbeat.custom_mode)
+                if heartbeat.autopilot == _PX4
+                else describe_plane_mode(heartbeat.custom_mode)
+            )
             if mode != last_mode:
                 yield ModeChange(time, *mode)
                 last_mode = mode
 
-    def _missions(self) -> Iterable[LoggedMission]:
+    def _read_missions(self) -> Iterable[LoggedMission]:
         """Yield the missions whose items a station uploaded or downloaded."""
         rows: list[LoggedItem] = []
         total, begins_mission = 0, False
@@ -526,7 +530,7 @@ class VehicleMessages:
             heartbeat.autopilot == _PX4 for _, heartbeat in self._named_messages["HEARTBEAT"] if _is_vehicle(heartbeat)
         )
 
-    def _parameters(self) -> dict[str, float]:
+    def _read_parameters(self) -> dict[str, float]:
         """Return the last finite value of each parameter that the vehicle sent."""
         values: dict[str, float] = {}
         for _, message in self._named_messages.get("PARAM_VALUE", []):
@@ -535,7 +539,7 @@ class VehicleMessages:
                 values[name] = float(message.param_value)
         return values
 
-    def _program(self, heartbeat: Any) -> str:
+    def _find_program(self, heartbeat: Any) -> str:
         """Return ArduPilot's start message with its version, or the autopilot's name; "" if unknown."""
         for _, message in self._named_messages.get("STATUSTEXT", []):
             text = _decode_text(message.text)
@@ -568,6 +572,6 @@ def _make_px4_mission(logged: LoggedItemGroup, source: str, origin: str) -> Logg
 
     Return None if the mission is complete but has fewer than two items.
     """
-    mission = Mission(None, px4_items(logged.items), source=f"{source}: {origin}")
+    mission = Mission(None, renumber_px4_items(logged.items), source=f"{source}: {origin}")
     end = max(logged.total, mission.items[-1].seq)
     return without_gaps(LoggedMission(logged.time, mission, origin), logged.total, end)

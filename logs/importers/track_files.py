@@ -37,7 +37,7 @@ MAX_BYTES = 256 * 2**20
 _DOCUMENT_TYPE = re.compile(r"<!(DOCTYPE|ENTITY)", re.IGNORECASE)
 
 
-def track_text(path: Path, *, xml: bool) -> str:
+def read_track_text(path: Path, *, xml: bool) -> str:
     """Read the text of a track file; bytes that are not UTF-8 are replaced.
 
     In a zipped file (`.kmz`) the first `.kml` is read.  Raises LogError for a file of more than `MAX_BYTES`, and for
@@ -82,7 +82,7 @@ def _read_bytes(path: Path) -> bytes:
     return data
 
 
-def _earliest_time(stamps: NDArray[np.float64]) -> float:
+def _find_earliest_time(stamps: NDArray[np.float64]) -> float:
     """Return the earliest of a track's times, s, ignoring times `MAX_TIME_S` or more from the median.
 
     stamps: times, s, (n,).
@@ -100,7 +100,7 @@ GPX = "GPX track"
 
 def read_gpx(path: Path) -> RawLog:
     """Read a GPX track.  Raises LogError for a track with fewer than two points that have a time."""
-    text = track_text(path, xml=True)
+    text = read_track_text(path, xml=True)
     try:
         gpx = gpxpy.parse(text)
     except (gpxpy.gpx.GPXException, ValueError) as error:
@@ -114,7 +114,7 @@ def read_gpx(path: Path) -> RawLog:
     # Times without a zone are UTC, the zone of all times in the format.
     times = [point.time if point.time.tzinfo else point.time.replace(tzinfo=UTC) for point in timed if point.time]
     stamps = np.array([time.timestamp() for time in times])
-    start = _earliest_time(stamps)
+    start = _find_earliest_time(stamps)
     up = [math.nan if point.elevation is None else point.elevation for point in timed]
     values = np.array([[point.latitude, point.longitude, height] for point, height in zip(timed, up, strict=True)])
     return RawLog(
@@ -179,7 +179,7 @@ def read_igc(path: Path) -> RawLog:
 
     The altitude is the GNSS altitude if most fixes have one, otherwise the pressure altitude.
     """
-    lines = re.split(r"\r\n|\n|\r", track_text(path, xml=False))
+    lines = re.split(r"\r\n|\n|\r", read_track_text(path, xml=False))
     rows, unreadable = _parse_fixes(lines)
     if len(rows) < 2:
         raise LogError(f"{path}: {len(rows)} fixes (B records); expected at least 2", file=path)
@@ -308,15 +308,15 @@ def read_kml(path: Path) -> RawLog:
     Raises LogError for a file with fewer than two positions with a time.
     """
     try:
-        root = ElementTree.fromstring(track_text(path, xml=True))
+        root = ElementTree.fromstring(read_track_text(path, xml=True))
     except (ElementTree.ParseError, ValueError) as error:
         raise LogError(f"{path}: not a readable KML file: {' '.join(str(error).split())[:120]}", file=path) from error
     rows, unreadable, mode = [], 0, "clampToGround"
     for track in root.iter():
-        if _local_name(track) != "Track":
+        if _get_local_name(track) != "Track":
             continue
-        mode = next((str(child.text).strip() for child in track if _local_name(child) == "altitudeMode"), mode)
-        pairs, unpaired_count = _time_position_pairs(track, path)
+        mode = next((str(child.text).strip() for child in track if _get_local_name(child) == "altitudeMode"), mode)
+        pairs, unpaired_count = _pair_times_with_positions(track, path)
         unreadable += unpaired_count
         for when, coord in pairs:
             row = _parse_position(when, coord)
@@ -325,14 +325,14 @@ def read_kml(path: Path) -> RawLog:
             else:
                 rows.append(row)
     if len(rows) < 2:
-        lines = sum(_local_name(element) == "LineString" for element in root.iter())
+        lines = sum(_get_local_name(element) == "LineString" for element in root.iter())
         reason = f"; the file also has {count_text(lines, 'line')} without times" if lines else ""
         raise LogError(
             f"{path}: only {count_text(len(rows), 'position')} with a time (gx:Track); at least 2 are needed{reason}",
             file=path,
         )
     table = np.array(rows)
-    start = _earliest_time(table[:, 0])
+    start = _find_earliest_time(table[:, 0])
     datum: VerticalDatum = "amsl" if mode == "absolute" else "unstated"
     return RawLog(
         source=str(path),
@@ -348,18 +348,20 @@ def read_kml(path: Path) -> RawLog:
     )
 
 
-def _local_name(element: ElementTree.Element) -> str:
+def _get_local_name(element: ElementTree.Element) -> str:
     """Return the name of an element without its namespace, which may be Google's, OGC's or none."""
     return element.tag.rpartition("}")[2] if isinstance(element.tag, str) else ""
 
 
-def _time_position_pairs(track: ElementTree.Element, path: Path) -> tuple[list[tuple[str, str]], int]:
+def _pair_times_with_positions(track: ElementTree.Element, path: Path) -> tuple[list[tuple[str, str]], int]:
     """Return the pairs of time and position of a track as texts, and the number of unpaired elements.
 
     Either all times come before all positions, or each time comes before its position.  Raises LogError if the numbers
     of times and positions differ in the first case.
     """
-    elements = [(_local_name(child), child.text or "") for child in track if _local_name(child) in ("when", "coord")]
+    elements = [
+        (_get_local_name(child), child.text or "") for child in track if _get_local_name(child) in ("when", "coord")
+    ]
     times = [text for name, text in elements if name == "when"]
     positions = [text for name, text in elements if name == "coord"]
     last_time = max((k for k, (name, _) in enumerate(elements) if name == "when"), default=-1)

@@ -170,14 +170,14 @@ def series(name: str, role: str, along: Floats, values: ArrayLike, **options: An
     options: other fields of `Layer`.
     """
     column = np.asarray(values, dtype=np.float64)
-    rows = outline_rows(column, BLOCKS)
+    rows = find_outline_rows(column, BLOCKS)
     return Layer("line", name, role, along[rows], column[rows], **options)
 
 
 def filled_series(name: str, role: str, along: Floats, values: ArrayLike) -> Layer:
     """Make a layer like `series` does, filled between zero and the values."""
     column = np.asarray(values, dtype=np.float64)
-    rows = outline_rows(column, BLOCKS)
+    rows = find_outline_rows(column, BLOCKS)
     return Layer("band", name, role, along[rows], column[rows], np.zeros(len(rows)))
 
 
@@ -193,7 +193,7 @@ def join_with_gaps(parts: Sequence[Floats]) -> tuple[Floats, Floats]:
     return points[:, 0], points[:, 1]
 
 
-def saturation_band(is_saturated: NDArray[np.bool_], along: Floats, span: tuple[float, float]) -> Layer:
+def make_saturation_band(is_saturated: NDArray[np.bool_], along: Floats, span: tuple[float, float]) -> Layer:
     """Return a layer that shades the parts of a long axis in which a control is at its limit.
 
     is_saturated: True at rows where the control is at its limit, (t,).
@@ -208,7 +208,7 @@ def saturation_band(is_saturated: NDArray[np.bool_], along: Floats, span: tuple[
     return Layer("band", "held at its limit", "held", x, y, np.full(len(x), span[0]), quiet=True)
 
 
-def leg_marks(legs: NDArray[Any], along: Floats) -> tuple[tuple[float, str], ...]:
+def make_leg_marks(legs: NDArray[Any], along: Floats) -> tuple[tuple[float, str], ...]:
     """Return a mark at the start of each leg: its position along an axis, and the leg's name.
 
     legs: number of each row's leg in messages, (t,).
@@ -218,7 +218,7 @@ def leg_marks(legs: NDArray[Any], along: Floats) -> tuple[tuple[float, str], ...
     return tuple((float(along[row]), f"leg {legs[row]}") for row in starts)
 
 
-def outline_rows(values: ArrayLike, count: int) -> Indices:
+def find_outline_rows(values: ArrayLike, count: int) -> Indices:
     """Return the rows of the lowest and highest value of each of `count` blocks of a long series.
 
     A line through these rows has the same outline as the series.  All rows of a short series are returned.

@@ -15,10 +15,10 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs import theme
 from logs.views.charts import Label, LabelRank, Layer, LayerKind, LegendEntry, shorten
-from logs.views.drawing import WIDTH, clean_style, draw_legend, legend_handle, new_figure, write_label
+from logs.views.drawing import WIDTH, clean_style, draw_legend, make_legend_handle, new_figure, write_label
 from logs.views.failures import Failures, route_distance, route_samples, stop_rows
 from logs.views.labels import LabelPlacer
-from logs.views.scene import GroundGrid, SceneView, drawn_rows, exaggeration, ground_grid, scene_bounds
+from logs.views.scene import GroundGrid, SceneView, exaggeration, ground_grid, scene_bounds, select_drawn_rows
 from world.airspace.zones_on_map import zone_walls
 from world.arrays import Floats
 from world.terrain import Terrain
@@ -103,7 +103,7 @@ def draw_scene(view: SceneView) -> Figure:
         _draw_labels(setup, projection, route, failed, placer)
         name = shorten(setup.scenario.name, 60)
         scale_text = "true to scale" if projection.stretch == 1.0 else f"heights × {projection.stretch:g}"
-        viewer_side = _compass_name(projection.azimuth)
+        viewer_side = _name_compass_direction(projection.azimuth)
         axes.set_title(f"{name}: seen from the {viewer_side}, {scale_text}", fontweight="bold")
         draw_legend(figure, handles, _LEFT + 0.1, (_BOTTOM - 0.08) / float(figure.get_figheight()))
     return figure
@@ -131,7 +131,7 @@ def _make_projection(route: Floats, bounds: Floats, stretch: float, is_narrow: b
     return Projection(azimuth, np.array([*bounds.mean(axis=1), float(route[:, 2].mean())]), stretch)
 
 
-def _compass_name(azimuth: float) -> str:
+def _name_compass_direction(azimuth: float) -> str:
     """Return the name of the side from which a viewer looks, such as "south-west".
 
     azimuth: direction of the viewer, rad, counter-clockwise from east.
@@ -206,7 +206,7 @@ def _draw_ground(axes: Any, projection: Projection, grid: GroundGrid | None, bou
                 zorder=1,
             )
         )
-        return [_legend_handle("band", "level-ground", "no terrain: level at mid height")]
+        return [_make_legend_handle("band", "level-ground", "no terrain: level at mid height")]
     east, north = np.meshgrid(grid.east, grid.north)
     corners = projection.project(np.stack([east, north, grid.heights], axis=-1))
     cells = np.stack([corners[:-1, :-1], corners[:-1, 1:], corners[1:, 1:], corners[1:, :-1]], axis=2).reshape(-1, 4, 3)
@@ -263,7 +263,7 @@ def _draw_threats(axes: Any, projection: Projection, setup: FlightSetup, failed:
             dome = projection.project(threats.position[entered_index])[:2] + float(radii[entered_index]) * shape
             axes.add_patch(Polygon(dome, fill=False, edgecolor=theme.colour("fail"), linewidth=2.2, zorder=4.6))
         if indices.size:
-            handles.append(_legend_handle("band", kind, f"{kind}'s reach"))
+            handles.append(_make_legend_handle("band", kind, f"{kind}'s reach"))
     return handles
 
 
@@ -290,14 +290,16 @@ def _draw_zones(axes: Any, projection: Projection, setup: FlightSetup) -> list[A
                     zorder=3.3,
                 )
     kinds = {zone.kind for zone in zones}
-    handles = [_legend_handle("area", "zone", "zone to keep out of")] if "exclusion" in kinds else []
-    return handles + ([_legend_handle("line", "stay-in", "edge of a zone to stay in")] if "inclusion" in kinds else [])
+    handles = [_make_legend_handle("area", "zone", "zone to keep out of")] if "exclusion" in kinds else []
+    return handles + (
+        [_make_legend_handle("line", "stay-in", "edge of a zone to stay in")] if "inclusion" in kinds else []
+    )
 
 
-def _legend_handle(kind: LayerKind, role: str, text: str) -> Any:
+def _make_legend_handle(kind: LayerKind, role: str, text: str) -> Any:
     """Return the handle of a legend entry, drawn in the style of a role."""
     empty = np.zeros(0)
-    return legend_handle(LegendEntry(text, (Layer(kind, text, role, empty, empty),)))
+    return make_legend_handle(LegendEntry(text, (Layer(kind, text, role, empty, empty),)))
 
 
 def _find_hidden_points(projection: Projection, terrain: Terrain | None, points: Floats) -> NDArray[np.bool_]:
@@ -339,12 +341,18 @@ def _draw_paths(
             solid_capstyle="butt",
         )
     _draw_path(axes, projection, terrain, samples, theme.colour("planned"), 3.6, 5)
-    handles: list[Any] = [_legend_handle("line", "planned", "planned path")]
+    handles: list[Any] = [_make_legend_handle("line", "planned", "planned path")]
     if track is not None:
         _draw_path(
-            axes, projection, terrain, track.position[drawn_rows(track, _MAX_TRACK)], theme.colour("flown"), 1.2, 6
+            axes,
+            projection,
+            terrain,
+            track.position[select_drawn_rows(track, _MAX_TRACK)],
+            theme.colour("flown"),
+            1.2,
+            6,
         )
-        handles.append(_legend_handle("line", "flown", "flown track"))
+        handles.append(_make_legend_handle("line", "flown", "flown track"))
     corners = projection.project(route)
     placer.avoid(*projection.project(samples)[:, :2].T)
     axes.plot(
@@ -359,14 +367,16 @@ def _draw_paths(
     for waypoint in failed.waypoints:
         axes.plot(*corners[waypoint, :2], "o", markersize=12, mfc="none", mec=theme.colour("fail"), mew=2.2, zorder=7.5)
     if terrain is not None:
-        handles.append(_legend_handle("line", "pole", "waypoint above the ground"))
+        handles.append(_make_legend_handle("line", "pole", "waypoint above the ground"))
     failure_entries: tuple[tuple[object, LayerKind, str, str], ...] = (
         (failed.legs, "line", "failing-leg", "leg that fails a rule"),
         (failed.waypoints, "rings", "fail", "waypoint that fails a rule"),
         (failed.threats, "line", "fail", "threat that is entered"),
     )
     return handles + [
-        _legend_handle(kind, role, text) for failing_elements, kind, role, text in failure_entries if failing_elements
+        _make_legend_handle(kind, role, text)
+        for failing_elements, kind, role, text in failure_entries
+        if failing_elements
     ]
 
 

@@ -91,8 +91,8 @@ class LabelPlacer:
         for ring, distance_in_heights in enumerate(ring_distances):
             for direction_rank, direction in enumerate((prefer, *_DIRECTIONS)):
                 box = self._make_box(point_x, point_y, width, height, gap + distance_in_heights * height, direction)
-                order_cost = 0.0 if "bbox" in style else self._order_cost(box, point_x, point_y)
-                cost = self._box_cost(box) + order_cost + 0.05 * direction_rank + 1.5 * ring
+                order_cost = 0.0 if "bbox" in style else self._compute_order_cost(box, point_x, point_y)
+                cost = self._compute_box_cost(box) + order_cost + 0.05 * direction_rank + 1.5 * ring
                 if cost < best_cost:
                     best_box, best_cost, best_ring = box, cost, ring
         if optional and any(_do_overlap(best_box, other) for other in self.boxes):
@@ -144,7 +144,7 @@ class LabelPlacer:
             middle_y + 0.5 * height,
         )
 
-    def _order_cost(self, box: Box, x: float, y: float) -> float:
+    def _compute_order_cost(self, box: Box, x: float, y: float) -> float:
         """Return the cost of a label that stands in another order to near labels than their points do.
 
         A reader could assign such labels to the wrong points.  A framed label has a line to its point instead.
@@ -163,7 +163,7 @@ class LabelPlacer:
                 cost += _ORDER_COST
         return cost
 
-    def _box_cost(self, box: Box) -> float:
+    def _compute_box_cost(self, box: Box) -> float:
         """Return the cost of a box: 0 if it is free, more if it leaves the frame or covers labels or lines."""
         frame = self.axes.get_window_extent()
         cost = 0.0

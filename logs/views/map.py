@@ -9,7 +9,7 @@ import numpy as np
 from flight.simulation.track import Track
 from logs.verdict.verdict import Verdict
 from logs.views.charts import Json, Label, Layer, Panel, numbers, panel_json, shorten
-from logs.views.failures import Failures, fail_labels, failures, inside_threats, paths_differ, stop_rows
+from logs.views.failures import Failures, failures, find_rows_inside_threats, make_fail_labels, paths_differ, stop_rows
 from logs.views.threats_and_zones import threat_circles, threat_labels, zone_labels, zone_shapes
 from world.airspace.zones_on_map import zone_rings
 from world.arrays import Floats
@@ -134,16 +134,16 @@ def map_chart(
     layers: list[Layer] = []
     labels: list[Label] = []
     if route is not None:
-        layers += _path_layers(route, plan_waypoints, failed)
-    layers += [_track_layer(drawn_track) for drawn_track in tracks]
+        layers += _make_path_layers(route, plan_waypoints, failed)
+    layers += [_make_track_layer(drawn_track) for drawn_track in tracks]
     for drawn_track in tracks if failed.threats else ():
-        layers += _inside_threat_layers(scenario, drawn_track.track, failed)
+        layers += _make_inside_threat_layers(scenario, drawn_track.track, failed)
     if route is not None:
-        layers += _waypoint_layers(route, stops, failed, waypoint_texts)
+        layers += _make_waypoint_layers(route, stops, failed, waypoint_texts)
         centres = {k: (float(east), float(north)) for k, (east, north, _) in enumerate(scenario.threats.position)}
-        labels += fail_labels(failed, route[:, :2], centres)
+        labels += make_fail_labels(failed, route[:, :2], centres)
     labels += end_labels(scenario, route, stops)
-    labels += [] if route is None else _waypoint_labels(route, stops, failed)
+    labels += [] if route is None else _make_waypoint_labels(route, stops, failed)
     extent = map_extent(scenario, route, [drawn_track.track.position for drawn_track in tracks])
     return scenario_map(
         scenario, subject, layers, labels, extent, route=route, failing_threats=frozenset(failing_threats), winds=winds
@@ -172,7 +172,7 @@ def scenario_map(
     """
     east, north = extent
     area_layers = [
-        *_area_edge_layers(scenario),
+        *_make_area_edge_layers(scenario),
         *threat_circles(scenario.threats, route, failing_threats),
         *zone_shapes(scenario.zones),
     ]
@@ -182,7 +182,11 @@ def scenario_map(
     return MapChart(
         f"{shorten(scenario.name, 60)}: {subject}",
         Panel(
-            "north", "km", (*area_layers, *layers, *_end_markers(scenario, route)), span=north, labels=(*labels, *names)
+            "north",
+            "km",
+            (*area_layers, *layers, *_make_end_markers(scenario, route)),
+            span=north,
+            labels=(*labels, *names),
         ),
         east,
         north,
@@ -229,7 +233,7 @@ def map_extent(scenario: Scenario, route: Floats | None, paths: Sequence[Floats]
     return (west, east), (south, north)
 
 
-def _area_edge_layers(scenario: Scenario) -> list[Layer]:
+def _make_area_edge_layers(scenario: Scenario) -> list[Layer]:
     """Return the layer of the edge of the scenario's area; [] for a mission without a scenario.
 
     The bounds that planfly makes around such a mission do not limit the flight.
@@ -242,7 +246,7 @@ def _area_edge_layers(scenario: Scenario) -> list[Layer]:
     return [Layer("line", "edge of the area", "area", x, y, quiet=True)]
 
 
-def _path_layers(route: Floats, plan: Floats | None, failed: Failures) -> list[Layer]:
+def _make_path_layers(route: Floats, plan: Floats | None, failed: Failures) -> list[Layer]:
     """Return the layers of the failing legs, of the plan if it differs from the route, and of the route."""
     has_different_plan = plan is not None and paths_differ(plan, route, 1.0)
     legs = [route[k : k + 2] for k in failed.legs]
@@ -253,7 +257,7 @@ def _path_layers(route: Floats, plan: Floats | None, failed: Failures) -> list[L
     return [*layers, Layer("line", name, "planned", route[:, 0], route[:, 1], quiet=True)]
 
 
-def _track_layer(drawn_track: DrawnTrack) -> Layer:
+def _make_track_layer(drawn_track: DrawnTrack) -> Layer:
     """Make the layer of a flown track, thinned to what a map can show."""
     count = len(drawn_track.track)
     rows = np.union1d(np.arange(0, count, max(1, count // _MAX_POINTS)), [count - 1])
@@ -261,16 +265,16 @@ def _track_layer(drawn_track: DrawnTrack) -> Layer:
     return Layer("line", drawn_track.label, drawn_track.role, east, north, flight=drawn_track.flight)
 
 
-def _inside_threat_layers(scenario: Scenario, track: Track, failed: Failures) -> list[Layer]:
+def _make_inside_threat_layers(scenario: Scenario, track: Track, failed: Failures) -> list[Layer]:
     """Return the layer of the part of a track inside a threat whose rule fails, if any."""
-    is_inside = inside_threats(failed, scenario.threats, track)
+    is_inside = find_rows_inside_threats(failed, scenario.threats, track)
     if not is_inside.any():
         return []
     east, north = np.where(is_inside, track.position[:, :2].T, np.nan)
     return [Layer("line", "flown inside a threat's reach", "inside", east, north, quiet=True)]
 
 
-def _waypoint_layers(
+def _make_waypoint_layers(
     route: Floats, stops: Sequence[int], failed: Failures, texts_by_waypoint: Sequence[str]
 ) -> list[Layer]:
     """Make the layers of waypoints, and of waypoints that fail a rule."""
@@ -286,17 +290,17 @@ def _waypoint_layers(
     return layers
 
 
-def _named_ends(scenario: Scenario, route: Floats | None) -> tuple[tuple[str, Floats], tuple[str, Floats]]:
+def _name_ends(scenario: Scenario, route: Floats | None) -> tuple[tuple[str, Floats], tuple[str, Floats]]:
     """Return start and destination, by name: the ends of the route, or the scenario's without a route."""
     first, last = (scenario.start, scenario.destination) if route is None else (route[0], route[-1])
     return ("start", first), ("destination", last)
 
 
-def _end_markers(scenario: Scenario, route: Floats | None) -> list[Layer]:
+def _make_end_markers(scenario: Scenario, route: Floats | None) -> list[Layer]:
     """Make the markers of start and destination."""
     return [
         Layer("dots", name, name, point[:1], point[1:2], hover_texts=(name,))
-        for name, point in _named_ends(scenario, route)
+        for name, point in _name_ends(scenario, route)
     ]
 
 
@@ -305,7 +309,7 @@ def end_labels(scenario: Scenario, route: Floats | None, stops: Sequence[int]) -
 
     stops: number of each waypoint of the route.
     """
-    ends = _named_ends(scenario, route)
+    ends = _name_ends(scenario, route)
     numbers_of_ends = ("", "") if route is None else (stops[0], stops[-1])
     start, destination = (
         Label(f"{stop} {name}".strip(), float(point[0]), float(point[1]), "end")
@@ -321,7 +325,7 @@ def _are_close(first: Floats, second: Floats) -> bool:
     return float(np.hypot(*(first[:2] - second[:2]))) < 50.0
 
 
-def _waypoint_labels(route: Floats, stops: Sequence[int], failed: Failures) -> list[Label]:
+def _make_waypoint_labels(route: Floats, stops: Sequence[int], failed: Failures) -> list[Label]:
     """Return the numbers of waypoints as labels: at most `_MAX_NUMBERS`, and all that fail a rule.
 
     Waypoints at start and destination are left out.

@@ -44,9 +44,9 @@ def threat_circles(threats: Threats, route: Floats | None, failing_threats: froz
         kill_radius = float(threats.kill_radius[k])
         detection_radius = float(threats.detection_radius[k])
         center = threats.position[k, :2]
-        texts = (_threat_text(name, kill_radius, detection_radius),)
+        texts = (_describe_threat(name, kill_radius, detection_radius),)
         if detection_radius > 0.0:
-            x, y = circle_points(center, detection_radius)
+            x, y = make_circle_points(center, detection_radius)
             radars.append(
                 Layer(
                     "line",
@@ -59,10 +59,10 @@ def threat_circles(threats: Threats, route: Floats | None, failing_threats: froz
                 )
             )
         if radius_at_path[k] > 0.0:
-            x, y = circle_points(center, float(radius_at_path[k]))
+            x, y = make_circle_points(center, float(radius_at_path[k]))
             sections.append(Layer("area", name, "missile-reach", x, y, legend=section_name, hover_texts=texts))
         if kill_radius > 0.0:
-            x, y = circle_points(center, kill_radius)
+            x, y = make_circle_points(center, kill_radius)
             is_entered = k in failing_threats
             legend = "threat that is entered" if is_entered else "missile: circle of its sphere"
             missiles.append(Layer("line", name, "fail" if is_entered else "missile", x, y, quiet=True, legend=legend))
@@ -70,7 +70,7 @@ def threat_circles(threats: Threats, route: Floats | None, failing_threats: froz
     return (*radars, *sections, *missiles, *units)
 
 
-def _threat_text(name: str, kill_radius: float, detection_radius: float) -> str:
+def _describe_threat(name: str, kill_radius: float, detection_radius: float) -> str:
     """Return the hover text of a threat: its name and the radii of its spheres."""
     return "\n".join(
         [
@@ -81,7 +81,7 @@ def _threat_text(name: str, kill_radius: float, detection_radius: float) -> str:
     )
 
 
-def circle_points(center: Floats, radius: float) -> tuple[Floats, Floats]:
+def make_circle_points(center: Floats, radius: float) -> tuple[Floats, Floats]:
     """Return the east and north coordinates of the points of a closed circle, (73,) each."""
     return center[0] + radius * np.cos(_CIRCLE_ANGLES_RAD), center[1] + radius * np.sin(_CIRCLE_ANGLES_RAD)
 
@@ -115,7 +115,7 @@ def kill_radius_at_path(threats: Threats, indices: NDArray[np.intp], route: Floa
     return section_radii
 
 
-def sphere_cuts(center: Floats, radius: float, points: Floats) -> tuple[Floats, Floats]:
+def cut_sphere(center: Floats, radius: float, points: Floats) -> tuple[Floats, Floats]:
     """Return the altitude of the lower and upper surface of a sphere at each point, m AMSL, (s,) each.
 
     Both are NaN at points outside the sphere's circle.
@@ -203,7 +203,7 @@ def threat_cuts(
     )
     for kind, radii in (("radar", threats.detection_radius), ("missile", threats.kill_radius)):
         for k in np.flatnonzero((radii > 0.0) & (distances <= radii)):
-            lower, upper = sphere_cuts(threats.position[k], float(radii[k]), plane.points)
+            lower, upper = cut_sphere(threats.position[k], float(radii[k]), plane.points)
             samples_inside = np.flatnonzero(np.isfinite(upper))
             if not samples_inside.size:
                 continue
@@ -231,7 +231,7 @@ def entered_cuts(
     layers, label_positions = [], {}
     for place in failed.threats:
         k = place.index or 0
-        lower, upper = sphere_cuts(threats.position[k], threat_radius(threats, place), plane.points)
+        lower, upper = cut_sphere(threats.position[k], threat_radius(threats, place), plane.points)
         if not np.isfinite(upper).any():
             continue
         legend = "threat that is entered"
@@ -257,14 +257,14 @@ def zone_text(zone: Zone) -> str:
     name = shorten(zone.name, 24)
     if zone.floor is not None and zone.ceiling is not None:
         if zone.floor.datum == zone.ceiling.datum:
-            return f"{name}, {zone.floor.height:g} to {_level_text(zone.ceiling)}"
-        return f"{name}, {_level_text(zone.floor)} to {_level_text(zone.ceiling)}"
+            return f"{name}, {zone.floor.height:g} to {_format_level(zone.ceiling)}"
+        return f"{name}, {_format_level(zone.floor)} to {_format_level(zone.ceiling)}"
     if zone.floor is not None:
-        return f"{name}, above {_level_text(zone.floor)}"
-    return name if zone.ceiling is None else f"{name}, below {_level_text(zone.ceiling)}"
+        return f"{name}, above {_format_level(zone.floor)}"
+    return name if zone.ceiling is None else f"{name}, below {_format_level(zone.ceiling)}"
 
 
-def _level_text(level: ZoneLevel) -> str:
+def _format_level(level: ZoneLevel) -> str:
     """Return an altitude limit of a zone as text, with its datum."""
     return f"{level.height:g} m {'AMSL' if level.datum == 'amsl' else 'above ground'}"
 

@@ -78,11 +78,11 @@ def ground_risk(
     )
     with stage("flying", "flying for the ground risk") as advance:
         result = find_ground_risk(base, goal, workers_used, advance)
-    command = answer_command_line("ground-risk", target, base, options, _goal_options(goal))
+    command = answer_command_line("ground-risk", target, base, options, _list_goal_options(goal))
     return result if out is None else _write_files(result, Path(out), command, overwrite=overwrite)
 
 
-def _goal_options(goal: GroundRiskGoal) -> dict[str, object]:
+def _list_goal_options(goal: GroundRiskGoal) -> dict[str, object]:
     """Return the command-line options that reproduce a goal: value of each option, by name."""
     return {
         "population": goal.population,

@@ -106,17 +106,17 @@ def _open_base(
     return base
 
 
-def _command_line_target(target: Plan | Scenario | str | Path, folder: Path) -> str:
+def _name_command_line_target(target: Plan | Scenario | str | Path, folder: Path) -> str:
     """Return the target of a campaign as text for the command line that repeats the campaign.
 
     The text of a `Plan` is the path of its file in `folder`.  A `Scenario` is written to a file there.
     """
     if isinstance(target, Plan):
         return str(folder / "plan.json")
-    return _scenario_file(target, folder) if isinstance(target, Scenario) else str(target)
+    return _write_scenario_file(target, folder) if isinstance(target, Scenario) else str(target)
 
 
-def _scenario_file(scenario: Scenario, folder: Path) -> str:
+def _write_scenario_file(scenario: Scenario, folder: Path) -> str:
     """Write a scenario into a campaign's folder, for the command line that repeats it; return the path.
 
     For a scenario made around a mission, nothing is written, and its name is returned.
@@ -127,7 +127,7 @@ def _scenario_file(scenario: Scenario, folder: Path) -> str:
     return str(folder / SCENARIO_FILE)
 
 
-def _command_line_options(
+def _list_command_line_options(
     base: CampaignBase, options: MissionOptions, spread: str | Path | None, folder: Path
 ) -> dict[str, object]:
     """Return the options of the command line that repeats a campaign, by name.
@@ -137,7 +137,9 @@ def _command_line_options(
     named_scenario = options.get("scenario")
     return {"seed": base.seed, "spread": spread} | {
         **select_mission_options(options),
-        "scenario": _scenario_file(named_scenario, folder) if isinstance(named_scenario, Scenario) else named_scenario,
+        "scenario": _write_scenario_file(named_scenario, folder)
+        if isinstance(named_scenario, Scenario)
+        else named_scenario,
         "fence": fence_file_names(options),
     }
 
@@ -274,9 +276,9 @@ def campaign(
         _warn_of_too_few_flights(goal)
         base = _open_base(target, options, _read_spread(spread), directory)
         repeated = campaign_command_line(
-            _command_line_target(target, directory.folder),
+            _name_command_line_target(target, directory.folder),
             goal,
-            _command_line_options(base, options, spread, directory.folder),
+            _list_command_line_options(base, options, spread, directory.folder),
         )
         return _fly_and_summarise(base, goal, workers_used, directory, repeated, keep=out is not None)
 
@@ -320,13 +322,13 @@ def campaign_flight(
     goal = continued_goal(folder, options["flights"], options["prove"], options["at_least"], options["confidence"])
     directory = OutputDirectory(folder, CAMPAIGN_DATABASE, resume=True, overwrite=False)
     base = _open_base(target, options, _read_spread(options["spread"]), directory)
-    row = _flight_row(base, goal, folder, index)
+    row = _read_flight_row(base, goal, folder, index)
     log = folder / "flights" / f"flight-{index:06d}.mcap"
     log.parent.mkdir(exist_ok=True)
     return CampaignFlight(fly_row_again(base, row, log), log)
 
 
-def _flight_row(base: CampaignBase, goal: Goal, folder: Path, index: int) -> FlightRow:
+def _read_flight_row(base: CampaignBase, goal: Goal, folder: Path, index: int) -> FlightRow:
     """Read a flight from a campaign's table.
 
     Raises PlanflyError if the table has no flight with this index.
@@ -423,7 +425,9 @@ def winds(
             winds_found = find_winds(base, goal, workers_used, store, advance)
         if out is not None:
             repeated = winds_command_line(
-                _command_line_target(target, folder), goal, _command_line_options(base, options, spread, folder)
+                _name_command_line_target(target, folder),
+                goal,
+                _list_command_line_options(base, options, spread, folder),
             )
             write_winds(folder, base, winds_found, repeated)
     return winds_found

@@ -148,9 +148,9 @@ def export(
     if not files:
         raise PlanflyError("export: expected at least one file", field="files")
     targets = tuple(Path(file) for file in files)
-    chosen_autopilot = _chosen_autopilot(autopilot, params)
+    chosen_autopilot = _find_chosen_autopilot(autopilot, params)
     with contextlib.ExitStack() as temporary_folders:
-        path = _source_path(source, temporary_folders)
+        path = _find_source_path(source, temporary_folders)
         for target in targets:
             if target.suffix.lower() not in (*MAP_WRITERS, *PARAMETER_SUFFIXES, *LOG_SUFFIXES):
                 _check_suffix(target)
@@ -176,7 +176,7 @@ def export(
     return ExportedFiles(targets, notes, tuple(description for _, description in contents), loss)
 
 
-def _chosen_autopilot(autopilot: str | None, params: str | Path | None) -> str:
+def _find_chosen_autopilot(autopilot: str | None, params: str | Path | None) -> str:
     """Return the name of the autopilot that the user names, or for which a parameter file was written.
 
     Return "" without either.  Raises ArgumentError for an unknown autopilot, and ParameterError for a file that belongs
@@ -222,7 +222,9 @@ def _with_plan_notes(source: _SourceContent, autopilot: str, fence: FencePaths) 
     return replace(source, mission=mission, notes=tuple(notes))
 
 
-def _source_path(source: FlightLog | FlownMission | Plan | str | Path, temporary_folders: contextlib.ExitStack) -> Path:
+def _find_source_path(
+    source: FlightLog | FlownMission | Plan | str | Path, temporary_folders: contextlib.ExitStack
+) -> Path:
     """Return the path of a source's file.
 
     A plan is written to a file that exists while `temporary_folders` is open.  Raises PlanflyError for a flight without
@@ -368,7 +370,7 @@ def _make_target_content(source: _SourceContent, target: Path) -> tuple[str | by
     """Return the content of a target file, and a description of the content, such as "23 items"."""
     suffix, mission = target.suffix.lower(), source.mission
     if suffix in LOG_SUFFIXES and source.log is not None:
-        return _flight_content(source.log, suffix)
+        return _encode_flight(source.log, suffix)
     if suffix in MAP_WRITERS:
         descriptions = [*source.lines, *([count_text(len(source.zones), "zone")] if source.zones else [])]
         lines, zones = list(source.lines.values()), source.zones
@@ -377,7 +379,7 @@ def _make_target_content(source: _SourceContent, target: Path) -> tuple[str | by
             descriptions.append("returns")
         return MAP_WRITERS[suffix](source.name, lines, zones), " and ".join(descriptions)
     if suffix in PARAMETER_SUFFIXES and source.autopilot is not None:
-        return judging_parameters_text(mission, source.autopilot, has_own_parameters=source.has_own_parameters)
+        return format_judging_parameters(mission, source.autopilot, has_own_parameters=source.has_own_parameters)
     kind = mission_kind(target)
     if kind in _CONTENT_NAMES:
         count = len(mission.fences if kind == "fence" else mission.rally)
@@ -390,12 +392,12 @@ def _make_target_content(source: _SourceContent, target: Path) -> tuple[str | by
     if kind == "plan" and (mission.fences or mission.rally):
         extra = f", {count_text(len(mission.fences), 'fence item')}, {count_text(len(mission.rally), 'rally point')}"
     if kind == "plan":
-        airspeed, origin = _cruise_speed(source)
+        airspeed, origin = _find_cruise_speed(source)
         mission, extra = replace(mission, cruise_speed=airspeed), f"{extra}, cruiseSpeed {airspeed:.0f} m/s: {origin}"
     return mission_text(mission, kind), f"{count_text(len(mission.items), 'item')}{extra}"
 
 
-def _cruise_speed(source: _SourceContent) -> tuple[float, str]:
+def _find_cruise_speed(source: _SourceContent) -> tuple[float, str]:
     """Return the cruiseSpeed of a .plan, m/s, and a text on where it comes from.
 
     It is the mission's cruise speed, or else the airspeed at which planfly flies the mission.  Without a scenario or a
@@ -409,7 +411,7 @@ def _cruise_speed(source: _SourceContent) -> tuple[float, str]:
     return aircraft.airspeed, f"from the default aircraft {aircraft.name}; name yours with --aircraft"
 
 
-def judging_parameters_text(
+def format_judging_parameters(
     mission: Mission, autopilot: Autopilot, *, has_own_parameters: bool = True
 ) -> tuple[str, str]:
     """Return a parameter file for take-off, landing and returns, and a description of its content.
@@ -438,7 +440,7 @@ def judging_parameters_text(
     return parameters_text(values, title), f"{count_text(len(values), 'parameter')} of {autopilot.title}{omitted}"
 
 
-def _flight_content(log: FlightLog, suffix: str) -> tuple[str | bytes, str]:
+def _encode_flight(log: FlightLog, suffix: str) -> tuple[str | bytes, str]:
     """Return a flight in the log format with this suffix, and a description of the content."""
     description = f"{count_text(len(log.track), 'row')}, {log.end_time:.0f} s"
     if suffix == ".tlog":

@@ -16,7 +16,7 @@ from logs.importers.motion_log import read_motion
 from planfly.arguments import check_arguments
 from planfly.identification.base_numbers import base_model, scale_base_model
 from planfly.identification.checks import check_battery, check_commands, check_estimate, check_power
-from planfly.identification.folder import Identified, folder_files, make_identification
+from planfly.identification.folder import Identified, make_folder_files, make_identification
 from planfly.identification.model_text import check_base
 from planfly.identification.propulsion_check import PowerConflict
 from planfly.identification.records import (
@@ -25,10 +25,10 @@ from planfly.identification.records import (
     MIN_CHECK_SECONDS,
     MIN_HZ,
     MIN_SECONDS,
+    describe_recording_setting,
+    find_slowest_log_rate,
     flight_records,
     log_outputs,
-    recording_setting,
-    slowest_log_rate,
 )
 from planfly.identification.servos import ServoOutput, read_servos
 from planfly.identification.wide_quantities import WideQuantity, wide_quantities
@@ -143,12 +143,12 @@ def identify_aircraft(
     check_commands(records)
     log, _, outputs = log_parts[-1]
     with stage("estimating"):
-        has_fast_rows = all(slowest_log_rate(motion_log) >= MIN_HZ for motion_log, _, _ in log_parts)
+        has_fast_rows = all(find_slowest_log_rate(motion_log) >= MIN_HZ for motion_log, _, _ in log_parts)
         estimate = estimate_model(records, base_numbers, dynamics=has_fast_rows)
-        check_estimate(estimate, base_numbers, _unmixed_outputs(log, prior), log.source)
+        check_estimate(estimate, base_numbers, _find_unmixed_outputs(log, prior), log.source)
         check_power(estimate, records, base_numbers)
         identified = make_identification(prior, base_numbers, estimate, motion_logs, outputs, until)
-        files = folder_files(identified, target.name, (volts, energy))
+        files = make_folder_files(identified, target.name, (volts, energy))
     with stage("predicting"):
         predicted = score_predictions(estimate, checked or records, base_numbers, prior.name)
     with stage("drawing", "drawing an identification"):
@@ -161,7 +161,7 @@ def _make_result(
     aircraft: Aircraft, identified: Identified, predicted: PredictedLog, records: Sequence[FlightRecord]
 ) -> IdentifiedAircraft:
     """Return the result of an identification, with the performance and the deficiencies of the logs."""
-    climb, sink, power = _performance_intervals(identified)
+    climb, sink, power = _compute_performance_intervals(identified)
     return IdentifiedAircraft(
         aircraft=aircraft,
         estimate=identified.estimate,
@@ -267,7 +267,7 @@ def read_records_and_outputs(
     return flight_records(log, prior, used_outputs if is_same else None, min_seconds, end), used_outputs
 
 
-def _unmixed_outputs(log: MotionLog, prior: Aircraft) -> dict[str, int]:
+def _find_unmixed_outputs(log: MotionLog, prior: Aircraft) -> dict[str, int]:
     """Return the output number of each control that has its own servo output in the log.
 
     Logs of PX4 and tables of columns have none: they contain the controls themselves, not servo outputs.
@@ -298,7 +298,7 @@ def _report_page(identified: Identified, predicted: PredictedLog, check: str | P
         (title, unit, *interval)
         for (title, unit), interval in zip(
             (("climb at full throttle", "°"), ("sink at idle", "°"), ("power in level flight", "W")),
-            _performance_intervals(identified),
+            _compute_performance_intervals(identified),
             strict=True,
         )
     )
@@ -314,7 +314,7 @@ def _report_page(identified: Identified, predicted: PredictedLog, check: str | P
 
 def _find_wide_numbers(identified: Identified) -> tuple[WideQuantity, ...]:
     """Return those of the sink angle and the power that the logs determine only within a wide interval."""
-    _, sink, power = _performance_intervals(identified)
+    _, sink, power = _compute_performance_intervals(identified)
     return wide_quantities(sink, power, with_current=identified.estimate.with_current)
 
 
@@ -322,25 +322,25 @@ def _find_wide_numbers(identified: Identified) -> tuple[WideQuantity, ...]:
 Interval = tuple[float, float, float]
 
 
-def _performance_intervals(identified: Identified) -> tuple[Interval, Interval, Interval]:
+def _compute_performance_intervals(identified: Identified) -> tuple[Interval, Interval, Interval]:
     """Return the intervals of climb angle (deg), sink angle (deg) and power (W).
 
     Each is lower end, estimate and upper end (95 %).
     """
     best, samples = identified.performance()
 
-    def interval(value: Floats, sample_values: Floats, factor: float = 1.0) -> Interval:
+    def make_interval(value: Floats, sample_values: Floats, factor: float = 1.0) -> Interval:
         """Return the samples' 2.5 % quantile, the estimate and the 97.5 % quantile, times a factor."""
         lower, upper = np.percentile(sample_values, [2.5, 97.5])
         return factor * float(lower), factor * float(value[0]), factor * float(upper)
 
     degrees = math.degrees(1.0)
-    lower_power, power, upper_power = interval(best.power, samples.power)
+    lower_power, power, upper_power = make_interval(best.power, samples.power)
     if (conflict := identified.power_conflict()) is not None:
         upper_power = max(upper_power, conflict.largest_power)
     return (
-        interval(best.climb, samples.climb, degrees),
-        interval(best.sink, samples.sink, degrees),
+        make_interval(best.climb, samples.climb, degrees),
+        make_interval(best.sink, samples.sink, degrees),
         (lower_power, power, upper_power),
     )
 
@@ -356,5 +356,5 @@ def find_logs_without_current(records: Sequence[FlightRecord]) -> tuple[str, ...
 
 def find_slow_logs(logs: Sequence[MotionLog]) -> tuple[SlowLog, ...]:
     """Return the logs whose sensors or servo outputs have fewer than `AMPLE_HZ` rows per second."""
-    rates = [(log, slowest_log_rate(log)) for log in logs]
-    return tuple(SlowLog(log.source, rate, recording_setting(log)) for log, rate in rates if rate < AMPLE_HZ)
+    rates = [(log, find_slowest_log_rate(log)) for log in logs]
+    return tuple(SlowLog(log.source, rate, describe_recording_setting(log)) for log, rate in rates if rate < AMPLE_HZ)

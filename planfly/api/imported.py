@@ -12,7 +12,7 @@ from logs.recording.recorder import Recorder
 from logs.recording.recover import recover_log
 from logs.verdict.imported.model_comparison import Reflight
 from logs.verdict.judge_flight import judge_flight
-from logs.views.report.text import not_reflown_lines, refly_lines
+from logs.views.report.text import list_not_reflown, refly_lines
 from planfly.arguments import check_arguments
 from planfly.flight_options import LogOptions
 from planfly.kernel_units.unit_kernels import FLYING
@@ -176,7 +176,7 @@ def refly(
     lines: list[str] = []
     for number, reflight in enumerate(reflights, 1):
         lines += [*([] if number == 1 else [""]), *refly_lines(reflight)]
-    lines += not_reflown_lines(reflights, flight_log.setup.imported_log.stretches, MAX_REFLOWN_PARTS)
+    lines += list_not_reflown(reflights, flight_log.setup.imported_log.stretches, MAX_REFLOWN_PARTS)
     files: list[Path] = []
     if out is not None:
         folder = clean_folder(out, REFLY_FILES, overwrite=True)

@@ -55,7 +55,7 @@ def make_scenario(
     _check_terrain(tables.get("terrain"))
     base_scenario = load_scenario_with_options(base, {})
     spec = base_scenario.to_json()
-    for name, values in _plain_values(tables).items():
+    for name, values in _convert_to_plain_values(tables).items():
         is_merged = isinstance(values, Mapping) and isinstance(spec.get(name), dict) and name not in _POSITIONS
         spec[name] = _change_table(spec[name], values) if is_merged else values
     terrain_table, base_table = spec["terrain"], base_scenario.to_json()["terrain"]
@@ -89,12 +89,12 @@ def _check_terrain(table: Any) -> None:
             raise ArgumentError.of_argument(name, value, allowed, shown=f"array of shape {value.shape}")
 
 
-def _plain_values(values: Any) -> Any:
+def _convert_to_plain_values(values: Any) -> Any:
     """Convert numpy arrays and numbers in tables to lists and numbers of Python."""
     if isinstance(values, Mapping):
-        return {key: _plain_values(value) for key, value in values.items()}
+        return {key: _convert_to_plain_values(value) for key, value in values.items()}
     if isinstance(values, list | tuple):
-        return [_plain_values(value) for value in values]
+        return [_convert_to_plain_values(value) for value in values]
     return values.tolist() if isinstance(values, np.ndarray | np.generic) else values
 
 

@@ -123,7 +123,7 @@ class Optimiser:
             raise ArgumentError.of_argument("values, violations", values, allowed, shown="")
         if not self._levels:
             self._violation_count = violation_values.shape[1]
-            self._levels = _priority_levels(violation_values.shape[1], objective_values.shape[1])
+            self._levels = _make_priority_levels(violation_values.shape[1], objective_values.shape[1])
             self._scores = np.empty((0, scores.shape[1]))
         self.evaluations += len(points)
         self._update_front(points, scores)
@@ -279,7 +279,7 @@ def _parse_numbers(name: str, numbers: ArrayLike) -> Floats:
         raise ArgumentError.of_argument(name, type(numbers).__name__, "expected an array of numbers") from None
 
 
-def _priority_levels(violations: int, objectives: int) -> tuple[Level, ...]:
+def _make_priority_levels(violations: int, objectives: int) -> tuple[Level, ...]:
     """Return the priority levels by which scores are ranked: constraints with the goal 0, then objectives.
 
     violations, objectives: numbers of constraints and of objectives.

@@ -81,7 +81,10 @@ def plan(
     world = _with_budget(load_scenario_with_options(scenario, options), options["budget"])
     if waypoints is None:
         return _search_and_write(world, scenario, None, options, out, overwrite)
-    path, target = _check_waypoints(world, waypoints, options), _plan_target(world, scenario, options, out, overwrite)
+    path, target = (
+        _check_waypoints(world, waypoints, options),
+        _find_plan_target(world, scenario, options, out, overwrite),
+    )
     return _write_plan(make_given_plan(world, load_uav(world), choose_seed(world, options["seed"]), path), target)
 
 
@@ -103,7 +106,7 @@ def _check_waypoints(scenario: Scenario, waypoints: ArrayLike, options: PlanOpti
                 name, value, "cannot be combined with waypoints, because nothing is then searched"
             )
     expected = "expected an array (w, 3) of at least 2 rows: east, north and altitude AMSL, m"
-    coordinates = _coordinate_columns(waypoints)
+    coordinates = _select_coordinate_columns(waypoints)
     try:
         path = np.array(coordinates, dtype=np.float64)
     except (TypeError, ValueError):
@@ -127,7 +130,7 @@ def _check_waypoints(scenario: Scenario, waypoints: ArrayLike, options: PlanOpti
 _COLUMN_NAMES = (("east_m", "north_m", "amsl_m"), ("east", "north", "amsl"), ("east_m", "north_m", "up_amsl_m"))
 
 
-def _coordinate_columns(waypoints: Any) -> Any:
+def _select_coordinate_columns(waypoints: Any) -> Any:
     """Return the columns east, north and altitude of a data frame of waypoints, in this order.
 
     Anything without named columns is returned unchanged.  Raises ArgumentError for other names, whose order is unknown.
@@ -202,7 +205,7 @@ def _search_and_write(
     source: the scenario as the caller named it; its file must not be overwritten.
     flown_plan_and_leg: the plan being flown and the leg to plan from; None for a new plan.
     """
-    seed, target = choose_seed(world, options["seed"]), _plan_target(world, source, options, out, overwrite)
+    seed, target = choose_seed(world, options["seed"]), _find_plan_target(world, source, options, out, overwrite)
     uav, should_stop = load_uav(world), stop_condition(options["seconds"], options["stop"])
     with stage(f"planning {world.name}", "planning") as advance:
         plan = make_plan(
@@ -217,7 +220,7 @@ def _search_and_write(
     return _write_plan(plan, target)
 
 
-def _plan_target(
+def _find_plan_target(
     world: Scenario, source: Scenario | str | Path, options: PlanOptions, out: str | Path | None, overwrite: bool
 ) -> Path | None:
     """Return the file for a plan of a scenario; None to write no file."""
@@ -243,17 +246,17 @@ def stop_condition(seconds: float | None, stop: Callable[[], bool] | None) -> St
     "".  The time in which kernels are compiled does not count.
     """
 
-    def working_time() -> float:
+    def measure_working_time() -> float:
         """Return the time of the process without the compilation of kernels, s."""
         return time.monotonic() - COMPILE_TIMER.seconds
 
-    start = working_time()
+    start = measure_working_time()
 
     def should_stop() -> str:
         """Return the reason to stop the search now; "" to continue."""
         if stop is not None and stop():
             return "interrupted"
-        return "budget" if seconds is not None and working_time() - start >= seconds else ""
+        return "budget" if seconds is not None and measure_working_time() - start >= seconds else ""
 
     return should_stop
 

@@ -203,7 +203,7 @@ def _predict_by_controls(motion: MotionLog, aircraft: Aircraft, start: float | N
         f" {end:.1f} s, {DRAWS} flights each; the model's errors are drawn from"
         f" {count_text(before, 'window')} before {start:.1f} s"
     )
-    lines = (heading, *_band_lines(bands))
+    lines = (heading, *_format_band_lines(bands))
     return Predicted("controls", bands, DRAWS, count, start, end, motion.source, aircraft.name, heading, lines)
 
 
@@ -292,13 +292,13 @@ def _predict_by_mission(path: Path, aircraft: Aircraft, options: LogOptions) -> 
     name = str(aircraft.folder) if not aircraft.is_embedded else aircraft.name
     with stage("flying by draws") as advance:
         flights = fly_draws(setup, track, name, draw_flight_variations(aircraft), advance)
-    bands = _profile_bands(flights)
+    bands = _compute_profile_bands(flights)
     stretch = flights[0].stretch
     heading = (
         f"{path} by its mission: {stretch.mode} from {stretch.start:.1f} s to {stretch.end:.1f} s, {len(flights)} of"
         f" {DRAWS} flights with other aircraft, wind and turbulence; no band is fitted to the log"
     )
-    lines = (heading, *_band_lines(bands))
+    lines = (heading, *_format_band_lines(bands))
     ends = tuple(flights[0].ends.tolist())
     return Predicted(
         "mission",
@@ -315,7 +315,7 @@ def _predict_by_mission(path: Path, aircraft: Aircraft, options: LogOptions) -> 
     )
 
 
-def _profile_bands(flights: Sequence[Reflight]) -> tuple[Band, ...]:
+def _compute_profile_bands(flights: Sequence[Reflight]) -> tuple[Band, ...]:
     """Return the band of each quantity of simulated flights, over the distance along the legs."""
     flown_profile, bands = flights[0].flown, []
     for field, (name, unit, factor) in _PROFILE_QUANTITIES.items():
@@ -324,7 +324,7 @@ def _profile_bands(flights: Sequence[Reflight]) -> tuple[Band, ...]:
     return tuple(bands)
 
 
-def _band_lines(bands: Sequence[Band]) -> list[str]:
+def _format_band_lines(bands: Sequence[Band]) -> list[str]:
     """Return a line for each band: the fraction of the flight inside the band, and the band's width."""
     lines = []
     for band in bands:

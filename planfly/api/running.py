@@ -14,7 +14,7 @@ from flight.simulation.setup import EngineChoice
 from logs.recording.setup_attachments import package_versions
 from logs.verdict.judge_flight import judge_plan_only
 from logs.verdict.verdict import Verdict, verdict_json
-from planfly.api.exporting import judging_parameters_text
+from planfly.api.exporting import format_judging_parameters
 from planfly.api.flying import check_program
 from planfly.arguments import check_arguments
 from planfly.flight_options import RunOptions, load_scenario_with_options, option_defaults
@@ -266,7 +266,7 @@ def _record_round(task: _RunTask, plan: Plan, number: int) -> Round:
     for target in (folder / "mission.waypoints", folder / "mission.plan", *rally):
         write_atomically(target, mission_text(written, mission_kind(target)))
     if plan.procedures is not None and uav.autopilot.parameters is not None:
-        write_atomically(folder / "mission.parm", judging_parameters_text(mission, uav.autopilot)[0])
+        write_atomically(folder / "mission.parm", format_judging_parameters(mission, uav.autopilot)[0])
     if not plan.feasible:
         verdict = judge_plan_only(plan, planning_conditions(task.scenario, uav))
         write_atomically(folder / "verdict.json", verdict_json(verdict))

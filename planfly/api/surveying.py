@@ -302,12 +302,12 @@ def _write_results(result: SurveyResult, out: str | Path | None, overwrite: bool
             files.append(path)
         if remedy.kind == "parameter":
             path = folder / "parameter.param"
-            write_atomically(path, _remedy_parameter_file(result.setup, remedy))
+            write_atomically(path, _write_remedy_parameters(result.setup, remedy))
             files.append(path)
     return replace(result, files=tuple(files))
 
 
-def _remedy_parameter_file(setup: FlightSetup, remedy: SurveyRemedy) -> str:
+def _write_remedy_parameters(setup: FlightSetup, remedy: SurveyRemedy) -> str:
     """Return the text of the user's parameter file with the value of the remedy's parameter.
 
     If the scenario names no parameter file, the text contains only this parameter.

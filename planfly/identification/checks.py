@@ -132,13 +132,13 @@ def check_estimate(estimate: Estimate, base: BaseModel, outputs: dict[str, int],
             allowed = f"allowed {min_value:g}..{max_value:g}"
             message = f"{parameter.title} ({parameter.name}) = {value:.2f} is at its bound: {allowed}"
             raise LogError(f"{source}: {message}", file=source, field=parameter.name, value=value, allowed=allowed)
-    change, sd = mass_change(estimate, base)
+    change, sd = estimate_mass_change(estimate, base)
     if abs(change) > MAX_MASS_CHANGE and abs(change) > _MASS_CHANGE_SIGMAS * sd:
         message = f"the mass seems to change by {100.0 * change:+.0f} % within the logs; it must stay the same"
         raise LogError(f"{source}: {message}", file=source, value=change)
 
 
-def mass_change(estimate: Estimate, base: BaseModel) -> tuple[float, float]:
+def estimate_mass_change(estimate: Estimate, base: BaseModel) -> tuple[float, float]:
     """Return the change of mass within the logs, as a fraction of the mass, and its standard deviation.
 
     An aircraft that burns fuel or drops a load needs less and less angle of attack than its assumed mass requires.  The

@@ -26,7 +26,7 @@ _SLOPE_TIME_S = 25.0
 _START_HEIGHT_M = 150.0
 
 
-def identification_mission(
+def make_identification_mission(
     aircraft: Aircraft,
     envelope: Envelope,
     lat_deg: float,
@@ -77,7 +77,7 @@ def _lay_out_waypoints(
     """Yield east, north and altitude (m) of each waypoint, and the airspeed on the leg to it (m/s).
 
     start_altitude: altitude of the first waypoint, m AMSL.
-    repeats, max_rates: see `identification_mission`.
+    repeats, max_rates: see `make_identification_mission`.
     """
     cruise = aircraft.airspeed
     slow_speed = aircraft.airspeed_min + 0.15 * (cruise - aircraft.airspeed_min)

@@ -73,7 +73,7 @@ def _make_vehicle(
         system=SYSTEM,
         speed=speed,
     )
-    standby = standby_at_start(served_scenario.scenario)
+    standby = make_standby_at_start(served_scenario.scenario)
     return Vehicle(
         link,
         pool.spawn,
@@ -112,7 +112,7 @@ class _FlightPool:
         end_children([child for child in self._children if child.is_alive()], _CHILD_END_TIMEOUT_S)
 
 
-def standby_at_start(scenario: Scenario) -> Standby:
+def make_standby_at_start(scenario: Scenario) -> Standby:
     """Return state and home of a vehicle without a mission.
 
     The vehicle is at the scenario's start and heads for the destination.  Home is on the ground below the start, or at

@@ -19,12 +19,12 @@ class Certificate(NamedTuple):
     key: str
 
 
-def temporary_certificate() -> Certificate:
+def make_temporary_certificate() -> Certificate:
     """Return a new self-signed certificate for ``localhost``, with a new private key.
 
     The key is on the elliptic curve P-256.
 
-    >>> one, other = temporary_certificate(), temporary_certificate()
+    >>> one, other = make_temporary_certificate(), make_temporary_certificate()
     >>> one.certificate.splitlines()[0], one.key == other.key
     ('-----BEGIN CERTIFICATE-----', False)
     """

@@ -14,7 +14,7 @@ from typing import Any
 
 from logs.recording.reader import FlightLog, LogChannel, LogMessage, log_channels, log_messages
 from logs.recording.state_channel import EPOCH_NS
-from planfly.replays.certificates import temporary_certificate
+from planfly.replays.certificates import make_temporary_certificate
 from planfly.replays.origin_gate import HOST, VIEWERS, OriginGate
 from world.errors import FlightError
 from world.running_clock import RunningClock
@@ -69,7 +69,7 @@ def _start_server(foxglove: Any, name: str, broadcast: "_Broadcast", gate: Origi
 
     No page can bypass the gate, because no browser trusts the certificate of the server.
     """
-    certificate = temporary_certificate()
+    certificate = make_temporary_certificate()
     try:
         server = foxglove.start_server(
             name=name,

@@ -101,7 +101,7 @@ def _read_csv(path: Path) -> DataFile:
     # The names are given, so that a separator at the end of a row does not make its first cell an index.
     options = {"header": None, "names": names, "index_col": False, "skipinitialspace": True, "low_memory": False}
     table = pd.read_csv(StringIO(body), sep=separator, decimal=decimal, **options)
-    return DataFile(path, {str(name): _numbers_as_float64(table[name].to_numpy()) for name in table.columns}, units)
+    return DataFile(path, {str(name): _convert_numbers(table[name].to_numpy()) for name in table.columns}, units)
 
 
 def _is_remark(line: str, next_lines: list[str]) -> bool:
@@ -135,7 +135,7 @@ def _check_cell_counts(path: Path, rows: list[tuple[int, str]], separator: str, 
             )
 
 
-def _numbers_as_float64(values: Column) -> Column:
+def _convert_numbers(values: Column) -> Column:
     """Return numeric values as float64, and other values unchanged."""
     return values.astype(np.float64) if values.dtype.kind in "fiub" else values
 
@@ -157,29 +157,29 @@ def _read_mat(path: Path) -> DataFile:
     for name, value in variables.items():
         if not name.startswith("__"):
             labels = variables.get(f"{name}_label")
-            columns |= dict(_mat_columns(name, value, labels))
+            columns |= dict(_list_mat_columns(name, value, labels))
     return DataFile(path, columns)
 
 
-def _mat_columns(name: str, value: Any, labels: Any = None) -> Iterator[tuple[str, Column]]:
+def _list_mat_columns(name: str, value: Any, labels: Any = None) -> Iterator[tuple[str, Column]]:
     """Yield name and values of the columns of a MATLAB variable: a struct's fields or a matrix's columns.
 
     labels: names of a matrix's columns, if known.
     """
     if hasattr(value, "_fieldnames"):
         for field_name in value._fieldnames:
-            yield from _mat_columns(f"{name}.{field_name}", getattr(value, field_name))
+            yield from _list_mat_columns(f"{name}.{field_name}", getattr(value, field_name))
         return
     array = np.asarray(value)
     if array.dtype.names is not None:
         for field_name in array.dtype.names:
-            yield from _mat_columns(f"{name}.{field_name}", array[field_name])
+            yield from _list_mat_columns(f"{name}.{field_name}", array[field_name])
         return
     titles = [str(label) for label in np.atleast_1d(labels)] if labels is not None else []
-    yield from _array_columns(name, array, titles)
+    yield from _list_array_columns(name, array, titles)
 
 
-def _array_columns(name: str, array: Column, titles: list[str] | None = None) -> Iterator[tuple[str, Column]]:
+def _list_array_columns(name: str, array: Column, titles: list[str] | None = None) -> Iterator[tuple[str, Column]]:
     """Yield name and values of each column of an array; ignore arrays of more than two dimensions.
 
     An array of one dimension is one column.  The longer axis of a matrix is taken as its rows, unless the number of
@@ -197,7 +197,7 @@ def _array_columns(name: str, array: Column, titles: list[str] | None = None) ->
         )
         for k in range(rows.shape[1]):
             title = f"{name}.{titles[k]}" if has_titles and titles else f"{name}[{k}]"
-            yield from _array_columns(title, np.ascontiguousarray(rows[:, k]))
+            yield from _list_array_columns(title, np.ascontiguousarray(rows[:, k]))
 
 
 # ----------------------------------------------------------------------
@@ -212,7 +212,7 @@ def _read_parquet(path: Path) -> DataFile:
     columns = {}
     for name in table.column_names:
         values = table[name].to_numpy()
-        columns[name] = _numbers_as_float64(np.asarray(values))
+        columns[name] = _convert_numbers(np.asarray(values))
     return DataFile(path, columns)
 
 
@@ -231,9 +231,9 @@ def _read_hdf5(path: Path) -> DataFile:
             values = np.array("".join(chr(code) for code in values.ravel()))
         if values.dtype.names is not None:
             for field_name in values.dtype.names:
-                columns.update(_array_columns(f"{title}.{field_name}", np.squeeze(values[field_name])))
+                columns.update(_list_array_columns(f"{title}.{field_name}", np.squeeze(values[field_name])))
         else:
-            columns.update(_array_columns(title, np.squeeze(values)))
+            columns.update(_list_array_columns(title, np.squeeze(values)))
 
     with h5py.File(path, "r") as file:
         file.visititems(visit)

@@ -398,10 +398,10 @@ def _format_table(guesses: Sequence[_Guess], alternatives: Sequence[_Guess], fil
         parts += [f'frame = "{guess.frame}"'] if guess.frame else []
         parts += [f'clock = "{names[guess.clock]}"'] if guess.clock != main_clock else []
         lines.append(f"{guess.quantity} = {{ {', '.join(parts)} }}  # guess{guess.reason}")
-    return "\n".join([*lines, *_missing_lines(guesses), *_unused_lines(guesses, files)]) + "\n"
+    return "\n".join([*lines, *_format_missing_lines(guesses), *_format_unused_lines(guesses, files)]) + "\n"
 
 
-def _missing_lines(guesses: Sequence[_Guess]) -> Iterator[str]:
+def _format_missing_lines(guesses: Sequence[_Guess]) -> Iterator[str]:
     """Yield comment lines for the table: the needed and the optional quantities that were not found."""
     found_quantities = {guess.quantity for guess in guesses}
     substitutes = dict.fromkeys(ANGLES, QUATERNION[-1]) | {
@@ -423,7 +423,7 @@ def _missing_lines(guesses: Sequence[_Guess]) -> Iterator[str]:
         yield f"# Not found, and optional: {', '.join(remaining_quantities)}"
 
 
-def _unused_lines(guesses: Sequence[_Guess], files: dict[str, DataFile]) -> Iterator[str]:
+def _format_unused_lines(guesses: Sequence[_Guess], files: dict[str, DataFile]) -> Iterator[str]:
     """Yield a comment line for each file with columns that no guess uses."""
     used = {(guess.clock.file, guess.column) for guess in guesses} | {
         (guess.clock.file, guess.clock.column) for guess in guesses

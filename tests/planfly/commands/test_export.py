@@ -16,7 +16,7 @@ from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from flight.mission.items import Mission, MissionItem
 from flight.mission_files.formats import mission_text, read_mission
 from logs.recording.reader import read_log
-from planfly.api.exporting import judging_parameters_text
+from planfly.api.exporting import format_judging_parameters
 from planfly.cli import main
 from planner.plan import plan_json
 from tests.mission_lines import a_plan
@@ -147,7 +147,7 @@ def test_the_parameters_that_a_plan_is_judged_with(plan_file: Path, tmp_path: Pa
 
 def test_planflys_own_guidance_has_none_of_these_parameters() -> None:
     with pytest.raises(MissionError, match=r"^a\.waypoints: .* has no parameters of take-off, landing and returns$"):
-        judging_parameters_text(Mission(None, (), source="a.waypoints"), PlanflyGuidance())
+        format_judging_parameters(Mission(None, (), source="a.waypoints"), PlanflyGuidance())
 
 
 LANDING = """QGC WPL 110

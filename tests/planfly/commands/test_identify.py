@@ -18,7 +18,7 @@ from logs.views.report import identification
 from planfly.api import identifying
 from planfly.api.identifying import find_logs_without_current, find_slow_logs
 from planfly.cli import main
-from planfly.identification.records import MIN_HZ, slowest_log_rate
+from planfly.identification.records import MIN_HZ, find_slowest_log_rate
 from tests.aircraft.identification.flown_truth import TRUTH, flown_truth
 from tests.instrumented_flights import PX4_PARAMETERS, px4_topics, short_motion, write_motion, write_px4
 from tests.soak import SOAK
@@ -218,7 +218,7 @@ def test_logs_with_few_rows_are_named_with_what_records_more() -> None:
     (slow,) = find_slow_logs([thin])
     assert slow.setting == "LOG_BITMASK 65535"
     assert slow.hertz == pytest.approx(6.25)
-    assert slowest_log_rate(thin) < MIN_HZ
+    assert find_slowest_log_rate(thin) < MIN_HZ
 
 
 @pytest.mark.parametrize(("hertz", "dynamics"), [(50.0, True), (10.0, True), (9.6, True), (9.4, False)])
