@@ -41,6 +41,7 @@ class MappedFile:
     """
 
     def __init__(self, path: Path) -> None:
+        """Map a file into memory, to be read only."""
         with path.open("rb") as file:
             self._map = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
         self.data: Bytes = np.frombuffer(self._map, np.uint8)
@@ -345,7 +346,7 @@ def _walk_messages(
 ) -> tuple[Ints, Bytes]:
     """Find the requested messages up to byte `stop`, and return their starts (byte numbers) and types.
 
-    state: progress of the walk, by the indices above; the walk continues from it and updates it.
+    state: progress of the walk, indexed by `_NEXT_BYTE` and so on; the walk continues from it and updates it.
 
     lengths: length of each message type, bytes, (256,), updated by the FMT messages.
     counts: number of messages of each type, (256,), which is updated.
@@ -364,6 +365,7 @@ def _walk_messages(
     is_reading, is_cut = state[_IS_READING] == 1, state[_IS_CUT] == 1
     while k + header_bytes <= data_end and k < stop:
         length = 0
+        # Every message begins with these two bytes and its type.
         if data[k] == 0xA3 and data[k + 1] == 0x95:
             length = lengths[data[k + 2]]
         message_end = k + length

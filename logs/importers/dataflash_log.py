@@ -143,6 +143,7 @@ def find_program_and_vehicle(texts: Iterable[str], version: Messages) -> tuple[s
     for text in texts:
         if match := _PROGRAM.match(text):
             return text, _PROGRAMS[match.group(1)]
+    # VER.BT is the number of the vehicle, VER.FWS the name and version of the firmware.
     if version.has("BT") and len(version):
         text = version.texts("FWS")[0] if version.has("FWS") else ""
         return text, _BUILDS.get(int(version.column("BT")[0]), "unknown")
@@ -153,6 +154,7 @@ class _Reader:
     """Reader of one log, with a method for each part of `RawLog`."""
 
     def __init__(self, index: Dataflash, source: str) -> None:
+        """Take the index of a log and its path, and find the jumps of the log's clock."""
         self._index, self._source = index, source
         self._cache: dict[str, Messages] = {}
         self._clock = self._find_clock_shifts()

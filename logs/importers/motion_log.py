@@ -84,6 +84,7 @@ class _DataflashMotionReader:
     """Reader of the motion in one ArduPilot dataflash log."""
 
     def __init__(self, index: Dataflash, source: str, digest: str) -> None:
+        """Take the index of a log, its path, and the SHA-256 of its bytes."""
         self._index, self._source, self._digest = index, source, digest
 
     def read(self) -> MotionLog:

@@ -28,6 +28,7 @@ class MessageFormats:
     """
 
     def __init__(self, source: str) -> None:
+        """Start without formats and topics."""
         self._source = source
         self._formats: dict[str, list[tuple[str, int]]] = {}
         self._counts: dict[str, int] = {}

@@ -101,6 +101,7 @@ class _FormatCheckingFile:
     """
 
     def __init__(self, file: BinaryIO, source: str) -> None:
+        """Wrap an open file, whose path `source` is named in messages."""
         self._file, self._missing, self._letter = file, 0, b""
         self._formats = MessageFormats(source)
 
@@ -172,7 +173,7 @@ _IS_CUT = 4
 def _walk_records(data: Bytes, stop: int, state: Ints, letters: Bytes) -> None:
     """Walk over the records up to byte ``stop``, and count damaged places and lost bytes.
 
-    state: progress of the walk, by the indices above; the walk continues from it and updates it.
+    state: progress of the walk, indexed by `_NEXT_BYTE` and so on; the walk continues from it and updates it.
     letters: letters of all kinds of records.
     """
     is_known_letter = np.zeros(256, np.bool_)
@@ -231,6 +232,7 @@ class Topics:
     """
 
     def __init__(self, log: ULog, source: str, damage: Damage) -> None:
+        """Collect the instances of each topic that have rows, the first instance first."""
         self._log, self._source, self._damage = log, source, damage
         self._instances: dict[str, list[dict[str, Any]]] = {}
         for data in sorted(log.data_list, key=lambda data: int(data.multi_id)):
@@ -385,7 +387,7 @@ class Topics:
         data = self._data.get("vehicle_status", {})
         if "vehicle_type" in data:
             kinds = np.asarray(data["vehicle_type"])
-            # A VTOL is a copter at the beginning and the end of a flight.
+            # Type 2 is a fixed wing; a VTOL is a copter at the beginning and the end of a flight.
             if (kinds == 2).any():
                 return "plane"
             return _TYPES.get(int(kinds[0]), "unknown")

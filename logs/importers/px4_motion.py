@@ -169,7 +169,7 @@ def _read_airspeed(topics: Topics) -> tuple[Samples, Samples]:
 
     Rows whose airspeed is not from a sensor are left out.
     """
-    # Calibrated since 1.12, equivalent until then: equal at these speeds.
+    # PX4 logs calibrated airspeed since 1.12, and equivalent airspeed before; both are equal at these speeds.
     choices = [(speed, "true_airspeed_m_s") for speed in ("calibrated_airspeed_m_s", "equivalent_airspeed_m_s")]
     validated = topics.table("airspeed_validated", *choices)
     if validated is None:

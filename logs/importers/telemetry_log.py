@@ -191,6 +191,8 @@ class SystemMessages:
     """Messages sent by one system."""
 
     def __init__(self) -> None:
+        """Start without messages."""
+        # Time of reception (s since 1970) and the vehicle's own time (s; NaN if not stated) of each message.
         self._stamps, self._boots = array("d"), array("d")
         self._rows: dict[str, array[float]] = {}
         self._named: dict[str, list[tuple[int, Any]]] = {}

@@ -75,7 +75,7 @@ class Projection:
 
     @property
     def toward(self) -> Floats:
-        """Step towards the viewer in world axes, 1 m long on the ground."""
+        """Step towards the viewer to east, north and up, (3,), m; its horizontal length is 1 m."""
         return np.array([math.cos(self.azimuth), math.sin(self.azimuth), math.tan(_ELEVATION) / self.stretch])
 
 

@@ -83,7 +83,9 @@ def _collect_failed_rules(failed_findings: list[Finding], kind: PlaceKind, count
 
 
 def stop_rows(stops: Sequence[int]) -> list[int]:
-    """Return the index of the first waypoint of each stop; a loiter is one stop with several corners.
+    """Return the index of the first waypoint of each stop of a mission.
+
+    A stop is a place as numbered in messages; a loiter is one stop with several waypoints.
 
     stops: number of the stop of each waypoint, in flying order.
 
@@ -120,7 +122,7 @@ def paths_differ(first_path: Floats, second_path: Floats, tolerance: float) -> b
 
 
 def _compute_max_distance(points: Floats, path: Floats) -> float:
-    """Return the largest distance (m) of any of the points from the path."""
+    """Return the largest distance (m) of points (n, 3) from a path with corners (k, 3)."""
     start, step = path[:-1], np.diff(path, axis=0)
     length_square = (step**2).sum(axis=1)
     max_distance = 0.0

@@ -388,7 +388,10 @@ FIGURES = (
 def make_subject(
     setup: FlightSetup, track: Track | None, verdict: Verdict, returns: DrawnReturns | None = None
 ) -> Subject:
-    """Return the subject of the figures; a track without rows is omitted."""
+    """Collect the data that the figures of a flight or a plan show, with its fence and its radio link.
+
+    track: track of the flight; a track without rows counts as None, a plan that was not flown.
+    """
     track = track if track is not None and len(track) else None
     setup = with_fence_zones(setup)
     return Subject(setup, track, verdict, returns, compute_scenario_link(setup, track))

@@ -37,7 +37,11 @@ class RiskVolume(NamedTuple):
 
 
 def ground_risk_map(setup: FlightSetup, volumes: Sequence[RiskVolume], population: Population | None) -> MapChart:
-    """Return a map of the volumes, the largest last, over the population."""
+    """Make a map of the volumes of a mission's ground risk over the population.
+
+    volumes: volumes from the smallest to the largest.
+    population: None to draw no population.
+    """
     scenario, route = setup.scenario, setup.route.positions
     outline = shapely.get_coordinates(shapely.union_all([volume.area for volume in volumes]))
     extent = map_extent(scenario, route, [np.column_stack([outline, np.zeros(len(outline))])])

@@ -71,6 +71,7 @@ class Optimiser:
         rng: np.random.Generator,
         initial: Floats | None,
     ) -> None:
+        """Start a search; see `optimise` for the arguments."""
         self._scores: Floats = np.empty((0, 0))
         self._points: Floats = np.empty((0, lower.size))
         self._levels: tuple[Level, ...] = ()

@@ -103,7 +103,7 @@ class SurveyResult:
 
     @property
     def lost(self) -> bool:
-        """True if too much of a line is lost, or photos overlap less than required; False for unknown lines."""
+        """True if too much of a line is lost, or photos overlap less than required; unknown lines are ignored."""
         lines = [line for lines in self.lines for line in lines if not is_line_unknown(line)]
         return not all(map(is_line_usable, lines)) or any(overlap_faults(overlap) for overlap in self.overlaps)
 
@@ -302,12 +302,12 @@ def _write_results(result: SurveyResult, out: str | Path | None, overwrite: bool
             files.append(path)
         if remedy.kind == "parameter":
             path = folder / "parameter.param"
-            write_atomically(path, _write_remedy_parameters(result.setup, remedy))
+            write_atomically(path, _format_remedy_parameters(result.setup, remedy))
             files.append(path)
     return replace(result, files=tuple(files))
 
 
-def _write_remedy_parameters(setup: FlightSetup, remedy: SurveyRemedy) -> str:
+def _format_remedy_parameters(setup: FlightSetup, remedy: SurveyRemedy) -> str:
     """Return the text of the user's parameter file with the value of the remedy's parameter.
 
     If the scenario names no parameter file, the text contains only this parameter.

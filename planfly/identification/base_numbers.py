@@ -75,6 +75,7 @@ class _Probe:
     """JSBSim model of an aircraft, evaluated at chosen flow angles, angular rates and surface deflections."""
 
     def __init__(self, aircraft: Aircraft, variation: Variation | None = None) -> None:
+        """Trim an aircraft for level flight at cruise.  Raises FlightError if there is no such trim."""
         self._aircraft = aircraft
         self._fdm = fdm = Fdm(aircraft, variation=variation)
         read = fdm.properties.getter

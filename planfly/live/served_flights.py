@@ -149,6 +149,7 @@ class ServedFlights:
     """Factory of a flight process, which judges missions in the served scenario and opens flight logs."""
 
     def __init__(self, options: ServeOptions) -> None:
+        """Load the scenario of the options, with its UAV."""
         self._served = load_served_scenario(options)
         self._logs = options.logs
         # Uav with the parameters of the last judged mission.
@@ -275,6 +276,7 @@ class ServedLog:
     """Log of one served flight."""
 
     def __init__(self, path: Path, setup: FlightSetup, aircraft: Aircraft, mode: int) -> None:
+        """Open the log file of a flight in a mode, such as `AUTO`."""
         self._path, self._setup, self._aircraft = path, setup, aircraft
         self._verdict_basis = "flown" if mode == AUTO else f"flown in {MODE_NAMES[mode]}"
         self._recorder = Recorder(path, setup)

@@ -89,6 +89,7 @@ class _FlightPool:
     """Pool of flight processes; the vehicle requests another process when one has died."""
 
     def __init__(self, options: ServeOptions) -> None:
+        """Start with no process; `spawn` starts the processes."""
         self._options = options
         self._context = multiprocessing.get_context("spawn")
         self._children: list[multiprocessing.process.BaseProcess] = []

@@ -141,6 +141,7 @@ class _Broadcast:
     """
 
     def __init__(self, foxglove: Any, channels: list[LogChannel]) -> None:
+        """Make a Foxglove channel for each topic of the log."""
         self.context = foxglove.Context()
         self.listeners = 0
         self._channels = {

@@ -79,6 +79,7 @@ class ColumnLog:
     """
 
     def __init__(self, path: Path) -> None:
+        """Read the table of columns, and check that the data files have its columns."""
         table_path = path if is_column_table_name(path) else find_column_table(path)
         self.path, self.table_path = path, table_path
         self.table: LogTable = read_column_table(table_path)
@@ -124,7 +125,7 @@ class ColumnLog:
         return self.table.columns[quantity][0].unit
 
     def frame(self, quantity: str) -> str:
-        """Return the frame of the first entry of a quantity, or the default frame."""
+        """Return the frame (axes, such as "NED") of a quantity's first entry, or the default frame."""
         return self.table.columns[quantity][0].frame or QUANTITIES[quantity].frames[0]
 
     def series(self, quantity: str) -> Series:

@@ -105,9 +105,9 @@ def _read_csv(path: Path) -> DataFile:
 
 
 def _is_remark(line: str, next_lines: list[str]) -> bool:
-    """Return True if a line is a remark.
+    """Return True if a line of a CSV file is a remark, which begins with # or %.
 
-    A line that begins with # or % and has as many cells as the next line is the header instead.
+    If such a line has as many cells as the next line, it is the header instead.
     """
     if not line.lstrip().startswith(("#", "%")):
         return False

@@ -228,6 +228,7 @@ class _Folders:
     """Folders of a KML document."""
 
     def __init__(self, document: ElementTree.Element) -> None:
+        """Take the KML element to which folders are added."""
         self._document = document
         self._folder_by_name: dict[str, ElementTree.Element] = {}
 

@@ -95,6 +95,7 @@ class _MovingParts:
     """Trail, aircraft and numbers, which move over the map."""
 
     def __init__(self, figure: Figure, axes: Any, setup: FlightSetup, track: Track) -> None:
+        """Make the trail, the aircraft and the caption, which each frame draws again."""
         self._axes, self._figure, self._setup, self._track = axes, figure, setup, track
         look: dict[str, Any] = {"animated": True, "zorder": 9}
         (self._trail,) = axes.plot([], [], color=theme.colour("flown"), linewidth=1.6, **look)
