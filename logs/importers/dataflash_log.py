@@ -69,7 +69,7 @@ def make_dataflash_missions(
         position = (round_to_grid(lat), round_to_grid(lon), round(up, 6))
         item = MissionItem(int(number), int(command), int(frame), (p1, p2, p3, p4), *position)
         rows.append(LoggedItem(stamp, int(total) if 0.0 <= total <= _MAX_ITEMS else 0, item))
-    notes = () if has_frames else ("the log states no frames: heights are taken as above home",)
+    notes = () if has_frames else ("the log states no altitude frames: altitudes are taken as heights above home",)
     for logged in combine_items(rows):
         usable_mission = make_logged_mission(logged, source, "CMD")
         if usable_mission is not None:
@@ -371,7 +371,7 @@ class _Reader:
         else:
             baro = self._read_table("BARO", ("Alt",))
             if baro is not None:
-                yield HeightSource("BARO.Alt (above where it was switched on)", "unstated", baro)
+                yield HeightSource("BARO.Alt (above the power-up position)", "unstated", baro)
 
     def _read_modes(self) -> Iterable[ModeChange]:
         """Yield the mode changes; nothing for a log that states modes by name instead of number."""

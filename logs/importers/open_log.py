@@ -111,7 +111,7 @@ def open_log(path: Path) -> "RawLog":
     except AddressSpaceError:
         raise
     except MemoryError:
-        raise LogError(f"{path}: its stated size does not fit into memory", file=path) from None
+        raise LogError(f"{path}: the size stated in the file does not fit into memory", file=path) from None
 
 
 def detect_log_format(path: Path, head: bytes) -> LogFormat:
@@ -124,7 +124,7 @@ def detect_log_format(path: Path, head: bytes) -> LogFormat:
     ('.gpx', 'ArduPilot .BIN')
     """
     if re.search(_AS_TEXT, head, re.IGNORECASE):
-        raise LogError(f"{path}: a dataflash log converted to text; open the .BIN from which it was made", file=path)
+        raise LogError(f"{path}: a dataflash log converted to text; open the original .BIN", file=path)
     by_content = [log_type for log_type in FORMATS if re.search(log_type.content, head, re.DOTALL | re.IGNORECASE)]
     by_suffix = [log_type for log_type in FORMATS if _find_suffix(path) in log_type.suffixes]
     if not by_content and not by_suffix:

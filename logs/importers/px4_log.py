@@ -85,7 +85,7 @@ def open_topics(path: Path, names: list[str]) -> "Topics":
     except (AddressSpaceError, LogError):
         raise
     except MemoryError:
-        raise LogError(f"{path}: its stated size does not fit into memory", file=path) from None
+        raise LogError(f"{path}: the size stated in the file does not fit into memory", file=path) from None
     except Exception as error:  # of any kind: the library raises errors of struct, its own and plain ones
         reason = " ".join(str(error).split())[:120] or type(error).__name__
         raise LogError(f"{path}: not a readable PX4 log: {reason}", file=path) from error
@@ -93,7 +93,7 @@ def open_topics(path: Path, names: list[str]) -> "Topics":
 
 
 class _FormatCheckingFile:
-    """File for pyulog that checks the formats, and that corrects pyulog's backward seeks after short reads.
+    """File for pyulog that checks the formats and corrects pyulog's backward seeks after short reads.
 
     pyulog steps back by the stated length of a record even if fewer bytes were read, and would read the end of a
     damaged file again and again; this file steps back only by the bytes that were read.  pyulog first reads the three

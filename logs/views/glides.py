@@ -33,7 +33,7 @@ def glide_chart(setup: FlightSetup, drawn_returns: DrawnReturns, track: Track | 
     layers += path_layers(segments, _LOOKS, east_and_north, lambda point: _describe_glide(point.element, drawn_returns))
     impacts = np.array([glide.own_return.impact for glide in glides.each if glide.own_return.end == "ground"])
     if len(impacts):
-        name = f"where {glides.autopilot}'s own return comes down"
+        name = f"place where {glides.autopilot}'s own return meets the ground"
         layers.append(Layer("dots", name, "comes-down", impacts[:, 0], impacts[:, 1], quiet=True))
     names = tuple(site_text(site) for site in glides.sites)
     layers.append(

@@ -158,7 +158,7 @@ def draw_convergence(histories: Mapping[int, Mapping[str, Sequence[Floats]]]) ->
     >>> history = np.array([[1.4, 0.2, 1.0], [1.2, 0.0, 0.0], [1.1, 0.0, 0.0]])
     >>> figure = draw_convergence({30: {"umda": [history]}})
     >>> figure.axes[0].get_title(loc="left"), figure.axes[1].get_ylabel()
-    ('30 threats', 'length ratio of the safe ones')
+    ('30 threats', 'length ratio of safe paths')
     """
     count = len(histories)
     with clean_style():
@@ -193,7 +193,7 @@ def draw_convergence(histories: Mapping[int, Mapping[str, Sequence[Floats]]]) ->
                 )
             if column == 0:
                 upper.set_ylabel("runs with a safe path")
-                lower.set_ylabel("length ratio of the safe ones")
+                lower.set_ylabel("length ratio of safe paths")
         figure.text(0.012, 0.965, "Convergence over generations", fontsize=11, fontweight="bold")
         handles: list[Any] = [
             Line2D([], [], linewidth=1.8, label=name, **look) for name, look in zip(names, _LOOKS, strict=False)

@@ -82,8 +82,8 @@ def _check_terrain(table: Any) -> None:
     ):
         if isinstance(value, np.ndarray):
             allowed = (
-                'expected {"kind": "dem", "path": FILE}; np.savez("hills.npz", elevation=heights, xmin=, xmax=, ymin=,'
-                " ymax=) writes such a file of an array: rows from north to south, m, and its edges in degrees"
+                'expected {"kind": "dem", "path": FILE}; an array of heights (m, rows from north to south) with edges'
+                ' (degrees) is written to FILE by np.savez("hills.npz", elevation=heights, xmin=, xmax=, ymin=, ymax=)'
                 " (docs/your-dem.md)"
             )
             raise ArgumentError.of_argument(name, value, allowed, shown=f"array of shape {value.shape}")

@@ -108,7 +108,9 @@ class Optimiser:
         number of points that `ask` returned, or if the number of columns differs from the previous call.
         """
         if not self._is_asked:
-            raise ArgumentError.of_argument("values", values, "call ask() first, which returns their points", shown="")
+            raise ArgumentError.of_argument(
+                "values", values, "call ask() first; it returns the points to evaluate", shown=""
+            )
         points = self._search.ask()
         objective_values = _parse_columns("values", values, len(points))
         violation_values = (
@@ -241,7 +243,7 @@ def optimise(
     lower_bounds, upper_bounds = _parse_numbers("lower", lower), _parse_numbers("upper", upper)
     if lower_bounds.ndim != 1 or lower_bounds.shape != upper_bounds.shape or not lower_bounds.size:
         shapes = f"of shapes {lower_bounds.shape} and {upper_bounds.shape}"
-        raise ArgumentError.of_argument("lower, upper", lower, "expected two of shape (d,)", shown=shapes)
+        raise ArgumentError.of_argument("lower, upper", lower, "expected two arrays of shape (d,)", shown=shapes)
     if not (np.isfinite(lower_bounds) & np.isfinite(upper_bounds) & (lower_bounds < upper_bounds)).all():
         raise ArgumentError.of_argument("lower, upper", lower, "expected finite numbers, lower below upper", shown="")
     if not isinstance(model, str) or model not in _MODELS:

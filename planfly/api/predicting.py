@@ -284,7 +284,7 @@ def _predict_by_mission(path: Path, aircraft: Aircraft, options: LogOptions) -> 
         log = read_log(path)
         setup, track = log.setup, log.track
         if setup.imported_log is None:
-            message = f"{path}: flown by planfly itself: expected a log that `planfly import` wrote"
+            message = f"{path}: the flight was flown by planfly itself: expected a log that `planfly import` wrote"
             raise LogError(message, file=path)
     else:
         flight = read_imported(path, **options)

@@ -41,7 +41,7 @@ def serve_vehicle(
         host, port = link.address
         targets = ", ".join(f"{station}:{station_port}" for station, station_port in access.to)
         on_message(f"vehicle {SYSTEM} at {host}:{port}, calling {targets}; scenario {served_scenario.scenario.name}")
-        on_message(f"flight logs go to {options.logs}/; Ctrl-C ends")
+        on_message(f"flight logs are written to {options.logs}/; Ctrl-C ends")
         if served_scenario.mission is not None:
             vehicle.load(served_scenario.mission)
         elif served_scenario.fence or served_scenario.rally:

@@ -221,7 +221,7 @@ def _list_attitude_pairs(log: ColumnLog, grid: Floats) -> Iterator[_Pair]:
     for name, values in expected.items():
         if log.has(name):
             yield _Pair(name, "the change of roll, pitch and yaw", log.series(name), values)
-    yield _Pair("roll", "the turn that yaw shows", angles["roll"], yaw_change, exact=False, simultaneous=False)
+    yield _Pair("roll", "the turn rate from yaw", angles["roll"], yaw_change, exact=False, simultaneous=False)
 
 
 def _list_acceleration_pairs(log: ColumnLog, grid: Floats) -> Iterator[_Pair]:
@@ -378,7 +378,7 @@ def _check_delay(log: ColumnLog, pair: _Pair, grid: Floats) -> None:
     if pair.exact and not 1.0 / _MAX_RATIO <= ratio <= _MAX_RATIO:
         return
     if best > _SHIFTED_CORRELATION and is_better and abs(shift) >= _LATE_S:
-        message = f"comes {abs(shift):g} s {'after' if shift > 0.0 else 'before'} {pair.partner}"
+        message = f"{'lags' if shift > 0.0 else 'leads'} {pair.partner} by {abs(shift):g} s"
         raise _make_contradiction_error(log, pair.quantity, message, "check its clock (offset_s)")
 
 

@@ -216,7 +216,9 @@ class ColumnLog:
             return self.path
         if self.table.file is None:
             raise LogError(
-                f"{self.table_path}: file: missing; it names the data file", file=self.table_path, field="file"
+                f"{self.table_path}: file: missing; expected the path of the data file",
+                file=self.table_path,
+                field="file",
             )
         return self.table_path.parent / self.table.file
 

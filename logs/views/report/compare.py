@@ -295,7 +295,7 @@ def difference_lines(comparison: Comparison) -> list[str]:
 
 # Name of the chart of each picture, and its description.
 _PICTURES = {
-    "compare-map": ("map", "Both flights from above, over the first one's map"),
+    "compare-map": ("map", "Both flights from above, over the map of the first flight"),
     "compare-profile": (
         "along",
         "Height, height above ground, airspeed, bank, cross-track and throttle of both flights",

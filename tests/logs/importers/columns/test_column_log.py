@@ -47,7 +47,7 @@ def said(path: Path, read: Callable[[Path], object] = read_motion) -> str:
         ('column = "vn",', 'colum = "vn",', "columns.velocity_north.colum: unknown key: did you mean 'column'"),
         ('file = "flight.csv"', 'file = "other.csv"', "other.csv: no such file"),
         ('file = "flight.csv"', 'file = "flight.xlsx"', "suffix: .xlsx: expected .csv, .mat"),
-        ('file = "flight.csv"', "", "file: missing; it names the data file"),
+        ('file = "flight.csv"', "", "file: missing; expected the path of the data file"),
         ("\n[columns]", "rate = 50.0\n[columns]", "clocks.main.rate: 50 Hz: the times in t have 20 rows a second"),
         ('unit = "s"', 'unit = "fortnights"', "clocks.main.unit: fortnights: expected s, ms"),
         ('column = "t"', 'column = "tt"', "clocks.main.column: tt: no such column in flight.csv"),
@@ -162,8 +162,8 @@ def late(name: str, delay: float) -> np.ndarray:
         ),
         ({"tas": 0.0 * TIME + 18.0}, r"airspeed: tas is stuck at one value from 0 to 239.5 s, in flight"),
         ({"r": frozen("r", 50.0, 80.0)}, "yaw_rate: r is stuck at one value from 50 to 80 s, in flight"),
-        ({"vn": late("vn", 1.0)}, "velocity_north: vn comes 1 s after the change of latitude: check its clock"),
-        ({"lat": late("lat", 2.0)}, "velocity_north: vn comes 2 s before the change of latitude: check its clock"),
+        ({"vn": late("vn", 1.0)}, "velocity_north: vn lags the change of latitude by 1 s: check its clock"),
+        ({"lat": late("lat", 2.0)}, "velocity_north: vn leads the change of latitude by 2 s: check its clock"),
     ],
 )
 def test_a_file_that_is_wrong_is_refused_in_one_line(
