@@ -347,21 +347,15 @@ def _walk_messages(
     """Find the requested messages up to byte `stop`, and return their starts (byte numbers) and types.
 
     state: progress of the walk, indexed by `_NEXT_BYTE` and so on; the walk continues from it and updates it.
-
     lengths: length of each message type, bytes, (256,), updated by the FMT messages.
     counts: number of messages of each type, (256,), which is updated.
-    header_bytes: length of a message's header, bytes.
-    fmt_type: message type of FMT messages.
+    header_bytes: length of a message's header, bytes.  fmt_type: message type of FMT messages.
     max_trailing_bytes: largest number of bytes at the end that need not be a message.
     """
     starts, kinds = np.empty(1024, np.int64), np.empty(1024, np.uint8)
     found_count, data_end = 0, data.size
-    damaged_places, lost_bytes, k, last_end = (
-        state[_DAMAGED_PLACES],
-        state[_LOST_BYTES],
-        state[_NEXT_BYTE],
-        state[_LAST_END],
-    )
+    damaged_places, lost_bytes = state[_DAMAGED_PLACES], state[_LOST_BYTES]
+    k, last_end = state[_NEXT_BYTE], state[_LAST_END]
     is_reading, is_cut = state[_IS_READING] == 1, state[_IS_CUT] == 1
     while k + header_bytes <= data_end and k < stop:
         length = 0
@@ -394,13 +388,8 @@ def _walk_messages(
         if kind == fmt_type and message_end <= data_end:
             lengths[data[k + header_bytes]] = data[k + header_bytes + 1]
         k = last_end = message_end
-        is_cut = message_end > data_end
-        is_reading = True
-    state[_DAMAGED_PLACES], state[_LOST_BYTES], state[_NEXT_BYTE], state[_LAST_END] = (
-        damaged_places,
-        lost_bytes,
-        k,
-        last_end,
-    )
+        is_cut, is_reading = message_end > data_end, True
+    state[_DAMAGED_PLACES], state[_LOST_BYTES] = damaged_places, lost_bytes
+    state[_NEXT_BYTE], state[_LAST_END] = k, last_end
     state[_IS_READING], state[_IS_CUT] = is_reading, is_cut
     return starts[:found_count], kinds[:found_count]

@@ -343,15 +343,8 @@ def _draw_paths(
     _draw_path(axes, projection, terrain, samples, theme.colour("planned"), 3.6, 5)
     handles: list[Any] = [_make_legend_handle("line", "planned", "planned path")]
     if track is not None:
-        _draw_path(
-            axes,
-            projection,
-            terrain,
-            track.position[select_drawn_rows(track, _MAX_TRACK)],
-            theme.colour("flown"),
-            1.2,
-            6,
-        )
+        flown_positions = track.position[select_drawn_rows(track, _MAX_TRACK)]
+        _draw_path(axes, projection, terrain, flown_positions, theme.colour("flown"), 1.2, 6)
         handles.append(_make_legend_handle("line", "flown", "flown track"))
     corners = projection.project(route)
     placer.avoid(*projection.project(samples)[:, :2].T)

@@ -80,12 +80,8 @@ def profile_chart(
     zones, zone_labels = zone_bands(scenario.zones, plane)
     cuts, cut_names = threat_cuts(scenario.threats, plane, frozenset(failed.threat_names()))
     flown_layers, entered_positions = _make_flown_layers(scenario, route, track, failed, plane)
-    layers = [
-        *zones,
-        *cuts,
-        *make_ground_bands(scenario, plane),
-        *_mark_failing_legs(waypoint_distances, route, failed),
-    ]
+    layers = [*zones, *cuts, *make_ground_bands(scenario, plane)]
+    layers += _mark_failing_legs(waypoint_distances, route, failed)
     layers += [] if is_straight_line else [Layer("line", "planned", "planned", plane.kilometres, points[:, 2])]
     layers += flown_layers
     labels: list[Label] = []

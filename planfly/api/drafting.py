@@ -40,8 +40,7 @@ def new_scenario(
     terrain: an elevation file, a folder of tiles, or the name of a built-in terrain; None for flat ground.
     aircraft: a name, or a folder.  autopilot: see `planfly.fly`.
     overwrite: True replaces an existing scenario.
-    The area contains the straight line and a margin of a third of its length, within the coverage of the elevation
-    file.
+    The area is the straight line with a margin of a third of its length, as far as the elevation file covers it.
     Returns the file.  Raises a `planfly.PlanflyError` for bad input; then nothing is written.
 
     >>> import planfly, tempfile
@@ -64,8 +63,7 @@ def new_scenario(
         raster = None if raster_path is None else open_raster(raster_path)
         draft = make_draft(
             name,
-            endpoints[0],
-            endpoints[1],
+            *endpoints,
             height,
             raster=raster,
             terrain=raster_path,

@@ -133,8 +133,7 @@ def export(
     at: time of the flight, see `planfly.plan`; the files omit zones that are inactive at that time.
     scenario: scenario of a mission or plan, as for `planfly.fly`.
     aircraft: name or folder of the aircraft, whose cruise speed a .plan states, and to which the parameters apply.
-    autopilot: the autopilot for which a .plan is written (its firmwareType), and whose parameters a .parm contains;
-    None for the autopilot of the source.
+    autopilot: autopilot of a .plan (its firmwareType) and of the parameters in a .parm; None for that of the source.
     params: a file of this autopilot's parameters, which replaces the parameters of the source.
     overwrite: True replaces existing files.
     Raises a `planfly.PlanflyError` for bad input; then nothing is written.

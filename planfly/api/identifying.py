@@ -108,10 +108,8 @@ def identify_aircraft(
 ) -> IdentifiedAircraft:
     """Make the folder of an aircraft from flight logs of ArduPlane or PX4.
 
-    The folder contains a list of uncertain properties.
-
     logs: `.BIN` or `.ulg` of one aircraft with one mass, with inertial sensors and servo outputs.
-    folder: the folder to make.  overwrite: True replaces the folder of an aircraft.
+    folder: the folder to make, with a list of uncertain properties.  overwrite: True replaces an aircraft's folder.
     mass: mass in flight, kg.  span: wing span, m.  area: wing area, m^2; None takes the ratio of area to squared span
     from the base.
     battery: volts and capacity, "44.4V,888Wh"; None takes the battery of the base.

@@ -211,8 +211,7 @@ def optimise(
     initial: first points in the box, (population, d); None draws uniform points.
     Raises a `planfly.PlanflyError`, which is also a ValueError, for invalid bounds or another invalid argument.
 
-    Find the minimum of a bowl, at (1, 2).  With a constraint that excludes this point, the minimum is 0.5 at
-    (0.5, 1.5):
+    Find the minimum of a bowl, 0 at (1, 2).  A constraint that excludes this point makes it 0.5 at (0.5, 1.5):
 
     >>> import planfly
     >>> search = planfly.optimise([-5, -5], [5, 5], seed=1)
@@ -228,8 +227,7 @@ def optimise(
     >>> search.best.feasible, round(search.best.value, 1)
     (True, 0.5)
 
-    Find a path of eight waypoints past a wall with gaps of width 0.02, at 0.2 to each side.  Its length is 1.08 through
-    a gap, and 2.3 around the wall:
+    Find a path past a wall with two gaps, each 0.02 wide.  Its length is 1.08 through a gap, and 2.3 around the wall:
 
     >>> def length(across):
     ...     wall = abs(across[:, 3] + across[:, 4]) / 2

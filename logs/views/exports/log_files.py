@@ -88,7 +88,7 @@ def parquet_bytes(log: FlightLog) -> bytes:
 
 
 def battery_voltage(log: FlightLog) -> float:
-    """Return the battery's constant voltage, V: the aircraft's, or the mean from logged energy and current.
+    """Return the battery's constant voltage, V: the aircraft's, or the mean by logged energy and current.
 
     Returns NaN for an aircraft without a battery.
 
@@ -237,18 +237,14 @@ def _make_topics(log: FlightLog, rows: NDArray[np.int64]) -> list[_Topic]:
     true_airspeed, height_above_ground = track.airspeed[rows].astype(np.float64), track.clearance[rows]
     calibrated_airspeed = true_airspeed * np.sqrt(np.maximum(1.0 - _DENSITY_LAPSE_PER_M * up, 0.0) ** _DENSITY_EXPONENT)
     wind, battery = track.wind[rows], _make_battery_values(log, rows)
+    quaternions = compute_attitude_quaternion(track.attitude[rows])
 
     def make_topic(name: str, period: float, fields: list[tuple[Any, ...]], **values: Any) -> _Topic:
         """Make a topic with the timestamps of all rows."""
         return _Topic(name, period, fields, {"timestamp": stamp, **values})
 
     topics = [
-        make_topic(
-            "vehicle_attitude",
-            _EVERY_ROW_INTERVAL_S,
-            [("q", "<f4", 4)],
-            q=compute_attitude_quaternion(track.attitude[rows]),
-        ),
+        make_topic("vehicle_attitude", _EVERY_ROW_INTERVAL_S, [("q", "<f4", 4)], q=quaternions),
         make_topic("vehicle_angular_velocity", _EVERY_ROW_INTERVAL_S, [("xyz", "<f4", 3)], xyz=track.rates[rows]),
         make_topic(
             "vehicle_local_position",
