@@ -72,8 +72,8 @@ def profile_chart(
         points[:, 2] = _compute_planned_altitudes(
             waypoint_distances, route, above_ground, distance, points[:, 2], ground, scenario
         )
-    min_altitude, max_altitude = _choose_altitude_limits(scenario, route, track, ground)
-    plane = PathPlane(distance / 1000.0, points, ground, min_altitude, max_altitude)
+    altitude_span = _choose_altitude_limits(scenario, route, track, ground)
+    plane = PathPlane(distance / 1000.0, points, ground, *altitude_span)
     failed = failures(verdict, len(route))
     stops = range(len(route)) if stops is None else stops
     stop_starts = stop_rows(stops)
@@ -93,10 +93,8 @@ def profile_chart(
     layers += _mark_failing_waypoints(waypoint_distances, route, failed)
     corners = np.column_stack([waypoint_distances / 1000.0, route[:, 2]])
     labels = [*make_fail_labels(failed, corners, entered_positions), *labels, *cut_names, *zone_labels]
-    limits, note = _make_limit_lines(scenario, min_altitude, max_altitude)
-    panel = Panel(
-        "altitude", "m AMSL", tuple(layers), limits, span=(min_altitude, max_altitude), note=note, labels=tuple(labels)
-    )
+    limits, note = _make_limit_lines(scenario, *altitude_span)
+    panel = Panel("altitude", "m AMSL", tuple(layers), limits, span=altitude_span, note=note, labels=tuple(labels))
     return _make_chart(scenario, waypoint_distances, stop_starts, panel, is_straight=is_straight_line)
 
 
