@@ -86,7 +86,7 @@ def test_the_cruise_speed_of_a_plan_file_is_that_of_the_mission_or_the_aircraft(
     for source, more, speed, words in (
         ("m.waypoints", [], 25.0, "from the default aircraft aerosonde; name yours with --aircraft"),
         ("m.waypoints", ["--aircraft", "x8"], x8, "from x8"),
-        ("slow.waypoints", [], 19.0, "the mission's"),
+        ("slow.waypoints", [], 19.0, "from the mission"),
         ("m.waypoints", ["--scenario", "x8.toml"], x8, "from x8"),
         (str(log_file), [], 25.0, "from aerosonde"),
     ):
