@@ -33,7 +33,7 @@ from flight.dynamics.fdm import Fdm
 from flight.dynamics.trim import steady_flight
 from flight.simulation.track import Track
 from planfly.identification.base_numbers import base_model, scale_base_model
-from planfly.identification.folder import AMSL, DENSITY, folder_files, make_identification
+from planfly.identification.folder import AMSL, DENSITY, make_folder_files, make_identification
 from planfly.identification.records import flight_records
 from planfly.identification.servos import read_servos
 from tests.instrumented_flights import (
@@ -185,7 +185,7 @@ def verdict_of_too_steep(folder: Path, climb: float, estimate: Estimate, base: B
     found = make_identification(prior, base, estimate, [log], read_servos(prior.folder / "ardupilot.toml"))
     place = folder / "mine"
     place.mkdir()
-    for name, text in folder_files(found, "mine", (prior.battery_voltage, prior.battery_energy)).items():
+    for name, text in make_folder_files(found, "mine", (prior.battery_voltage, prior.battery_energy)).items():
         (place / name).write_text(text, encoding="utf-8")
     rise = 2000.0 * math.tan(_STEEP_SLOPE_RATIO * climb)
     lat, lon, ground = HOME

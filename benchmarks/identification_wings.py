@@ -26,8 +26,8 @@ from aircraft.identification.performance import performance
 from flight.dynamics.fdm import Fdm
 from flight.dynamics.trim import full_throttle_climb, idle_descent, steady_flight
 from planfly.identification.base_numbers import base_model, scale_base_model
-from planfly.identification.folder import AMSL, DENSITY, folder_files, make_identification
-from planfly.identification.model_text import identified_xml
+from planfly.identification.folder import AMSL, DENSITY, make_folder_files, make_identification
+from planfly.identification.model_text import format_identified_model
 from planfly.identification.records import flight_records, log_outputs
 from planfly.identification.servos import read_servos
 from tests.instrumented_flights import drawn_sensors
@@ -112,7 +112,7 @@ def one_variant(name: str, seed: int, repeats: int) -> dict[str, Any]:
         }
         before = folder / "before"
         before.mkdir()
-        text = identified_xml(base, "before", numbers, prior_means())
+        text = format_identified_model(base, "before", numbers, prior_means())
         (before / "before.xml").write_text(text, encoding="utf-8")
         table = (wing.folder / f"{wing.name}.toml").read_text(encoding="utf-8")
         (before / "before.toml").write_text(table, encoding="utf-8")
@@ -124,7 +124,7 @@ def one_variant(name: str, seed: int, repeats: int) -> dict[str, Any]:
             found = make_identification(base, numbers, estimate, [log], read_servos(base.folder / "ardupilot.toml"))
             own = folder / ("with" if battery else "without")
             own.mkdir()
-            files = folder_files(found, own.name, (base.battery_voltage, base.battery_energy))
+            files = make_folder_files(found, own.name, (base.battery_voltage, base.battery_energy))
             (own / f"{own.name}.xml").write_text(files[f"{own.name}.xml"], encoding="utf-8")
             (own / f"{own.name}.toml").write_text(table, encoding="utf-8")
             drawn = performance(numbers, draw_aircraft(estimate), wing.airspeed, DENSITY)

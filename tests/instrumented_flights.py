@@ -24,7 +24,7 @@ from flight.dynamics.envelope_tables import load_envelope
 from flight.mission_files.wpl import waypoints_text
 from flight.simulation.track import Track
 from logs.importers.motion import MotionLog, Samples
-from planfly.identification.manoeuvres import identification_mission
+from planfly.identification.manoeuvres import make_identification_mission
 from tests.logs.importers.written_logs import DataflashWriter
 from world.arrays import Floats
 
@@ -333,7 +333,7 @@ def fly_identification(
     """Fly the mission of manoeuvres with an aircraft of this truth in a folder; repeats: how often all of it."""
     flown = folder / f"v{seed}"
     aircraft = read_aircraft(flown) if flown.exists() else changed_aerosonde(flown, truth)
-    mission = identification_mission(aircraft, load_envelope(aircraft), *HOME, repeats=repeats)
+    mission = make_identification_mission(aircraft, load_envelope(aircraft), *HOME, repeats=repeats)
     file = folder / f"identify-{seed}-{repeats}.waypoints"
     file.write_text(waypoints_text(mission), encoding="utf-8")
     course = float(np.random.default_rng([seed, 3]).uniform(0.0, 360.0))

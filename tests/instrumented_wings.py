@@ -18,7 +18,7 @@ from flight.dynamics.envelope_tables import load_envelope
 from flight.mission_files.wpl import waypoints_text
 from flight.simulation.track import Track
 from logs.importers.motion import MotionLog
-from planfly.identification.manoeuvres import identification_mission
+from planfly.identification.manoeuvres import make_identification_mission
 from tests.instrumented_flights import HOME, Sensors, sensed
 
 MASS, TORQUE = "mass", "propeller-torque"
@@ -62,7 +62,7 @@ def fly_wing(
     aircraft: Aircraft, folder: Path, seed: int, *, repeats: int = 2, wind: tuple[float, float] = (3.0, 40.0)
 ) -> Track:
     """The mission of manoeuvres in light turbulence; repeats: how often all of it (twice is twelve minutes)."""
-    mission = identification_mission(aircraft, load_envelope(aircraft), *HOME, repeats=repeats)
+    mission = make_identification_mission(aircraft, load_envelope(aircraft), *HOME, repeats=repeats)
     file = folder / f"identify-{seed}.waypoints"
     file.write_text(waypoints_text(mission), encoding="utf-8")
     made = planfly.fly(

@@ -137,8 +137,9 @@ class CleanPositions:
 
 
 def clean_positions(series: LogSeries, earlier_jumps: tuple[float, ...] = ()) -> CleanPositions:
-    """Clean and sort rows of latitude, longitude and altitude, and count the faults.
+    """Sort the rows of a log's positions, remove faulty rows, and count the faults.
 
+    series: latitude and longitude (deg) and altitude (m), (n, 3).
     earlier_jumps: times of clock jumps that the reader has removed already, s.
 
     >>> rows = np.array([[46.0, 8.0, 500.0], [46.0002, 8.0, 500.0], [46.0002, 8.0, 500.0], [47.0, 8.0, 500.0]])
@@ -149,7 +150,7 @@ def clean_positions(series: LogSeries, earlier_jumps: tuple[float, ...] = ()) ->
     ([0.0, 1.0, 2.0, 3.0, 4.0, 9.0], 1, 1, (Gap(start=4.0, end=9.0),))
     """
     time, values = series.time, series.values
-    is_usable = _usable_rows(time, values)
+    is_usable = _find_usable_rows(time, values)
     unusable = int(is_usable.size - is_usable.sum())
     time, values = time[is_usable], values[is_usable]
     order = np.argsort(time, kind="stable")
@@ -161,11 +162,11 @@ def clean_positions(series: LogSeries, earlier_jumps: tuple[float, ...] = ()) ->
     time, values = time[is_new], values[is_new]
     is_glitch = _find_glitches(time, values)
     time, values = time[~is_glitch], values[~is_glitch]
-    is_near = _is_in_main_group(time)
-    time, shifts = _remove_forward_jumps(time[is_near], values[is_near])
+    is_in_group = _is_in_large_group(time)
+    time, shifts = _remove_forward_jumps(time[is_in_group], values[is_in_group])
     is_in_range = time < MAX_TIME_S
-    time, values = time[is_in_range], values[is_near][is_in_range]
-    unusable += is_near.size - time.size
+    time, values = time[is_in_range], values[is_in_group][is_in_range]
+    unusable += is_in_group.size - time.size
     jumps = tuple(sorted((*earlier_jumps, *(start for start, _ in shifts))))
     faults = RowFaults(duplicates, unordered, unusable, int(is_glitch.sum()), jumps)
     lat, lon, up = values.T if len(values) else np.zeros((3, 0))
@@ -187,17 +188,17 @@ def find_gaps(time: Floats) -> tuple[Gap, ...]:
     return tuple(Gap(float(time[k]), float(time[k + 1])) for k in np.flatnonzero(steps > max_step + 1e-6))
 
 
-def metres_between(lat: Floats, lon: Floats) -> Floats:
+def measure_steps(lat: Floats, lon: Floats) -> Floats:
     """Return the distances between n successive positions, m, (n - 1,), also across the 180th meridian."""
     north = np.diff(lat) * DEGREE_LENGTH_M
     east = (np.diff(lon) + 180.0) % 360.0 - 180.0
     return np.hypot(north, east * DEGREE_LENGTH_M * np.cos(np.radians(0.5 * (lat[1:] + lat[:-1]))))
 
 
-def _usable_rows(time: Floats, values: Floats) -> Flags:
+def _find_usable_rows(time: Floats, values: Floats) -> Flags:
     """Return a mask (n,): True for rows with a valid time, position and altitude.
 
-    Latitude and longitude 0 are no valid position. Rows without an altitude are valid only if no row has one.
+    A position at latitude 0 and longitude 0 is invalid.  Rows without an altitude are valid only if all rows lack one.
     """
     lat, lon, up = values.T
     with np.errstate(invalid="ignore"):
@@ -221,25 +222,25 @@ def _find_glitches(time: Floats, values: Floats) -> Flags:
         return is_glitch
     lat, lon, up = values.T
     steps = np.diff(time)
-    speed = metres_between(lat, lon) / np.maximum(steps, 1e-3)
+    speed = measure_steps(lat, lon) / np.maximum(steps, 1e-3)
     max_speed = GLITCH_SPEED_MPS + GLITCH_SPEED_RATIO * float(np.median(speed))
     rise = np.abs(np.diff(up)) / np.maximum(steps, 1e-3)
     leaps = np.flatnonzero((speed > max_speed) | (np.nan_to_num(rise) > max_speed))
     k = 0
     while k < leaps.size:
-        # A glitch goes away with one leap and comes back with a later one.
-        begin = int(leaps[k])
-        for back in leaps[k + 1 :].tolist():
-            if back - begin > MAX_GLITCH_ROWS:
+        # A glitch begins with one leap and ends with a later leap back to the path.
+        first_leap = int(leaps[k])
+        for return_leap in leaps[k + 1 :].tolist():
+            if return_leap - first_leap > MAX_GLITCH_ROWS:
                 break
-            if _is_reachable(time, values, begin, back + 1, max_speed):
-                is_glitch[begin + 1 : back + 1] = True
-                k = int(np.searchsorted(leaps, back))
+            if _is_reachable(time, values, first_leap, return_leap + 1, max_speed):
+                is_glitch[first_leap + 1 : return_leap + 1] = True
+                k = int(np.searchsorted(leaps, return_leap))
                 break
         else:
-            if begin == 0:
+            if first_leap == 0:
                 is_glitch[0] = True
-            elif begin == time.size - 2:
+            elif first_leap == time.size - 2:
                 is_glitch[-1] = True
         k += 1
     return is_glitch
@@ -253,14 +254,17 @@ def _is_reachable(time: Floats, values: Floats, first: int, second: int, max_spe
     first, second: numbers of the rows.
     """
     pair = [first, second]
-    distance = float(metres_between(values[pair, 0], values[pair, 1])[0])
+    distance = float(measure_steps(values[pair, 0], values[pair, 1])[0])
     rise = abs(float(values[second, 2] - values[first, 2]))
     duration = float(time[second] - time[first])
     return max(distance, 0.0 if math.isnan(rise) else rise) <= max_speed * duration
 
 
-def _is_in_main_group(time: Floats) -> Flags:
-    """Return a mask (n,): False for small groups of rows whose times are far from all others.
+def _is_in_large_group(time: Floats) -> Flags:
+    """Return a mask (n,): False for the rows of small groups, whose times are far from all other times.
+
+    A pause of more than `MAX_TIME_S` separates two groups.  A group is small if it has fewer than `MIN_LATE_ROWS` rows
+    and another group has more.
 
     time: sorted times, s, (n,).
     """
@@ -270,24 +274,25 @@ def _is_in_main_group(time: Floats) -> Flags:
 
 
 def _remove_forward_jumps(time: Floats, values: Floats) -> tuple[Floats, tuple[tuple[float, float], ...]]:
-    """Remove forward clock jumps: pauses in which a moving vehicle hardly moved.
+    """Remove forward clock jumps: long pauses in which a moving vehicle hardly changed its position.
 
+    values: latitude and longitude (deg) and altitude (m), (n, 3).
     Returns the shifted times, s, and the shifts as in `CleanPositions.shifts`.
     """
     shifts: list[tuple[float, float]] = []
     if time.size < 20:
         return time, ()
     steps = np.diff(time)
-    distances = metres_between(values[:, 0], values[:, 1])
-    usual = float(np.median(steps))
-    for k in np.flatnonzero(steps > max(MIN_CLOCK_JUMP_S, 2.0 * MAX_JUMP_STEPS * usual)).tolist():
-        around = slice(max(0, k - 5), k + 6)
-        is_ordinary = steps[around] <= MAX_JUMP_STEPS * usual
+    distances = measure_steps(values[:, 0], values[:, 1])
+    usual_step = float(np.median(steps))
+    for k in np.flatnonzero(steps > max(MIN_CLOCK_JUMP_S, 2.0 * MAX_JUMP_STEPS * usual_step)).tolist():
+        neighbours = slice(max(0, k - 5), k + 6)
+        is_ordinary = steps[neighbours] <= MAX_JUMP_STEPS * usual_step
         if is_ordinary.sum() < 4:
             continue
-        speed = float((distances[around][is_ordinary] / steps[around][is_ordinary]).min())
-        if speed > MIN_MOVING_SPEED_MPS and distances[k] <= speed * MAX_JUMP_STEPS * usual:
-            shifts.append((float(time[k + 1]), float(steps[k] - usual)))
+        speed = float((distances[neighbours][is_ordinary] / steps[neighbours][is_ordinary]).min())
+        if speed > MIN_MOVING_SPEED_MPS and distances[k] <= speed * MAX_JUMP_STEPS * usual_step:
+            shifts.append((float(time[k + 1]), float(steps[k] - usual_step)))
     shifted = time.copy()
     for start, shift in shifts:
         shifted[time >= start] -= shift

@@ -41,6 +41,7 @@ class MappedFile:
     """
 
     def __init__(self, path: Path) -> None:
+        """Map a file into memory, to be read only."""
         with path.open("rb") as file:
             self._map = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
         self.data: Bytes = np.frombuffer(self._map, np.uint8)
@@ -52,12 +53,13 @@ class MappedFile:
             self._map.madvise(mmap.MADV_DONTNEED)
 
 
-def piece_ends(size: int, release_memory: Callable[[], None]) -> Iterator[int]:
-    """Yield the end of each piece of a file of ``size`` bytes, and call `release_memory` after each piece.
+def iterate_piece_ends(size: int, release_memory: Callable[[], None]) -> Iterator[int]:
+    """Yield the end (byte number) of each piece of a file, and call `release_memory` after its use.
 
-    >>> list(piece_ends(3, lambda: None))
+    size: size of the file, bytes; all pieces but the last have `PIECE_BYTES`.
+    >>> list(iterate_piece_ends(3, lambda: None))
     [3]
-    >>> list(piece_ends(PIECE_BYTES + 1, lambda: None)) == [PIECE_BYTES, PIECE_BYTES + 1]
+    >>> list(iterate_piece_ends(PIECE_BYTES + 1, lambda: None)) == [PIECE_BYTES, PIECE_BYTES + 1]
     True
     """
     end = 0
@@ -125,7 +127,7 @@ class MessageFormat(NamedTuple):
 
     @property
     def scales(self) -> dict[str, int]:
-        """Factors of the scaled fields by name."""
+        """Factor by which the stored numbers of a field are multiplied, by name, for all fields with a factor."""
         letters_by_name = zip(self.columns, self.letters, strict=True)
         return {name: FIELDS[letter][1] for name, letter in letters_by_name if FIELDS[letter][1] != 1}
 
@@ -157,17 +159,17 @@ class Messages:
         return len(self.starts) > 0 and set(names) <= set(self.rows.dtype.names or ())
 
     def column(self, name: str) -> Floats:
-        """Return the numbers of a field in the format's unit, (n,)."""
+        """Return the values of a numeric field, divided by the field's factor, (n,)."""
         values = self.rows[name].astype(np.float64)
         # Division, unlike multiplication by 0.01, gives the float nearest to the decimal number.
         return np.asarray(values / self.scales.get(name, 1))
 
     def texts(self, name: str) -> list[str]:
-        """Return the texts of a field."""
+        """Return the values of a text field, one for each message."""
         return [_decode_text(value) for value in self.rows[name].tolist()]
 
     def select(self, is_selected: NDArray[np.bool_]) -> "Messages":
-        """Return the messages that a mask selects."""
+        """Return only the messages for which a mask (n,) is True."""
         return Messages(self.starts[is_selected], self.rows[is_selected], self.scales)
 
 
@@ -191,7 +193,7 @@ class Dataflash:
     release_memory: Callable[[], None] = lambda: None
 
     def messages(self, name: str) -> Messages:
-        """Return all messages of a name; without any, a `Messages` of length 0."""
+        """Return all messages with a name; the result has length 0 if the log has none."""
         for number, message_format in self.formats.items():
             if message_format.name == name and number in self.starts:
                 return _read_messages(self.data, self.starts[number], message_format, self.release_memory)
@@ -266,12 +268,12 @@ def _find_messages(data: Bytes, is_requested: NDArray[np.bool_], release_memory:
     counts = np.zeros(256, np.int64)
     state[_IS_READING], lengths[FMT_TYPE] = 1, _FMT_BYTES
     starts, kinds = [np.zeros(0, np.int64)], [np.zeros(0, np.uint8)]
-    for end in piece_ends(data.size, release_memory):
-        piece = _walk_messages(
+    for end in iterate_piece_ends(data.size, release_memory):
+        piece_starts, piece_kinds = _walk_messages(
             read_only(data), end, state, lengths, counts, HEADER_BYTES, FMT_TYPE, MAX_TRAILING_BYTES, is_requested
         )
-        starts.append(piece[0])
-        kinds.append(piece[1])
+        starts.append(piece_starts)
+        kinds.append(piece_kinds)
     damaged_places = int(state[_DAMAGED_PLACES])
     lost_bytes = int(state[_LOST_BYTES])
     last_end = int(state[_LAST_END])
@@ -308,7 +310,7 @@ def _read_messages(
         windows = np.lib.stride_tricks.sliding_window_view(data, dtype.itemsize)
         rows = np.empty(len(starts), dtype)
         first = 0
-        for end in piece_ends(data.size, release_memory):
+        for end in iterate_piece_ends(data.size, release_memory):
             last = int(np.searchsorted(starts, end))
             rows[first:last] = windows[starts[first:last] + HEADER_BYTES].view(dtype)[:, 0]
             first = last
@@ -337,53 +339,57 @@ def _walk_messages(
     state: Ints,
     lengths: Ints,
     counts: Ints,
-    header: int,
-    fmt: int,
-    trailing: int,
+    header_bytes: int,
+    fmt_type: int,
+    max_trailing_bytes: int,
     is_requested: NDArray[np.bool_],
 ) -> tuple[Ints, Bytes]:
-    """Find the requested messages up to byte `stop`, and return their starts and types.
+    """Find the requested messages up to byte `stop`, and return their starts (byte numbers) and types.
 
-    The walk continues from `state`, and updates it.
-
+    state: progress of the walk, indexed by `_NEXT_BYTE` and so on; the walk continues from it and updates it.
     lengths: length of each message type, bytes, (256,), updated by the FMT messages.
     counts: number of messages of each type, (256,), which is updated.
-    header: length of a message's header, bytes.
-    fmt: message type of FMT messages.
-    trailing: largest number of bytes at the end that need not be a message.
+    header_bytes: length of a message's header, bytes.  fmt_type: message type of FMT messages.
+    max_trailing_bytes: largest number of bytes at the end that need not be a message.
     """
     starts, kinds = np.empty(1024, np.int64), np.empty(1024, np.uint8)
-    count, end = 0, data.size
-    places, size, k, behind = state[_DAMAGED_PLACES], state[_LOST_BYTES], state[_NEXT_BYTE], state[_LAST_END]
-    reading, cut = state[_IS_READING] == 1, state[_IS_CUT] == 1
-    while k + header <= end and k < stop:
+    found_count, data_end = 0, data.size
+    damaged_places, lost_bytes = state[_DAMAGED_PLACES], state[_LOST_BYTES]
+    k, last_end = state[_NEXT_BYTE], state[_LAST_END]
+    is_reading, is_cut = state[_IS_READING] == 1, state[_IS_CUT] == 1
+    while k + header_bytes <= data_end and k < stop:
         length = 0
+        # Every message begins with these two bytes and its type.
         if data[k] == 0xA3 and data[k + 1] == 0x95:
             length = lengths[data[k + 2]]
-        after = k + length
+        message_end = k + length
         # Another message must follow, unless the file ends.
-        follows = after >= end - 1 or (data[after] == 0xA3 and data[after + 1] == 0x95) or end - after < trailing
-        if length == 0 or not follows:
-            places += reading
-            reading = False
-            size += 1
+        is_followed = (
+            message_end >= data_end - 1
+            or (data[message_end] == 0xA3 and data[message_end + 1] == 0x95)
+            or data_end - message_end < max_trailing_bytes
+        )
+        if length == 0 or not is_followed:
+            damaged_places += is_reading
+            is_reading = False
+            lost_bytes += 1
             k += 1
             continue
         kind = data[k + 2]
         counts[kind] += 1
         if is_requested[kind]:
-            if count == starts.size:
-                more_starts, more_kinds = np.empty(2 * count, np.int64), np.empty(2 * count, np.uint8)
+            if found_count == starts.size:
+                more_starts, more_kinds = np.empty(2 * found_count, np.int64), np.empty(2 * found_count, np.uint8)
                 copy_into(more_starts, starts)
                 copy_into(more_kinds, kinds)
                 starts, kinds = more_starts, more_kinds
-            starts[count], kinds[count] = k, kind
-            count += 1
-        if kind == fmt and after <= end:
-            lengths[data[k + header]] = data[k + header + 1]
-        k = behind = after
-        cut = after > end
-        reading = True
-    state[_DAMAGED_PLACES], state[_LOST_BYTES], state[_NEXT_BYTE], state[_LAST_END] = places, size, k, behind
-    state[_IS_READING], state[_IS_CUT] = reading, cut
-    return starts[:count], kinds[:count]
+            starts[found_count], kinds[found_count] = k, kind
+            found_count += 1
+        if kind == fmt_type and message_end <= data_end:
+            lengths[data[k + header_bytes]] = data[k + header_bytes + 1]
+        k = last_end = message_end
+        is_cut, is_reading = message_end > data_end, True
+    state[_DAMAGED_PLACES], state[_LOST_BYTES] = damaged_places, lost_bytes
+    state[_NEXT_BYTE], state[_LAST_END] = k, last_end
+    state[_IS_READING], state[_IS_CUT] = is_reading, is_cut
+    return starts[:found_count], kinds[:found_count]

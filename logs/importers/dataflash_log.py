@@ -17,7 +17,7 @@ from flight.guidance.equivalent_airspeed import eas_to_tas_ratio
 from flight.mission.items import Home, MissionItem, round_to_grid
 from logs.importers.clean_positions import remove_clock_jumps
 from logs.importers.dataflash_frames import Dataflash, MappedFile, Messages, index_dataflash
-from logs.importers.logged_missions import LoggedItem, combine_items, make_logged_mission, plane_mode
+from logs.importers.logged_missions import LoggedItem, combine_items, describe_plane_mode, make_logged_mission
 from logs.importers.raw_log import (
     HeightSource,
     LoggedMission,
@@ -39,8 +39,10 @@ _MAX_ITEMS = 65535.0
 _HOME = 1
 
 
-def dataflash_missions(commands: Messages, time: Floats, origins: Messages, source: str) -> Iterator[LoggedMission]:
-    """Yield the missions in the order of the log; items that were logged again when flown are merged.
+def make_dataflash_missions(
+    commands: Messages, time: Floats, origins: Messages, source: str
+) -> Iterator[LoggedMission]:
+    """Yield the missions of a log in their order; an item that is logged again when it is flown is merged.
 
     commands: CMD messages.
     time: time of each CMD message, s, (n,).
@@ -48,7 +50,7 @@ def dataflash_missions(commands: Messages, time: Floats, origins: Messages, sour
     source: name of the log.
 
     >>> none = Messages(np.zeros(0, np.int64), np.zeros(0, np.dtype([])), {})
-    >>> list(dataflash_missions(none, np.zeros(0), none, "a.BIN"))
+    >>> list(make_dataflash_missions(none, np.zeros(0), none, "a.BIN"))
     []
     """
     if not commands.has(*_NUMBERS):
@@ -67,16 +69,16 @@ def dataflash_missions(commands: Messages, time: Floats, origins: Messages, sour
         position = (round_to_grid(lat), round_to_grid(lon), round(up, 6))
         item = MissionItem(int(number), int(command), int(frame), (p1, p2, p3, p4), *position)
         rows.append(LoggedItem(stamp, int(total) if 0.0 <= total <= _MAX_ITEMS else 0, item))
-    notes = () if has_frames else ("the log states no frames: heights are taken as above home",)
+    notes = () if has_frames else ("the log states no altitude frames: altitudes are taken as heights above home",)
     for logged in combine_items(rows):
         usable_mission = make_logged_mission(logged, source, "CMD")
         if usable_mission is not None:
             mission = usable_mission.mission
-            home = mission.home if mission.home is not None else logged_home(origins)
+            home = mission.home if mission.home is not None else find_logged_home(origins)
             yield replace(usable_mission, mission=replace(mission, home=home, warnings=(*mission.warnings, *notes)))
 
 
-def logged_home(origins: Messages) -> Home | None:
+def find_logged_home(origins: Messages) -> Home | None:
     """Return the last home of the vehicle from the ORGN messages; None if not logged or invalid."""
     if not origins.has("Type", "Lat", "Lng", "Alt"):
         return None
@@ -128,19 +130,20 @@ def read_dataflash(path: Path) -> RawLog:
     return _Reader(index, str(path)).read()
 
 
-def program_and_vehicle(texts: Iterable[str], version: Messages) -> tuple[str, VehicleKind]:
+def find_program_and_vehicle(texts: Iterable[str], version: Messages) -> tuple[str, VehicleKind]:
     """Return the program and the vehicle from the first MSG text that names a program, or else from VER.
 
     texts: texts of the MSG messages.
     version: VER messages.
 
     >>> none = Messages(np.zeros(0, np.int64), np.zeros(0, np.dtype([])), {})
-    >>> program_and_vehicle(["ArduCopter V4.5.7"], none), program_and_vehicle([], none)
+    >>> find_program_and_vehicle(["ArduCopter V4.5.7"], none), find_program_and_vehicle([], none)
     (('ArduCopter V4.5.7', 'copter'), ('', 'unknown'))
     """
     for text in texts:
         if match := _PROGRAM.match(text):
             return text, _PROGRAMS[match.group(1)]
+    # VER.BT is the number of the vehicle, VER.FWS the name and version of the firmware.
     if version.has("BT") and len(version):
         text = version.texts("FWS")[0] if version.has("FWS") else ""
         return text, _BUILDS.get(int(version.column("BT")[0]), "unknown")
@@ -151,18 +154,22 @@ class _Reader:
     """Reader of one log, with a method for each part of `RawLog`."""
 
     def __init__(self, index: Dataflash, source: str) -> None:
+        """Take the index of a log and its path, and find the jumps of the log's clock."""
         self._index, self._source = index, source
         self._cache: dict[str, Messages] = {}
-        self._clock = self._clock_shifts()
+        self._clock = self._find_clock_shifts()
 
     def read(self) -> RawLog:
         """Return the log.  Raises LogError for a log without positions."""
-        series = {name: values for name, values in self._series() if values is not None and len(values.time)}
-        program, vehicle = program_and_vehicle([text for _, text in self._events()], self._messages("VER"))
+        series = {name: values for name, values in self._read_series() if values is not None and len(values.time)}
+        program, vehicle = find_program_and_vehicle(
+            [text for _, text in self._read_events()], self._select_messages("VER")
+        )
         if "position" not in series:
             names = ", ".join(sorted(self._index.names)[:12])
             raise LogError(
-                f"{self._source}: no POS, AHR2 or GPS message: the flown position is unknown (has {names or 'none'})",
+                f"{self._source}: no POS, AHR2 or GPS message: the flown position is unknown"
+                f" (the log has {names or 'no known messages'})",
                 file=self._source,
             )
         return RawLog(
@@ -171,18 +178,18 @@ class _Reader:
             program=program,
             vehicle=vehicle,
             series=series,
-            heights=tuple(self._heights()),
+            heights=tuple(self._read_heights()),
             datum="amsl",
-            modes=tuple(self._modes()),
-            missions=tuple(self._missions()),
-            parameters=self._parameters(),
-            events=tuple(self._events()),
-            utc_start=self._utc_start(),
+            modes=tuple(self._read_modes()),
+            missions=tuple(self._read_missions()),
+            parameters=self._read_parameters(),
+            events=tuple(self._read_events()),
+            utc_start=self._find_utc_start(),
             clock_jumps=self._clock[2],
             damage=self._index.damage,
         )
 
-    def _messages(self, name: str) -> Messages:
+    def _select_messages(self, name: str) -> Messages:
         """Return the messages with a name; from several sensors or estimators, only the first one's."""
         if name not in self._cache:
             messages = self._index.messages(name)
@@ -194,7 +201,7 @@ class _Reader:
             self._cache[name] = messages
         return self._cache[name]
 
-    def _clock_shifts(self) -> tuple[NDArray[np.int64], Floats, tuple[float, ...]]:
+    def _find_clock_shifts(self) -> tuple[NDArray[np.int64], Floats, tuple[float, ...]]:
         """Find the jumps of the log's clock, and the shift that corrects the time of each message.
 
         Returns the byte at which each message starts, (n,), the shift to add to its time, s, (n,), and the times of the
@@ -202,9 +209,9 @@ class _Reader:
         """
         times, starts = [], []
         for name in ("POS", "ATT", "GPS", "MODE"):
-            messages = self._messages(name)
+            messages = self._select_messages(name)
             if messages.has("TimeUS") or messages.has("TimeMS"):
-                times.append(_raw_time(messages))
+                times.append(_read_raw_time(messages))
                 starts.append(messages.starts)
         if not times:
             return np.zeros(0, np.int64), np.zeros(0), ()
@@ -215,187 +222,190 @@ class _Reader:
         steady = remove_clock_jumps(raw_times[is_finite])
         return sorted_starts[is_finite], steady.time - raw_times[is_finite], steady.jumps
 
-    def _time(self, messages: Messages) -> Floats:
+    def _compute_times(self, messages: Messages) -> Floats:
         """Return the times of messages on the clock without jumps back, s."""
         starts, shifts, jumps = self._clock
-        raw_time = _raw_time(messages)
+        raw_time = _read_raw_time(messages)
         if not jumps:
             return raw_time
         return np.asarray(raw_time + shifts[np.clip(np.searchsorted(starts, messages.starts), 0, len(shifts) - 1)])
 
-    def _message_table(self, name: str, columns: Iterable[str], scale: float = 1.0) -> LogSeries | None:
-        """Return fields of a message as columns, times `scale`; None if the log lacks one of them."""
+    def _read_table(self, name: str, columns: Iterable[str], scale: float = 1.0) -> LogSeries | None:
+        """Return fields of a message as columns, multiplied by `scale`; None if the log lacks one of them."""
         columns = tuple(columns)
-        messages = self._messages(name)
+        messages = self._select_messages(name)
         if not messages.has(*columns) or not (messages.has("TimeUS") or messages.has("TimeMS")):
             return None
         values = np.stack([messages.column(column) for column in columns], axis=1)
-        return LogSeries(name, self._time(messages), values * scale)
+        return LogSeries(name, self._compute_times(messages), values * scale)
 
-    def _series(self) -> Iterable[tuple[str, LogSeries | None]]:
+    def _read_series(self) -> Iterable[tuple[str, LogSeries | None]]:
         """Yield the name and the values of each series of a `RawLog`; None for a series that the log lacks."""
-        yield "position", self._position()
-        yield "velocity", self._velocity()
+        yield "position", self._read_position()
+        yield "velocity", self._read_velocity()
         yield (
             "attitude",
-            self._first_table((("ATT", ("Roll", "Pitch", "Yaw")), ("AHR2", ("Roll", "Pitch", "Yaw"))), _DEGREE),
+            self._read_first_table((("ATT", ("Roll", "Pitch", "Yaw")), ("AHR2", ("Roll", "Pitch", "Yaw"))), _DEGREE),
         )
-        yield "wind", self._wind()
-        yield "airspeed", self._airspeed()
-        yield "battery", self._battery()
-        yield "throttle", self._throttle()
+        yield "wind", self._read_wind()
+        yield "airspeed", self._read_airspeed()
+        yield "battery", self._read_battery()
+        yield "throttle", self._read_throttle()
 
-    def _first_table(self, choices: Iterable[tuple[str, tuple[str, ...]]], scale: float = 1.0) -> LogSeries | None:
-        """Return the first of several tables that has rows, times `scale`; None if all are empty.
+    def _read_first_table(self, choices: Iterable[tuple[str, tuple[str, ...]]], scale: float = 1.0) -> LogSeries | None:
+        """Return the fields of the first of several messages that the log contains; None if it has none.
 
-        choices: name of a message and its fields, for each table.
+        choices: for each message its name, and the names of the fields.
+        scale: factor by which the values are multiplied.
         """
         for name, columns in choices:
-            table = self._message_table(name, columns, scale)
+            table = self._read_table(name, columns, scale)
             if table is not None and len(table.time):
                 return table
         return None
 
-    def _position(self) -> LogSeries | None:
+    def _read_position(self) -> LogSeries | None:
         """Return the estimated positions, or else the positions of GPS with a 3-D fix.
 
         Return None if the log has neither.  If the log does not state the fix, all positions of GPS are returned.
         """
-        estimate = self._first_table((("POS", ("Lat", "Lng", "Alt")), ("AHR2", ("Lat", "Lng", "Alt"))))
+        estimate = self._read_first_table((("POS", ("Lat", "Lng", "Alt")), ("AHR2", ("Lat", "Lng", "Alt"))))
         if estimate is not None:
             return estimate
-        gps = self._messages("GPS")
-        position = self._first_table((("GPS", ("Lat", "Lng", "Alt")),))
+        gps = self._select_messages("GPS")
+        position = self._read_first_table((("GPS", ("Lat", "Lng", "Alt")),))
         if position is None or not gps.has("Status"):
             return position
         # Without a 3-D fix there is no altitude.
         has_fix = gps.column("Status") >= 3
         return LogSeries("GPS", position.time[has_fix], position.values[has_fix])
 
-    def _velocity(self) -> LogSeries | None:
+    def _read_velocity(self) -> LogSeries | None:
         """Return the ground velocity to east, north and up, m/s, (n, 3), from the estimator or else from GPS.
 
         Return None if the log has neither.
         """
         for name in ("XKF1", "NKF1", "EKF1"):
-            velocity = self._message_table(name, ("VE", "VN", "VD"))
+            velocity = self._read_table(name, ("VE", "VN", "VD"))
             if velocity is not None and len(velocity.time):
                 return LogSeries(name, velocity.time, velocity.values * np.array([1.0, 1.0, -1.0]))
-        gps = self._message_table("GPS", ("Spd", "GCrs", "VZ"))
+        gps = self._read_table("GPS", ("Spd", "GCrs", "VZ"))
         if gps is None:
             return None
         speed, course, down = gps.values.T
         course = np.radians(course)
         return LogSeries("GPS", gps.time, np.stack([speed * np.sin(course), speed * np.cos(course), -down], axis=1))
 
-    def _wind(self) -> LogSeries | None:
+    def _read_wind(self) -> LogSeries | None:
         """Return the estimated wind velocity to east and north, m/s, (n, 2); None if it is always 0."""
-        wind = self._first_table([(name, ("VWE", "VWN")) for name in ("XKF2", "NKF2", "EKF2")])
+        wind = self._read_first_table([(name, ("VWE", "VWN")) for name in ("XKF2", "NKF2", "EKF2")])
         # Without an estimate the wind stays zero.
         return wind if wind is not None and np.any(wind.values) else None
 
-    def _airspeed(self) -> LogSeries | None:
+    def _read_airspeed(self) -> LogSeries | None:
         """Return the true airspeed, m/s, (n, 1); None if unknown.
 
         It is converted from the equivalent airspeed that ArduPilot logs: that of a sensor in use, or else that of CTUN.
         """
-        sensor = self._messages("ARSP")
-        airspeed = self._message_table("ARSP", ("Airspeed",))
+        sensor = self._select_messages("ARSP")
+        airspeed = self._read_table("ARSP", ("Airspeed",))
         if airspeed is not None and sensor.has("U"):
             is_used = sensor.column("U") > 0
             airspeed = LogSeries("ARSP", airspeed.time[is_used], airspeed.values[is_used]) if is_used.any() else None
         if airspeed is None or not len(airspeed.time):
-            airspeed = self._first_table((("CTUN", ("As",)),)) if self._messages("CTUN").has("AsT") else None
+            airspeed = (
+                self._read_first_table((("CTUN", ("As",)),)) if self._select_messages("CTUN").has("AsT") else None
+            )
         if airspeed is None or not len(airspeed.time) or not np.any(airspeed.values):
             return None
         return LogSeries(
-            airspeed.source, airspeed.time, airspeed.values * self._true_by_equivalent(airspeed.time)[:, None]
+            airspeed.source, airspeed.time, airspeed.values * self._find_true_airspeed_ratio(airspeed.time)[:, None]
         )
 
-    def _true_by_equivalent(self, time: Floats) -> Floats:
-        """Return the ratio of true to equivalent airspeed at given times, (n,).
+    def _find_true_airspeed_ratio(self, time: Floats) -> Floats:
+        """Return the ratio of true to equivalent airspeed at each time, (n,).
 
         The logged ratio is used, or else the ratio in the standard atmosphere at the logged altitude.
         """
-        ratio = self._message_table("CTUN", ("E2T",))
+        ratio = self._read_table("CTUN", ("E2T",))
         if ratio is not None and len(ratio.time) > 1:
             order = np.argsort(ratio.time, kind="stable")
             return np.asarray(np.interp(time, ratio.time[order], ratio.values[order, 0]))
-        position = self._position()
+        position = self._read_position()
         if position is None or not len(position.time):
             return np.ones(len(time))
         order = np.argsort(position.time, kind="stable")
         altitudes = np.clip(np.interp(time, position.time[order], position.values[order, 2]), -500.0, 20_000.0)
         return np.array([eas_to_tas_ratio(float(altitude)) for altitude in altitudes])
 
-    def _battery(self) -> LogSeries | None:
+    def _read_battery(self) -> LogSeries | None:
         """Return the battery's current (A) and the energy used (Wh), (n, 2); None if neither was measured."""
-        battery = self._message_table("BAT", ("Curr", "EnrgTot"))
+        battery = self._read_table("BAT", ("Curr", "EnrgTot"))
         if battery is None or not len(battery.time):
-            battery = self._message_table("CURR", ("Curr", "EnrgTot"))
+            battery = self._read_table("CURR", ("Curr", "EnrgTot"))
         if battery is not None and len(battery.time):
             return battery if np.any(battery.values) else None
         for name in ("BAT", "CURR"):
-            battery = self._message_table(name, ("Volt", "Curr"))
+            battery = self._read_table(name, ("Volt", "Curr"))
             if battery is not None and len(battery.time) and np.any(battery.values[:, 1]):
                 return with_used_energy(battery)
         return None
 
-    def _throttle(self) -> LogSeries | None:
+    def _read_throttle(self) -> LogSeries | None:
         """Return the throttle, 0..1, (n, 1); None if not logged."""
         for column in ("ThO", "ThrOut"):
-            throttle = self._message_table("CTUN", (column,), 0.01)
+            throttle = self._read_table("CTUN", (column,), 0.01)
             if throttle is not None and len(throttle.time):
                 return throttle
         return None
 
-    def _heights(self) -> Iterable[HeightSource]:
+    def _read_heights(self) -> Iterable[HeightSource]:
         """Yield the altitudes in the log other than the altitude of the position."""
-        position = self._position()
-        gps = self._message_table("GPS", ("Alt",))
+        position = self._read_position()
+        gps = self._read_table("GPS", ("Alt",))
         if gps is not None and position is not None and position.source != "GPS":
             yield HeightSource("GPS.Alt", "amsl", gps)
-        baro = self._message_table("BARO", ("AltAMSL",))
+        baro = self._read_table("BARO", ("AltAMSL",))
         if baro is not None:
             yield HeightSource("BARO.AltAMSL", "amsl", baro)
         else:
-            baro = self._message_table("BARO", ("Alt",))
+            baro = self._read_table("BARO", ("Alt",))
             if baro is not None:
-                yield HeightSource("BARO.Alt (above where it was switched on)", "unstated", baro)
+                yield HeightSource("BARO.Alt (above the power-up position)", "unstated", baro)
 
-    def _modes(self) -> Iterable[ModeChange]:
+    def _read_modes(self) -> Iterable[ModeChange]:
         """Yield the mode changes; nothing for a log that states modes by name instead of number."""
-        messages = self._messages("MODE")
+        messages = self._select_messages("MODE")
         column = "ModeNum" if messages.has("ModeNum") else "Mode"
         if not messages.has(column) or messages.rows.dtype[column].kind == "S":
             return
-        for time, number in zip(self._time(messages).tolist(), messages.rows[column].tolist(), strict=True):
-            name, automatic = plane_mode(int(number))
+        for time, number in zip(self._compute_times(messages).tolist(), messages.rows[column].tolist(), strict=True):
+            name, automatic = describe_plane_mode(int(number))
             yield ModeChange(time, name, automatic)
 
-    def _missions(self) -> Iterable[LoggedMission]:
+    def _read_missions(self) -> Iterable[LoggedMission]:
         """Return the missions in the order of the log."""
-        commands = self._messages("CMD")
-        time = self._time(commands) if len(commands) else np.zeros(0)
-        return dataflash_missions(commands, time, self._messages("ORGN"), self._source)
+        commands = self._select_messages("CMD")
+        time = self._compute_times(commands) if len(commands) else np.zeros(0)
+        return make_dataflash_missions(commands, time, self._select_messages("ORGN"), self._source)
 
-    def _parameters(self) -> dict[str, float]:
+    def _read_parameters(self) -> dict[str, float]:
         """Return the last finite value of each parameter."""
-        messages = self._messages("PARM")
+        messages = self._select_messages("PARM")
         if not messages.has("Name", "Value"):
             return {}
         values = zip(messages.texts("Name"), messages.column("Value").tolist(), strict=True)
         return {name: value for name, value in values if name and math.isfinite(value)}
 
-    def _events(self) -> Iterable[tuple[float, str]]:
+    def _read_events(self) -> Iterable[tuple[float, str]]:
         """Yield the time (s) and the text of each MSG message."""
-        messages = self._messages("MSG")
+        messages = self._select_messages("MSG")
         if messages.has("Message"):
-            yield from zip(self._time(messages).tolist(), messages.texts("Message"), strict=True)
+            yield from zip(self._compute_times(messages).tolist(), messages.texts("Message"), strict=True)
 
-    def _utc_start(self) -> float:
-        """Return time 0 of the log's clock as given by the first GPS fix, s since 1970; NaN if not logged."""
-        messages = self._messages("GPS")
+    def _find_utc_start(self) -> float:
+        """Return the UTC time at time 0 of the log's clock, s since 1970; NaN if the log has no GPS fix."""
+        messages = self._select_messages("GPS")
         for weeks, millis in (("GWk", "GMS"), ("Week", "TimeMS")):
             if messages.has(weeks, millis, "TimeUS"):
                 # Without a fix a receiver may report a wrong week.
@@ -405,7 +415,7 @@ class _Reader:
                 if has_fix.any():
                     k = int(np.argmax(has_fix))
                     seconds = messages.column(weeks)[k] * _WEEK_S + messages.column(millis)[k] * 1e-3
-                    return float(_GPS_EPOCH_S - _LEAP_SECONDS_S + seconds - self._time(messages)[k])
+                    return float(_GPS_EPOCH_S - _LEAP_SECONDS_S + seconds - self._compute_times(messages)[k])
         return math.nan
 
 
@@ -436,7 +446,7 @@ _READ = (
 _WITH_INSTANCES = frozenset({"GPS", "BARO", "ARSP", "BAT", "XKF1", "XKF2", "NKF1", "NKF2", "EKF1", "EKF2"})
 
 
-def _raw_time(messages: Messages) -> Floats:
+def _read_raw_time(messages: Messages) -> Floats:
     """Return the times of messages on the log's own clock, s.
 
     Before 2015 they were logged in milliseconds.

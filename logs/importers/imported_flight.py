@@ -13,11 +13,12 @@ import numpy as np
 from flight.mission.items import Mission
 from flight.simulation.setup import DataKind, Gap, HeightOffset, Heights, MissionStretch, RowFaults
 from flight.simulation.track import THROTTLE, Track
-from logs.importers.clean_positions import DEGREE_LENGTH_M, CleanPositions, clean_positions, find_gaps, metres_between
+from logs.importers.clean_positions import DEGREE_LENGTH_M, CleanPositions, clean_positions, find_gaps, measure_steps
 from logs.importers.raw_log import COLUMNS, LoggedMission, LogSeries, ModeChange, RawLog, VehicleKind
 from world.arrays import Floats
 from world.errors import LogError
 from world.frames import GeoOrigin, to_map
+from world.wording import count_text
 
 # ----------------------------------------------------------------------
 # Flights of a log, and the parts of them that were flown along a mission.
@@ -72,9 +73,9 @@ def find_flight_spans(time: Floats, lat: Floats, lon: Floats) -> list[tuple[floa
     """
     if time.size < 3:
         return []
-    speed = metres_between(lat, lon) / np.maximum(np.diff(time), 1e-3)
+    speed = measure_steps(lat, lon) / np.maximum(np.diff(time), 1e-3)
     width = max(1, int(_MEDIAN_WINDOW_S / max(1e-3, float(np.median(np.diff(time))))))
-    is_flying = _running_median(speed, width) > MIN_FLYING_SPEED_MPS
+    is_flying = _compute_running_median(speed, width) > MIN_FLYING_SPEED_MPS
     spans: list[list[float]] = []
     for k in np.flatnonzero(is_flying).tolist():
         if spans and time[k] - spans[-1][1] <= MAX_SLOW_TIME_S:
@@ -84,8 +85,8 @@ def find_flight_spans(time: Floats, lat: Floats, lon: Floats) -> list[tuple[floa
     return [(start, end) for start, end in spans if end - start >= MIN_FLIGHT_TIME_S]
 
 
-def _running_median(values: Floats, width: int) -> Floats:
-    """Return the median of `width` values around each value, (n,); the values at the ends are repeated."""
+def _compute_running_median(values: Floats, width: int) -> Floats:
+    """Return the median of the `width` values around each value, (n,); end values are repeated."""
     if width < 2 or values.size <= width:
         return values
     half = width // 2
@@ -97,23 +98,23 @@ def find_flight_parts(
     spans: Sequence[tuple[float, float]],
     modes: Sequence[ModeChange],
     missions: Sequence[LoggedMission],
-    last: float,
+    log_end: float,
 ) -> list[FlightPart]:
     """Split the flights of a log by the missions that they followed, one part for each flight and mission.
 
     spans: start and end of each flight, from `find_flight_spans`.
     modes: mode changes in the log; without any, each whole flight is assumed to follow its mission.
     missions: missions in the log.
-    last: time of the last row of the log, s.
+    log_end: time of the last row of the log, s.
     """
     parts = []
     for start, end in spans:
-        stretches = _find_stretches(start, end, modes, last)
+        stretches = _find_stretches(start, end, modes, log_end)
         stretches_by_mission: dict[int, list[MissionStretch]] = {}
         for stretch in stretches:
-            stretches_by_mission.setdefault(_mission_at(stretch, missions), []).append(stretch)
+            stretches_by_mission.setdefault(_find_mission(stretch, missions), []).append(stretch)
         if not stretches_by_mission:
-            stretches_by_mission[_mission_at(MissionStretch(start, end, "", "log"), missions)] = []
+            stretches_by_mission[_find_mission(MissionStretch(start, end, "", "log"), missions)] = []
         parts += [
             FlightPart(start, end, number, tuple(mission_stretches))
             for number, mission_stretches in stretches_by_mission.items()
@@ -121,15 +122,15 @@ def find_flight_parts(
     return parts
 
 
-def _find_stretches(start: float, end: float, modes: Sequence[ModeChange], last: float) -> list[MissionStretch]:
+def _find_stretches(start: float, end: float, modes: Sequence[ModeChange], log_end: float) -> list[MissionStretch]:
     """Return the periods of a flight in a mode that follows the mission.
 
     Without modes, the period is the whole flight.
 
-    last: time of the last row of the log, s.
+    log_end: time of the last row of the log, s.
     """
     # A flight that continues to the log's last rows is cut off by the log.
-    is_cut_off = last - end < CUT_FLIGHT_TIME_S
+    is_cut_off = log_end - end < CUT_FLIGHT_TIME_S
     if not modes:
         return [MissionStretch(start, end, "", "log" if is_cut_off else "landed")]
     stretches = []
@@ -146,7 +147,7 @@ def _find_stretches(start: float, end: float, modes: Sequence[ModeChange], last:
     return stretches
 
 
-def _mission_at(stretch: MissionStretch, missions: Sequence[LoggedMission]) -> int:
+def _find_mission(stretch: MissionStretch, missions: Sequence[LoggedMission]) -> int:
     """Return the index of the mission that a stretch of a flight followed, or -1 if unknown.
 
     It is the last mission logged up to a second after the start of the stretch, or else the first mission logged
@@ -172,7 +173,7 @@ _MAX_INTERPOLATED_STEP_S = 1.0
 _MAX_INTERPOLATED_STEPS = 2.5
 # Duration at the start of a flight over which altitudes are compared, s.
 _COMPARED_TIME_S = 5.0
-# Vehicles whose logs are refused, with their possessive for the message.
+# Vehicles whose logs are refused, with their names in the message.
 _REFUSED: dict[VehicleKind, str] = {
     "copter": "a copter",
     "rover": "a rover",
@@ -242,18 +243,19 @@ def make_flight(raw: RawLog, number: int | None = None) -> LoggedFlight:
     if raw.vehicle in _REFUSED:
         program_text = f" (program {raw.program})" if raw.program else ""
         raise LogError(
-            f"{raw.source}: the log of {_REFUSED[raw.vehicle]}{program_text}; only flights of aeroplanes are judged",
+            f"{raw.source}: this log is from {_REFUSED[raw.vehicle]}{program_text}; planfly judges only aeroplanes",
             file=raw.source,
         )
     series = raw.series["position"]
     if len(series.time) > _MAX_ROWS:
         raise LogError(
-            f"{raw.source}: too long: {len(series.time):,} positions; the limit is {_MAX_ROWS:,}", file=raw.source
+            f"{raw.source}: too long: the log has {len(series.time):,} positions; the limit is {_MAX_ROWS:,}",
+            file=raw.source,
         )
     positions = clean_positions(series, raw.clock_jumps)
     spans = find_flight_spans(positions.time, positions.lat, positions.lon)
     if not spans:
-        raise LogError(f"{raw.source}: contains no flight: {_reason_without_flight(positions)}", file=raw.source)
+        raise LogError(f"{raw.source}: contains no flight: {_explain_missing_flight(positions)}", file=raw.source)
     last = float(positions.time[-1])
     modes = [
         type(mode)(float(positions.to_steady_clock(np.array([mode.time]))[0]), mode.name, mode.automatic)
@@ -269,16 +271,16 @@ def make_flight(raw: RawLog, number: int | None = None) -> LoggedFlight:
     return _extract_flight(raw, positions, parts[index], index + 1, len(parts), other_flights)
 
 
-def _reason_without_flight(positions: CleanPositions) -> str:
+def _explain_missing_flight(positions: CleanPositions) -> str:
     """Return the reason why a log contains no flight, for a message."""
     if positions.time.size < 2:
         unusable_count = positions.faults.unusable
-        return f"{positions.time.size} usable positions" + (
-            f", {unusable_count:,} without a position or a time" if unusable_count else ""
+        return f"{count_text(positions.time.size, 'usable position')}" + (
+            f"; {count_text(unusable_count, 'row')} without a valid position or time" if unusable_count else ""
         )
     duration = positions.time[-1] - positions.time[0]
     limit_text = f"{MIN_FLYING_SPEED_MPS:g} m/s for {MIN_FLIGHT_TIME_S:g} s"
-    return f"in {duration:.0f} s the ground speed never stayed above {limit_text}"
+    return f"the ground speed never stayed above {limit_text} in the log's {duration:.0f} s"
 
 
 def _extract_flight(
@@ -313,7 +315,7 @@ def _extract_flight(
         holds=tuple(available_quantities),
         stretches=part.stretches,
         mission=raw.missions[part.mission] if part.mission >= 0 else None,
-        heights=_heights(raw, positions, start),
+        heights=_compare_heights(raw, positions, start),
         gaps=find_gaps(time),
         faults=positions.faults,
         number=number,
@@ -367,10 +369,12 @@ def _interpolate_at(series: LogSeries | None, name: str, time: Floats, positions
     return interpolated
 
 
-def _heights(raw: RawLog, positions: CleanPositions, start: float) -> Heights:
+def _compare_heights(raw: RawLog, positions: CleanPositions, start: float) -> Heights:
     """Return the source of the positions' altitude, and the offsets of other altitudes from it, m.
 
-    The offsets are medians over the first seconds after `start`.
+    An offset is a median over the first `_COMPARED_TIME_S` seconds of the flight.
+
+    start: start of the flight, s.
     """
     offsets = []
     for other in raw.heights:
@@ -462,11 +466,11 @@ def mean_wind(flight: LoggedFlight) -> MeanWind | None:
 
 
 def make_track(flight: LoggedFlight, origin: GeoOrigin) -> Track:
-    """Return the flight as a track on the map around ``origin``.
+    """Convert a flight to a track with map coordinates relative to ``origin``.
 
-    Velocities that the log lacks are computed from the positions.  In a log without altitudes, the altitude of the
-    track is 0, and no rule judges it.  The energy counts from its first known value.  Columns that no log contains are
-    NaN, and all rows are on leg 0.
+    Velocities that the log lacks are computed from the positions.  For a log without altitudes the track has altitude
+    0, which no rule judges.  The energy is counted from its first known value.  Columns that no log contains are NaN,
+    and all rows are on leg 0.
 
     >>> from logs.importers.raw_log import example_raw_log
     >>> from logs.importers.imported_flight import make_flight

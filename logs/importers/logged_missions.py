@@ -43,11 +43,11 @@ def combine_items(rows: Iterable[LoggedItem]) -> list[LoggedItemGroup]:
     """Combine logged items, in the order of the log, into missions.
 
     An item 0 begins a new mission, even if later items are lost.  A single item that equals an item of the mission was
-    logged because it was flown.  A single item that differs is an edit, which begins a changed mission.  A mission that
-    is logged twice, each time in part, is one mission.
+    logged because it was flown.  A single item that differs was edited, and begins a changed mission.  Two incomplete
+    logs of one mission are merged.
 
-    >>> way = [MissionItem(k, 16, 0, (0.0,) * 4, 46.0 + k, 8.0, 75.0) for k in range(3)]
-    >>> logged = [*(LoggedItem(1.0, 3, item) for item in way), LoggedItem(9.0, 3, way[1])]
+    >>> waypoints = [MissionItem(k, 16, 0, (0.0,) * 4, 46.0 + k, 8.0, 75.0) for k in range(3)]
+    >>> logged = [*(LoggedItem(1.0, 3, item) for item in waypoints), LoggedItem(9.0, 3, waypoints[1])]
     >>> [(start, total, len(items)) for start, total, items in combine_items(logged)]
     [(1.0, 3, 3)]
     """
@@ -114,10 +114,10 @@ def _is_same_item(first: MissionItem, second: MissionItem) -> bool:
 
     Their frames may differ.
     """
-    return _comparison_key(first) == _comparison_key(second)
+    return _make_comparison_key(first) == _make_comparison_key(second)
 
 
-def _comparison_key(item: MissionItem) -> tuple[object, ...]:
+def _make_comparison_key(item: MissionItem) -> tuple[object, ...]:
     """Return the values by which items are compared.
 
     Numbers become texts, so that unset numbers (NaN) are equal.
@@ -134,11 +134,11 @@ def make_logged_mission(logged: LoggedItemGroup, source: str, origin: str) -> Lo
     source: name of the log.
     origin: name of the log messages with the items.
 
-    >>> way = [MissionItem(k, 16, 0, (0.0,) * 4, 46.0 + k, 8.0, 75.0) for k in range(3)]
-    >>> made = make_logged_mission(LoggedItemGroup(1.0, 5, tuple(way)), "a.BIN", "CMD").mission
+    >>> waypoints = [MissionItem(k, 16, 0, (0.0,) * 4, 46.0 + k, 8.0, 75.0) for k in range(3)]
+    >>> made = make_logged_mission(LoggedItemGroup(1.0, 5, tuple(waypoints)), "a.BIN", "CMD").mission
     >>> made.home.lat_deg, [item.seq for item in made.items]
     (46.0, [1, 2])
-    >>> make_logged_mission(LoggedItemGroup(1.0, 5, tuple(way)), "a.BIN", "CMD").missing.numbers
+    >>> make_logged_mission(LoggedItemGroup(1.0, 5, tuple(waypoints)), "a.BIN", "CMD").missing.numbers
     (3, 4)
     """
     home: Home | None = None
@@ -151,11 +151,11 @@ def make_logged_mission(logged: LoggedItemGroup, source: str, origin: str) -> Lo
             if item.has_position:
                 home = Home(item.lat_deg, item.lon_deg, item.alt)
             else:
-                warnings.append("item 0: home at 0, 0, which is not a position: left out; the mission has no home")
+                warnings.append("item 0: left out: home is at 0, 0, which is not a position; the mission has no home")
         else:
             items.append(item)
     if logged.total and not any(item.seq == 0 for item in logged.items):
-        warnings.append(f"item 0, which is home, of {logged.total} is not in the log")
+        warnings.append(f"the log lacks item 0 (home) of the mission's {logged.total} items")
     # Number 0 is reserved for home in mission files.
     shift = 1 if items and items[0].seq == 0 else 0
     end = max(logged.total - 1, logged.items[-1].seq) + shift
@@ -163,13 +163,13 @@ def make_logged_mission(logged: LoggedItemGroup, source: str, origin: str) -> Lo
     return without_gaps(LoggedMission(logged.time, mission, origin), logged.total, end)
 
 
-def px4_items(items: Iterable[MissionItem]) -> tuple[MissionItem, ...]:
+def renumber_px4_items(items: Iterable[MissionItem]) -> tuple[MissionItem, ...]:
     """Renumber items of PX4, which counts from 0, so that they count from 1.
 
     A vertical take-off becomes a take-off, because PX4 flies to the position of both in the same way (docs.px4.io,
     "Mission Mode (VTOL)").
 
-    >>> [(item.seq, item.command) for item in px4_items([MissionItem(0, 84, 0, (0.0,) * 4, 46.0, 8.0, 75.0)])]
+    >>> [(item.seq, item.command) for item in renumber_px4_items([MissionItem(0, 84, 0, (0.0,) * 4, 46.0, 8.0, 75.0)])]
     [(1, 22)]
     """
     vertical = Command.NAV_VTOL_TAKEOFF
@@ -177,40 +177,40 @@ def px4_items(items: Iterable[MissionItem]) -> tuple[MissionItem, ...]:
     return with_shifted_numbers(changed, 1)
 
 
-def without_gaps(logged: LoggedMission, total: int, end: int) -> LoggedMission | None:
+def without_gaps(logged: LoggedMission, total: int, last_number: int) -> LoggedMission | None:
     """Reduce an incomplete mission to its longest run of items without a gap.
 
     A complete mission is returned unchanged, or as None if it has fewer than two items; an incomplete mission may have
     no items left.
 
     total: announced number of items, 0 if unknown.
-    end: largest known number of an item; items are numbered from 1.
+    last_number: largest known number of an item; items are numbered from 1.
     """
     numbers = {item.seq for item in logged.mission.items}
-    missing = tuple(sorted(set(range(1, end + 1)) - numbers))
+    missing = tuple(sorted(set(range(1, last_number + 1)) - numbers))
     if not missing:
         return logged if len(numbers) > 1 else None
-    run = _longest_run(logged.mission.items)
+    run = _find_longest_run(logged.mission.items)
     first, last = (run[0].seq, run[-1].seq) if run else (0, 0)
-    missing_items = MissingItems(missing, total, first, last, end)
+    missing_items = MissingItems(missing, total, first, last, last_number)
     return replace(logged, mission=replace(logged.mission, items=tuple(run)), missing=missing_items)
 
 
-def _longest_run(items: Sequence[MissionItem]) -> Sequence[MissionItem]:
-    """Return the longest run of consecutively numbered items, cut before a jump out of the run.
+def _find_longest_run(items: Sequence[MissionItem]) -> Sequence[MissionItem]:
+    """Return the longest run of consecutively numbered items.
 
-    Of equally long runs, the first is returned.
+    Each run is cut before its first DO_JUMP to an item outside the run.  Of equally long runs, the first is returned.
     """
     runs: list[list[MissionItem]] = [[]]
     for item in items:
         if runs[-1] and item.seq != runs[-1][-1].seq + 1:
             runs.append([])
         runs[-1].append(item)
-    return max((_before_jump_out(run) for run in runs), key=len)
+    return max((_cut_before_jump_out(run) for run in runs), key=len)
 
 
-def _before_jump_out(run: Sequence[MissionItem]) -> Sequence[MissionItem]:
-    """Return the items of a run before the first jump to an item outside the run."""
+def _cut_before_jump_out(run: Sequence[MissionItem]) -> Sequence[MissionItem]:
+    """Return the items of a run before its first DO_JUMP to an item outside the run."""
     indices = {float(item.seq): k for k, item in enumerate(run)}
     end = len(run)
     jumps = [(indices.get(item.params[0], end), k) for k, item in enumerate(run) if item.command == Command.DO_JUMP]
@@ -280,28 +280,28 @@ _PX4_MAIN = {1: "MANUAL", 2: "ALTCTL", 3: "POSCTL", 5: "ACRO", 6: "OFFBOARD", 7:
 _PX4_SUB = {2: "TAKEOFF", 3: "LOITER", 4: "MISSION", 5: "RTL", 6: "LAND", 7: "RTGS", 8: "FOLLOWME"}
 
 
-def plane_mode(number: int) -> tuple[str, bool]:
+def describe_plane_mode(number: int) -> tuple[str, bool]:
     """Return ArduPlane's name of a flight mode, and True if the mode follows the mission.
 
-    >>> plane_mode(10), plane_mode(5)
+    >>> describe_plane_mode(10), describe_plane_mode(5)
     (('AUTO', True), ('FBWA', False))
     """
     return _PLANE_MODES.get(number, f"mode {number}"), number == _PLANE_AUTO
 
 
-def px4_state(number: int) -> tuple[str, bool]:
+def describe_px4_state(number: int) -> tuple[str, bool]:
     """Return PX4's name of a navigation state, and True if the state follows the mission.
 
-    >>> px4_state(3), px4_state(5)
+    >>> describe_px4_state(3), describe_px4_state(5)
     (('MISSION', True), ('RTL', False))
     """
     return _PX4_STATES.get(number, f"state {number}"), number == _PX4_MISSION
 
 
-def px4_mode(custom_mode: int) -> tuple[str, bool]:
+def describe_px4_mode(custom_mode: int) -> tuple[str, bool]:
     """Return PX4's name of the mode in a heartbeat, and True if the mode follows the mission.
 
-    >>> px4_mode(4 << 24 | 4 << 16)
+    >>> describe_px4_mode(4 << 24 | 4 << 16)
     ('MISSION', True)
     """
     main, sub = custom_mode >> 16 & 0xFF, custom_mode >> 24 & 0xFF

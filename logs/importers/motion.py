@@ -22,7 +22,7 @@ _STANDING_SPEED_MPS = 2.0
 
 @dataclass(frozen=True, slots=True)
 class Samples:
-    """Rows of one kind.
+    """Rows of one quantity, or of several quantities that are measured together.
 
     time: increasing times on the log's clock, s, (n,).
     values: columns of the rows, (n, k).
@@ -99,14 +99,14 @@ class MotionLog:
         return self.controls if len(self.controls.time) else self.outputs
 
 
-def first_ground_position(position: Samples, velocity: Samples) -> tuple[float, float, float] | None:
-    """Return the latitude, longitude and altitude at which a vehicle first stood still, or None.
+def find_first_ground_position(position: Samples, velocity: Samples) -> tuple[float, float, float] | None:
+    """Return latitude, longitude (deg) and altitude (m) where a vehicle first stood still, or None.
 
     position: latitude and longitude (deg) and altitude (m), (n, 3).
     velocity: ground velocity, m/s, (n, 3).
 
     >>> place = Samples(np.array([1.0, 2.0]), np.array([[48.0, 11.0, 520.0], [48.0, 11.001, 540.0]]))
-    >>> first_ground_position(place, Samples(np.array([0.0, 3.0]), np.zeros((2, 3))))
+    >>> find_first_ground_position(place, Samples(np.array([0.0, 3.0]), np.zeros((2, 3))))
     (48.0, 11.0, 520.0)
     """
     if not len(position.time) or not len(velocity.time):

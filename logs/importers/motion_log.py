@@ -9,8 +9,8 @@ import numpy as np
 
 from logs.importers.columns.file_names import DATA_SUFFIXES, is_column_table_name
 from logs.importers.dataflash_frames import Dataflash, MappedFile, Messages, index_dataflash
-from logs.importers.dataflash_log import logged_home, program_and_vehicle
-from logs.importers.motion import OUTPUTS, MotionLog, Samples, first_ground_position, sort_samples
+from logs.importers.dataflash_log import find_logged_home, find_program_and_vehicle
+from logs.importers.motion import OUTPUTS, MotionLog, Samples, find_first_ground_position, sort_samples
 from world.errors import LogError
 from world.extras import require_extra
 from world.files import missing_text
@@ -84,35 +84,36 @@ class _DataflashMotionReader:
     """Reader of the motion in one ArduPilot dataflash log."""
 
     def __init__(self, index: Dataflash, source: str, digest: str) -> None:
+        """Take the index of a log, its path, and the SHA-256 of its bytes."""
         self._index, self._source, self._digest = index, source, digest
 
     def read(self) -> MotionLog:
         """Return the motion of the aircraft."""
         events = self._index.messages("MSG")
         texts = events.texts("Message") if events.has("Message") else []
-        program, vehicle = program_and_vehicle(texts, self._index.messages("VER"))
-        velocity = self._first_samples((name, ("VN", "VE", "VD")) for name in ("XKF1", "NKF1"))
-        inertial = self._first_samples((("IMU", ("AccX", "AccY", "AccZ", "GyrX", "GyrY", "GyrZ")),))
+        program, vehicle = find_program_and_vehicle(texts, self._index.messages("VER"))
+        velocity = self._read_first_samples((name, ("VN", "VE", "VD")) for name in ("XKF1", "NKF1"))
+        inertial = self._read_first_samples((("IMU", ("AccX", "AccY", "AccZ", "GyrX", "GyrY", "GyrZ")),))
         return MotionLog(
             source=self._source,
             sha256=self._digest,
             program=program,
             vehicle=vehicle,
             inertial=inertial,
-            outputs=self._first_samples((("RCOU", tuple(f"C{k}" for k in range(1, OUTPUTS + 1))),)),
-            attitude=self._first_samples((("ATT", ("Roll", "Pitch", "Yaw")),), _DEGREE),
+            outputs=self._read_first_samples((("RCOU", tuple(f"C{k}" for k in range(1, OUTPUTS + 1))),)),
+            attitude=self._read_first_samples((("ATT", ("Roll", "Pitch", "Yaw")),), _DEGREE),
             velocity=velocity,
-            wind=self._first_samples((name, ("VWN", "VWE")) for name in ("XKF2", "NKF2")),
-            airspeed=self._airspeed(),
-            ratio=self._first_samples((("CTUN", ("E2T",)),)),
-            height=self._first_samples((("POS", ("Alt",)),)),
-            battery=self._first_samples((("BAT", ("Volt", "Curr")), ("CURR", ("Volt", "Curr")))),
-            modes=tuple(self._modes()),
-            parameters=self._parameters(),
-            home=self._home(velocity),
+            wind=self._read_first_samples((name, ("VWN", "VWE")) for name in ("XKF2", "NKF2")),
+            airspeed=self._read_airspeed(),
+            ratio=self._read_first_samples((("CTUN", ("E2T",)),)),
+            height=self._read_first_samples((("POS", ("Alt",)),)),
+            battery=self._read_first_samples((("BAT", ("Volt", "Curr")), ("CURR", ("Volt", "Curr")))),
+            modes=tuple(self._read_modes()),
+            parameters=self._read_parameters(),
+            home=self._find_home(velocity),
         )
 
-    def _messages(self, name: str) -> Messages:
+    def _select_messages(self, name: str) -> Messages:
         """Return the messages with a name; from several sensors or estimators, only the first one's."""
         messages = self._index.messages(name)
         for column in _INSTANCES:
@@ -121,15 +122,16 @@ class _DataflashMotionReader:
                 messages = messages.select(number == number.min()) if number.dtype.kind in "ui" else messages
         return messages
 
-    def _first_samples(self, choices: Iterable[tuple[str, tuple[str, ...]]], scale: float = 1.0) -> Samples:
-        """Return the fields of the first of several messages that the log has, times `scale`.
+    def _read_first_samples(self, choices: Iterable[tuple[str, tuple[str, ...]]], scale: float = 1.0) -> Samples:
+        """Return the fields of the first of several messages that the log has.
 
         The result has no rows if the log has none of the messages.  Servo outputs that RCOU lacks are 0.
 
-        choices: name of a message and its fields.
+        choices: for each message its name, and the names of the fields.
+        scale: factor by which the values are multiplied.
         """
         for name, columns in choices:
-            messages = self._messages(name)
+            messages = self._select_messages(name)
             # Logs of older releases have fewer outputs.
             present_columns = [column for column in columns if messages.has("TimeUS", column)]
             if not present_columns or (name != "RCOU" and len(present_columns) < len(columns)):
@@ -141,17 +143,17 @@ class _DataflashMotionReader:
             return sort_samples(messages.column("TimeUS") * 1e-6, values * scale)
         return Samples(np.zeros(0), np.zeros((0, 1)))
 
-    def _airspeed(self) -> Samples:
+    def _read_airspeed(self) -> Samples:
         """Return the measured airspeed, m/s, (n, 1), without rows of a sensor that was not in use."""
-        messages = self._messages("ARSP")
+        messages = self._select_messages("ARSP")
         if not messages.has("TimeUS", "Airspeed"):
             return Samples(np.zeros(0), np.zeros((0, 1)))
         is_used = messages.column("U") > 0 if messages.has("U") else np.ones(len(messages), np.bool_)
         return sort_samples(messages.column("TimeUS")[is_used] * 1e-6, messages.column("Airspeed")[is_used, np.newaxis])
 
-    def _modes(self) -> list[tuple[float, int]]:
+    def _read_modes(self) -> list[tuple[float, int]]:
         """Return the time (s) and the number of each mode change; [] for a log that states modes by name."""
-        messages = self._messages("MODE")
+        messages = self._select_messages("MODE")
         column = "ModeNum" if messages.has("ModeNum") else "Mode"
         if not messages.has("TimeUS", column) or messages.rows.dtype[column].kind == "S":
             return []
@@ -159,20 +161,20 @@ class _DataflashMotionReader:
             zip((messages.column("TimeUS") * 1e-6).tolist(), messages.column(column).astype(int).tolist(), strict=True)
         )
 
-    def _parameters(self) -> dict[str, float]:
+    def _read_parameters(self) -> dict[str, float]:
         """Return the last finite value of each parameter."""
-        messages = self._messages("PARM")
+        messages = self._select_messages("PARM")
         if not messages.has("Name", "Value"):
             return {}
         values = zip(messages.texts("Name"), messages.column("Value").tolist(), strict=True)
         return {name: value for name, value in values if math.isfinite(value)}
 
-    def _home(self, velocity: Samples) -> tuple[float, float, float] | None:
+    def _find_home(self, velocity: Samples) -> tuple[float, float, float] | None:
         """Return latitude (deg), longitude (deg) and altitude (m) of home, or of the first position at rest.
 
         Return None if the log has neither.
         """
-        home = logged_home(self._index.messages("ORGN"))
+        home = find_logged_home(self._index.messages("ORGN"))
         if home is not None:
             return home.lat_deg, home.lon_deg, home.alt
-        return first_ground_position(self._first_samples((("POS", ("Lat", "Lng", "Alt")),)), velocity)
+        return find_first_ground_position(self._read_first_samples((("POS", ("Lat", "Lng", "Alt")),)), velocity)

@@ -69,10 +69,10 @@ def is_imported_log(path: Path) -> bool:
     >>> is_imported_log(Path("00000042.BIN")), is_imported_log(Path("flight.mcap"))
     (True, False)
     """
-    return _suffix(path) in (*SUFFIXES, _TEXT_SUFFIX)
+    return _find_suffix(path) in (*SUFFIXES, _TEXT_SUFFIX)
 
 
-def _suffix(path: Path) -> str:
+def _find_suffix(path: Path) -> str:
     """Return the suffix of a file in lower case, or `TABLE_SUFFIX` for a table of columns."""
     return TABLE_SUFFIX if is_column_table_name(path) else path.suffix.lower()
 
@@ -100,7 +100,7 @@ def open_log(path: Path) -> "RawLog":
             raise LogError(f"{path}: empty; expected a log", file=path)
         log_type = detect_log_format(path, head)
         if log_type.extra:
-            require_extra(log_type.extra, f"{path}: reading {_suffix(path)} needs")
+            require_extra(log_type.extra, f"{path}: reading {_find_suffix(path)} needs")
         module, function = log_type.reader.rsplit(".", 1)
         read: Reader = getattr(import_module(f"logs.importers.{module}"), function)
         # Invalid numbers of a damaged log are left out later, and reported.
@@ -111,7 +111,7 @@ def open_log(path: Path) -> "RawLog":
     except AddressSpaceError:
         raise
     except MemoryError:
-        raise LogError(f"{path}: its stated size does not fit into memory", file=path) from None
+        raise LogError(f"{path}: the size stated in the file does not fit into memory", file=path) from None
 
 
 def detect_log_format(path: Path, head: bytes) -> LogFormat:
@@ -124,9 +124,9 @@ def detect_log_format(path: Path, head: bytes) -> LogFormat:
     ('.gpx', 'ArduPilot .BIN')
     """
     if re.search(_AS_TEXT, head, re.IGNORECASE):
-        raise LogError(f"{path}: a dataflash log converted to text; open the .BIN from which it was made", file=path)
+        raise LogError(f"{path}: a dataflash log converted to text; open the original .BIN", file=path)
     by_content = [log_type for log_type in FORMATS if re.search(log_type.content, head, re.DOTALL | re.IGNORECASE)]
-    by_suffix = [log_type for log_type in FORMATS if _suffix(path) in log_type.suffixes]
+    by_suffix = [log_type for log_type in FORMATS if _find_suffix(path) in log_type.suffixes]
     if not by_content and not by_suffix:
         names = ", ".join(log_type.name for log_type in FORMATS)
         message = f"not a known log format (it starts with {head[:8]!r}); expected {names}"

@@ -1,7 +1,7 @@
 """Count the fields in the message formats of a PX4 log, before pyulog creates them.
 
-A format may contain other formats, and arrays of them (PX4, "ULog File Format", Message Format): forty formats of which
-each contains the next one twice take a kilobyte and define 2^40 fields.  pyulog creates every field of a topic when the
+A format may contain other formats, and arrays of them (PX4, "ULog File Format", Message Format).  Forty formats that
+each contain the next one twice take a kilobyte, but define 2^40 fields.  pyulog creates every field of a topic when the
 log declares the topic.
 """
 
@@ -28,6 +28,7 @@ class MessageFormats:
     """
 
     def __init__(self, source: str) -> None:
+        """Start without formats and topics."""
         self._source = source
         self._formats: dict[str, list[tuple[str, int]]] = {}
         self._counts: dict[str, int] = {}
@@ -42,7 +43,7 @@ class MessageFormats:
         4
         """
         name, _, fields = text.partition(":")
-        self._formats[name] = list(_field_types(fields))
+        self._formats[name] = list(_parse_field_types(fields))
         self._counts.clear()
 
     def add_topic(self, name: str) -> None:
@@ -83,7 +84,7 @@ class MessageFormats:
         return self._counts[name]
 
 
-def _field_types(fields: str) -> Iterator[tuple[str, int]]:
+def _parse_field_types(fields: str) -> Iterator[tuple[str, int]]:
     """Yield the type of each field, and its number of elements: 1, or the length of an array."""
     for field in fields.split(";"):
         if match := _FIELD.match(field):

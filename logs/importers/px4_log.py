@@ -15,8 +15,8 @@ from pyulog import ULog
 
 from flight.mission.items import Home, Mission, MissionItem, item_problem, round_to_grid
 from flight.simulation.setup import Damage
-from logs.importers.dataflash_frames import MappedFile, piece_ends
-from logs.importers.logged_missions import px4_items, px4_state, without_gaps
+from logs.importers.dataflash_frames import MappedFile, iterate_piece_ends
+from logs.importers.logged_missions import describe_px4_state, renumber_px4_items, without_gaps
 from logs.importers.px4_formats import MessageFormats
 from logs.importers.raw_log import (
     HeightSource,
@@ -85,15 +85,15 @@ def open_topics(path: Path, names: list[str]) -> "Topics":
     except (AddressSpaceError, LogError):
         raise
     except MemoryError:
-        raise LogError(f"{path}: its stated size does not fit into memory", file=path) from None
+        raise LogError(f"{path}: the size stated in the file does not fit into memory", file=path) from None
     except Exception as error:  # of any kind: the library raises errors of struct, its own and plain ones
         reason = " ".join(str(error).split())[:120] or type(error).__name__
         raise LogError(f"{path}: not a readable PX4 log: {reason}", file=path) from error
-    return Topics(log, str(path), _file_damage(path))
+    return Topics(log, str(path), _find_file_damage(path))
 
 
 class _FormatCheckingFile:
-    """File for pyulog that checks the formats, and that corrects pyulog's backward seeks after short reads.
+    """File for pyulog that checks the formats and corrects pyulog's backward seeks after short reads.
 
     pyulog steps back by the stated length of a record even if fewer bytes were read, and would read the end of a
     damaged file again and again; this file steps back only by the bytes that were read.  pyulog first reads the three
@@ -101,6 +101,7 @@ class _FormatCheckingFile:
     """
 
     def __init__(self, file: BinaryIO, source: str) -> None:
+        """Wrap an open file, whose path `source` is named in messages."""
         self._file, self._missing, self._letter = file, 0, b""
         self._formats = MessageFormats(source)
 
@@ -143,13 +144,13 @@ def find_damage(data: Bytes, release_memory: Callable[[], None] = lambda: None) 
     """
     state = np.zeros(5, np.int64)
     state[_NEXT_BYTE], state[_IS_READING] = _HEADER, 1
-    for end in piece_ends(data.size, release_memory):
+    for end in iterate_piece_ends(data.size, release_memory):
         _walk_records(read_only(data), end, state, np.frombuffer(_LETTERS, np.uint8))
     cut = bool(state[_IS_CUT]) or int(state[_NEXT_BYTE]) < data.size
     return Damage(int(state[_DAMAGED_PLACES]), int(state[_LOST_BYTES]), cut)
 
 
-def _file_damage(path: Path) -> Damage:
+def _find_file_damage(path: Path) -> Damage:
     """Return the damage of a log file."""
     file = MappedFile(path)
     return find_damage(file.data, file.release_memory)
@@ -172,48 +173,48 @@ _IS_CUT = 4
 def _walk_records(data: Bytes, stop: int, state: Ints, letters: Bytes) -> None:
     """Walk over the records up to byte ``stop``, and count damaged places and lost bytes.
 
-    The walk continues from ``state``, and updates it.
-
+    state: progress of the walk, indexed by `_NEXT_BYTE` and so on; the walk continues from it and updates it.
     letters: letters of all kinds of records.
     """
     is_known_letter = np.zeros(256, np.bool_)
     for letter in letters:
         is_known_letter[letter] = True
-    k, places, size, reading, cut = (
+    k, damaged_places, lost_bytes, is_reading, is_cut = (
         state[_NEXT_BYTE],
         state[_DAMAGED_PLACES],
         state[_LOST_BYTES],
         state[_IS_READING],
         state[_IS_CUT],
     )
-    while k + 3 <= data.size and k < stop and not cut:
+    while k + 3 <= data.size and k < stop and not is_cut:
         length = data[k] + 256 * data[k + 1]
-        after = k + 3 + length
-        if is_known_letter[data[k + 2]] and after > data.size:
+        record_end = k + 3 + length
+        if is_known_letter[data[k + 2]] and record_end > data.size:
             # Nothing can follow a cut record.
-            cut = 1
+            is_cut = 1
             break
-        follows = after + 3 > data.size or is_known_letter[data[after + 2]]
-        if is_known_letter[data[k + 2]] and follows:
-            k = after
-            reading = 1
+        is_followed = record_end + 3 > data.size or is_known_letter[data[record_end + 2]]
+        if is_known_letter[data[k + 2]] and is_followed:
+            k = record_end
+            is_reading = 1
         else:
-            places += reading
-            reading = 0
-            size += 1
+            damaged_places += is_reading
+            is_reading = 0
+            lost_bytes += 1
             k += 1
     state[_NEXT_BYTE], state[_DAMAGED_PLACES], state[_LOST_BYTES], state[_IS_READING], state[_IS_CUT] = (
         k,
-        places,
-        size,
-        reading,
-        cut,
+        damaged_places,
+        lost_bytes,
+        is_reading,
+        is_cut,
     )
 
 
-def _instance_table(topic: str, data: dict[str, Any], choices: Iterable[tuple[str, ...]]) -> LogSeries | None:
-    """Return fields of one instance of a topic as columns; None if it lacks them.
+def _read_instance_table(topic: str, data: dict[str, Any], choices: Iterable[tuple[str, ...]]) -> LogSeries | None:
+    """Return fields of one instance of a topic as columns; None if the instance lacks them.
 
+    topic: name of the topic, for the result.
     data: values of the instance by field.
     choices: alternative groups of fields; the first group that the instance has is returned.
     """
@@ -231,6 +232,7 @@ class Topics:
     """
 
     def __init__(self, log: ULog, source: str, damage: Damage) -> None:
+        """Collect the instances of each topic that have rows, the first instance first."""
         self._log, self._source, self._damage = log, source, damage
         self._instances: dict[str, list[dict[str, Any]]] = {}
         for data in sorted(log.data_list, key=lambda data: int(data.multi_id)):
@@ -240,7 +242,7 @@ class Topics:
 
     def to_raw_log(self) -> RawLog:
         """Return the log with all data that a verdict needs.  Raises LogError for a log without positions."""
-        series = {name: values for name, values in self._series() if values is not None and len(values.time)}
+        series = {name: values for name, values in self._read_series() if values is not None and len(values.time)}
         if "position" not in series:
             raise LogError(
                 f"{self._source}: no vehicle_global_position: the flown position is unknown", file=self._source
@@ -251,13 +253,13 @@ class Topics:
             program=self.program(),
             vehicle=self.vehicle(),
             series=series,
-            heights=tuple(self._heights()),
+            heights=tuple(self._read_heights()),
             datum="amsl",
-            modes=tuple(self._modes()),
-            missions=tuple(self._missions()),
+            modes=tuple(self._read_modes()),
+            missions=tuple(self._read_missions()),
             parameters=self.parameters(),
             events=tuple((message.timestamp * 1e-6, str(message.message)) for message in self._log.logged_messages),
-            utc_start=self._utc_start(),
+            utc_start=self._find_utc_start(),
             damage=replace(self._damage, places=self._damage.places + len(self._log.dropouts)),
         )
 
@@ -267,26 +269,26 @@ class Topics:
         return self._source
 
     def table(self, topic: str, *choices: tuple[str, ...]) -> LogSeries | None:
-        """Return fields of a topic as columns; None if the log lacks them.
+        """Return fields of a topic's first instance as columns; None if the log lacks them.
 
         choices: alternative groups of fields; the first group that the topic has is returned.
         """
-        return _instance_table(topic, self._data.get(topic, {}), choices)
+        return _read_instance_table(topic, self._data.get(topic, {}), choices)
 
-    def _series(self) -> Iterable[tuple[str, LogSeries | None]]:
+    def _read_series(self) -> Iterable[tuple[str, LogSeries | None]]:
         """Yield the name and the values of each series of a `RawLog`; None for a series that the log lacks."""
         position = self.table("vehicle_global_position", ("lat", "lon", "alt"), ("latitude", "longitude", "altitude"))
-        yield "position", position if position is not None else self._gps()
-        yield "velocity", self._velocity()
+        yield "position", position if position is not None else self._read_gps_position()
+        yield "velocity", self._read_velocity()
         yield "attitude", self.attitude()
-        yield "airspeed", self._airspeed()
+        yield "airspeed", self._read_airspeed()
         winds = (self.table(topic, ("windspeed_east", "windspeed_north")) for topic in WIND_TOPICS)
         yield "wind", next((wind for wind in winds if wind is not None and np.any(wind.values)), None)
-        yield "battery", self._battery_with_energy()
+        yield "battery", self._read_battery_with_energy()
         yield "throttle", self.table("actuator_controls_0", ("control[3]",))
 
-    def _gps(self) -> LogSeries | None:
-        """Return latitude (deg), longitude (deg) and altitude (m AMSL) of GPS, (n, 3); None if not logged."""
+    def _read_gps_position(self) -> LogSeries | None:
+        """Return latitude, longitude (deg) and altitude (m AMSL) from GPS, (n, 3); None if not logged."""
         for topic in ("vehicle_gps_position", "sensor_gps"):
             position = self.table(topic, ("latitude_deg", "longitude_deg", "altitude_msl_m"))
             if position is not None:
@@ -298,7 +300,7 @@ class Topics:
                 )
         return None
 
-    def _velocity(self) -> LogSeries | None:
+    def _read_velocity(self) -> LogSeries | None:
         """Return the ground velocity to east, north and up, m/s, (n, 3); None if not logged."""
         velocity = self.table("vehicle_local_position", ("vy", "vx", "vz"))
         if velocity is None:
@@ -318,7 +320,7 @@ class Topics:
         yaw = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
         return LogSeries(quaternions.source, quaternions.time, np.stack([roll, pitch, yaw], axis=1))
 
-    def _airspeed(self) -> LogSeries | None:
+    def _read_airspeed(self) -> LogSeries | None:
         """Return the true airspeed, m/s, (n, 1); None if not logged or always 0."""
         for topic in ("airspeed_validated", "airspeed"):
             airspeed = self.table(topic, ("true_airspeed_m_s",))
@@ -337,7 +339,7 @@ class Topics:
         """
         connected_batteries = []
         for data in self._instances.get("battery_status", []):
-            status = _instance_table("battery_status", data, (("voltage_v", "current_a"),))
+            status = _read_instance_table("battery_status", data, (("voltage_v", "current_a"),))
             if status is None or ("connected" in data and not np.any(data["connected"])):
                 continue
             kind = float(data["source"][0]) if "source" in data else 0.0
@@ -355,21 +357,21 @@ class Topics:
         )
         return LogSeries(first.source, first.time, np.stack([volts.mean(axis=0), amps.sum(axis=0)], axis=1))
 
-    def _battery_with_energy(self) -> LogSeries | None:
+    def _read_battery_with_energy(self) -> LogSeries | None:
         """Return the battery current (A) and the energy used (Wh), (n, 2); None if the current is unknown."""
         battery = self.battery()
         return None if battery is None else with_used_energy(battery)
 
-    def _heights(self) -> Iterable[HeightSource]:
+    def _read_heights(self) -> Iterable[HeightSource]:
         """Yield the altitudes in the log other than the altitude of the position."""
-        gps = self._gps()
+        gps = self._read_gps_position()
         if gps is not None and "vehicle_global_position" in self._data:
             yield HeightSource(f"{gps.source}.alt", "amsl", LogSeries(gps.source, gps.time, gps.values[:, 2:]))
         baro = self.table("vehicle_air_data", ("baro_alt_meter",))
         if baro is not None:
             yield HeightSource("vehicle_air_data.baro_alt_meter", "pressure", baro)
 
-    def _modes(self) -> Iterable[ModeChange]:
+    def _read_modes(self) -> Iterable[ModeChange]:
         """Yield the changes of the navigation state, the first state included."""
         data = self._data.get("vehicle_status", {})
         if "nav_state" not in data:
@@ -377,7 +379,7 @@ class Topics:
         last_state = -1
         for time, state in zip(data["timestamp"].tolist(), data["nav_state"].tolist(), strict=True):
             if state != last_state:
-                yield ModeChange(time * 1e-6, *px4_state(int(state)))
+                yield ModeChange(time * 1e-6, *describe_px4_state(int(state)))
                 last_state = state
 
     def vehicle(self) -> VehicleKind:
@@ -385,7 +387,7 @@ class Topics:
         data = self._data.get("vehicle_status", {})
         if "vehicle_type" in data:
             kinds = np.asarray(data["vehicle_type"])
-            # A VTOL is a copter at the beginning and the end of a flight.
+            # Type 2 is a fixed wing; a VTOL is a copter at the beginning and the end of a flight.
             if (kinds == 2).any():
                 return "plane"
             return _TYPES.get(int(kinds[0]), "unknown")
@@ -393,24 +395,24 @@ class Topics:
             return "copter" if np.all(np.asarray(data["is_rotary_wing"])) else "plane"
         return "unknown"
 
-    def _missions(self) -> Iterable[LoggedMission]:
-        """Yield the mission, made of the items that became current, with the length from mission_result.
+    def _read_missions(self) -> Iterable[LoggedMission]:
+        """Yield the mission, which consists of the items that became current.
 
-        Nothing is yielded if the log has neither.
+        The number of items comes from mission_result.  Nothing is yielded if the log has neither.
         """
-        items = self._items()
+        items = self._read_items()
         stamps = self._data.get("navigator_mission_item", {}).get("timestamp", [0.0])
-        total = self._mission_length(float(stamps[-1]) if items else math.inf)
+        total = self._read_mission_length(float(stamps[-1]) if items else math.inf)
         if not items and not total:
             return
-        flown_items = px4_items([items[seq] for seq in sorted(items)])
+        flown_items = renumber_px4_items([items[seq] for seq in sorted(items)])
         mission = Mission(self.home(), flown_items, source=f"{self._source}: mission items")
         logged = LoggedMission(float(stamps[0]) * 1e-6, mission, "navigator_mission_item")
         gapless_mission = without_gaps(logged, total, max([total, *(item.seq for item in flown_items[-1:])]))
         if gapless_mission is not None:
             yield gapless_mission
 
-    def _items(self) -> dict[int, MissionItem]:
+    def _read_items(self) -> dict[int, MissionItem]:
         """Return the valid items that became current, by their number from 0; other items are not in the log."""
         data = self._data.get("navigator_mission_item", {})
         columns = ("sequence_current", "nav_cmd", "latitude", "longitude", "altitude")
@@ -434,7 +436,7 @@ class Topics:
                 items.setdefault(item.seq, item)
         return items
 
-    def _mission_length(self, stamp: float) -> int:
+    def _read_mission_length(self, stamp: float) -> int:
         """Return the number of items of the mission at a time (on the log's clock, us); 0 if not logged."""
         data = self._data.get("mission_result", {})
         if "seq_total" not in data:
@@ -456,7 +458,7 @@ class Topics:
         )
 
     def parameters(self) -> dict[str, float]:
-        """Return the last value of each parameter by name, without values that are not finite numbers."""
+        """Return the last value of each parameter by name; values that are not finite numbers are left out."""
         values = dict(self._log.initial_parameters)
         values |= {name: value for _, name, value in self._log.changed_parameters}
         # A damaged parameter may be a text.
@@ -471,8 +473,8 @@ class Topics:
             return f"{name} v{release >> 24 & 0xFF}.{release >> 16 & 0xFF}.{release >> 8 & 0xFF}"
         return name
 
-    def _utc_start(self) -> float:
-        """Return time 0 of the log's clock as given by the first GPS time, s since 1970; NaN if not logged."""
+    def _find_utc_start(self) -> float:
+        """Return the UTC time at time 0 of the log's clock, s since 1970; NaN if no GPS time is logged."""
         for topic in ("vehicle_gps_position", "sensor_gps"):
             data = self._data.get(topic, {})
             if "time_utc_usec" in data:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from logs.importers.motion import MotionLog, Samples, first_ground_position, sort_samples
+from logs.importers.motion import MotionLog, Samples, find_first_ground_position, sort_samples
 from logs.importers.px4_log import WIND_TOPICS, Topics, open_topics
 from world.arrays import Flags, Floats
 from world.errors import LogError
@@ -86,13 +86,13 @@ def read_px4_motion(path: Path, digest: str) -> MotionLog:
     topics = open_topics(path, _TOPICS)
     with np.errstate(all="ignore"):
         parameters = topics.parameters()
-        velocity = _samples(topics, "vehicle_local_position", ("vx", "vy", "vz"))
-        place = _samples(
+        velocity = _read_samples(topics, "vehicle_local_position", ("vx", "vy", "vz"))
+        place = _read_samples(
             topics, "vehicle_global_position", ("lat", "lon", "alt"), ("latitude", "longitude", "altitude")
         )
         attitude = topics.attitude()
-        controls, elevons = _controls(topics, parameters)
-        airspeed, ratio = _airspeed(topics)
+        controls, elevons = _read_controls(topics, parameters)
+        airspeed, ratio = _read_airspeed(topics)
         home, battery = topics.home(), topics.battery()
         height = NO_SAMPLES if not len(place.time) else Samples(place.time, place.values[:, 2:])
         return MotionLog(
@@ -100,11 +100,11 @@ def read_px4_motion(path: Path, digest: str) -> MotionLog:
             sha256=digest,
             program=topics.program(),
             vehicle=topics.vehicle(),
-            inertial=_inertial(topics),
+            inertial=_read_inertial(topics),
             outputs=NO_SAMPLES,
             attitude=NO_SAMPLES if attitude is None else sort_samples(attitude.time, attitude.values),
             velocity=velocity,
-            wind=_wind(topics),
+            wind=_read_wind(topics),
             airspeed=airspeed,
             ratio=ratio,
             height=height,
@@ -114,36 +114,38 @@ def read_px4_motion(path: Path, digest: str) -> MotionLog:
                 for px4_name, (name, factor) in _PARAMETERS.items()
                 if px4_name in parameters
             },
-            home=first_ground_position(place, velocity) if home is None else (home.lat_deg, home.lon_deg, home.alt),
+            home=find_first_ground_position(place, velocity)
+            if home is None
+            else (home.lat_deg, home.lon_deg, home.alt),
             program_kind="px4",
             controls=controls,
             elevons=elevons,
-            hovering=tuple(_hover_periods(topics)),
+            hovering=tuple(_find_hover_periods(topics)),
         )
 
 
-def _samples(topics: Topics, topic: str, *choices: tuple[str, ...]) -> Samples:
-    """Return fields of a topic, sorted by time: the first of several choices that the topic has.
+def _read_samples(topics: Topics, topic: str, *choices: tuple[str, ...]) -> Samples:
+    """Return fields of a topic, sorted by time; no rows if the topic has none of the groups of fields.
 
-    There are no rows if the topic has none of the choices.
+    choices: alternative groups of fields; the first group that the topic has is returned.
     """
     table = topics.table(topic, *choices)
     return NO_SAMPLES if table is None else sort_samples(table.time, table.values)
 
 
-def _inertial(topics: Topics) -> Samples:
+def _read_inertial(topics: Topics) -> Samples:
     """Return specific force (m/s²) and angular rates (rad/s), (n, 6).
 
     They come from the inertial sensors, or else from the two topics with filtered values.
     """
     force = tuple(f"accelerometer_m_s2[{k}]" for k in range(3))
     rates = tuple(f"gyro_rad[{k}]" for k in range(3))
-    samples = _samples(topics, "sensor_combined", force + rates)
+    samples = _read_samples(topics, "sensor_combined", force + rates)
     if len(samples.time):
         return samples
     axes = tuple(f"xyz[{k}]" for k in range(3))
     forces, angular_rates = (
-        _samples(topics, name, axes) for name in ("vehicle_acceleration", "vehicle_angular_velocity")
+        _read_samples(topics, name, axes) for name in ("vehicle_acceleration", "vehicle_angular_velocity")
     )
     if len(forces.time) < 2 or len(angular_rates.time) < 2:
         return NO_SAMPLES
@@ -153,21 +155,21 @@ def _inertial(topics: Topics) -> Samples:
     return Samples(time, np.column_stack([forces.values[has_rates], *rate_columns]))
 
 
-def _wind(topics: Topics) -> Samples:
+def _read_wind(topics: Topics) -> Samples:
     """Return the wind velocity to north and east, m/s, (n, 2), from the first topic that has rows."""
     for topic in WIND_TOPICS:
-        wind = _samples(topics, topic, ("windspeed_north", "windspeed_east"))
+        wind = _read_samples(topics, topic, ("windspeed_north", "windspeed_east"))
         if len(wind.time):
             return wind
     return NO_SAMPLES
 
 
-def _airspeed(topics: Topics) -> tuple[Samples, Samples]:
-    """Return the measured calibrated airspeed, m/s, and the ratio of true to calibrated airspeed.
+def _read_airspeed(topics: Topics) -> tuple[Samples, Samples]:
+    """Return the measured calibrated airspeed (m/s), and the ratio of true to calibrated airspeed.
 
     Rows whose airspeed is not from a sensor are left out.
     """
-    # Calibrated since 1.12, equivalent until then: equal at these speeds.
+    # PX4 logs calibrated airspeed since 1.12, and equivalent airspeed before; both are equal at these speeds.
     choices = [(speed, "true_airspeed_m_s") for speed in ("calibrated_airspeed_m_s", "equivalent_airspeed_m_s")]
     validated = topics.table("airspeed_validated", *choices)
     if validated is None:
@@ -187,8 +189,8 @@ def _airspeed(topics: Topics) -> tuple[Samples, Samples]:
     return sort_samples(time, values[:, :1]), sort_samples(time[is_moving], ratio)
 
 
-def _hover_periods(topics: Topics) -> Iterable[tuple[float, float]]:
-    """Yield the start and end (s) of each period in which a VTOL was not a plane, or was in transition."""
+def _find_hover_periods(topics: Topics) -> Iterable[tuple[float, float]]:
+    """Yield start and end (s) of each period in which a VTOL flew on lifting motors or in transition."""
     kinds = topics.table("vehicle_status", ("vehicle_type", "in_transition_mode"), ("vehicle_type",))
     if kinds is None:
         return
@@ -201,27 +203,27 @@ def _hover_periods(topics: Topics) -> Iterable[tuple[float, float]]:
             yield start, end
 
 
-def _controls(topics: Topics, parameters: Mapping[str, float]) -> tuple[Samples, bool]:
+def _read_controls(topics: Topics, parameters: Mapping[str, float]) -> tuple[Samples, bool]:
     """Return pitch, roll, yaw (fractions of travel) and throttle, (n, 4), and True if there are elevons.
 
-    The deflection of a surface is positive up or to the right.  The torque scales of a surface (CA_SV_CSn_TRQ_*) state
-    its effect on each axis; the deflection of an axis is the mean of the surfaces, weighted by these scales.  Raises
+    The deflection of a surface is positive up or to the right.  The parameters CA_SV_CSn_TRQ_* of a surface state its
+    effect on each axis.  The deflection about an axis is the mean of all surfaces, weighted by these effects.  Raises
     LogError for surfaces that cannot be modelled.
     """
-    servos = _actuators(topics, "actuator_servos", _SERVOS)
-    motors = _actuators(topics, "actuator_motors", _MOTORS)
+    servos = _read_actuators(topics, "actuator_servos", _SERVOS)
+    motors = _read_actuators(topics, "actuator_motors", _MOTORS)
     # An unused servo has NaN.
     is_known = np.isfinite(servos.values).any(axis=1) & _is_armed(topics, servos.time)
     servos = Samples(servos.time[is_known], servos.values[is_known])
     if len(servos.time) < 2 or len(motors.time) < 2:
         # Roll, pitch, yaw and throttle before the mixer, in logs of old releases.
-        mixer_inputs = _samples(topics, "actuator_controls_0", tuple(f"control[{k}]" for k in range(4)))
+        mixer_inputs = _read_samples(topics, "actuator_controls_0", tuple(f"control[{k}]" for k in range(4)))
         if not len(mixer_inputs.time):
             return NO_SAMPLES, False
         return Samples(mixer_inputs.time, mixer_inputs.values[:, [1, 0, 2, 3]]), False
     airframe = int(parameters.get("CA_AIRFRAME", _WING))
     if airframe not in (_WING, _STANDARD_VTOL):
-        raise _parameter_error(
+        raise _make_parameter_error(
             topics, "CA_AIRFRAME", airframe, f"{_AIRFRAMES.get(airframe, 'unknown')}; expected a plane"
         )
     scales = np.zeros((3, _SERVOS))
@@ -236,24 +238,24 @@ def _controls(topics: Topics, parameters: Mapping[str, float]) -> tuple[Samples,
             has_elevons = has_elevons or kind in _ELEVONS
             servos.values[:, k] -= parameters.get(f"CA_SV_CS{k}_TRIM", 0.0)
         elif kind in _MIXED:
-            raise _parameter_error(topics, f"CA_SV_CS{k}_TYPE", kind, f"{_MIXED[kind]}, whose mix is not modelled")
+            raise _make_parameter_error(topics, f"CA_SV_CS{k}_TYPE", kind, f"{_MIXED[kind]}, whose mix is not modelled")
         elif kind in _FLAPS and moves:
             message = f"the {_FLAPS[kind]} moves in flight, which the model does not represent"
-            raise _parameter_error(topics, f"CA_SV_CS{k}_TYPE", kind, message)
+            raise _make_parameter_error(topics, f"CA_SV_CS{k}_TYPE", kind, message)
     for axis, row in zip(("elevator", "aileron"), scales, strict=False):
         if not row.any():
             allowed = "expected CA_SV_CSn_TYPE with CA_SV_CSn_TRQ_P and CA_SV_CSn_TRQ_R"
-            raise LogError(f"{topics.source}: no surface controls the {axis}; {allowed}", file=topics.source)
+            raise LogError(f"{topics.source}: no surface acts as {axis}; {allowed}", file=topics.source)
     sums = np.abs(scales).sum(axis=1, keepdims=True)
     axis_deflections = np.nan_to_num(servos.values) @ (scales / np.where(sums > 0.0, sums, 1.0)).T
     # A motor below 2 % of its thrust is stopped, which is NaN (PX4's control allocator).
-    thrusts = np.nan_to_num(motors.values[:, _forward_motors(topics, airframe, parameters, motors)])
+    thrusts = np.nan_to_num(motors.values[:, _find_forward_motors(topics, airframe, parameters, motors)])
     throttle = np.clip(thrusts.mean(axis=1), 0.0, 1.0) if thrusts.size else np.zeros(len(motors.time))
     rows = np.clip(np.searchsorted(motors.time, servos.time, side="right") - 1, 0, len(motors.time) - 1)
     return Samples(servos.time, np.column_stack([axis_deflections, throttle[rows]])), has_elevons
 
 
-def _forward_motors(topics: Topics, airframe: int, parameters: Mapping[str, float], motors: Samples) -> list[int]:
+def _find_forward_motors(topics: Topics, airframe: int, parameters: Mapping[str, float], motors: Samples) -> list[int]:
     """Return the indices of the motors that push forward.
 
     Raises LogError for a VTOL without such a motor.
@@ -265,26 +267,29 @@ def _forward_motors(topics: Topics, airframe: int, parameters: Mapping[str, floa
             [abs(parameters.get(f"CA_ROTOR{k}_A{axis}", up)) for axis, up in (("X", 0.0), ("Z", 1.0))]
             for k in range(count)
         ]
-        ahead = [k for k, (x, z) in enumerate(axes) if x > z]
-        if not ahead:
-            allowed = "expected one with |CA_ROTORn_AX| above |CA_ROTORn_AZ|"
-            raise _parameter_error(topics, "CA_ROTOR_COUNT", count, f"no rotor pushes forward; {allowed}")
-        return ahead
+        forward_rotors = [k for k, (x, z) in enumerate(axes) if x > z]
+        if not forward_rotors:
+            allowed = "expected a rotor with |CA_ROTORn_AX| above |CA_ROTORn_AZ|"
+            raise _make_parameter_error(topics, "CA_ROTOR_COUNT", count, f"no rotor pushes forward; {allowed}")
+        return forward_rotors
     return list(range(count)) or np.flatnonzero(np.isfinite(motors.values).any(axis=0)).tolist()
 
 
 def _check_flaperon(topics: Topics, parameters: Mapping[str, float], surface: int) -> None:
-    """Raise LogError if a surface is also deflected as a flap or a spoiler during the flight."""
+    """Raise LogError if a control surface is also deflected as a flap or a spoiler during the flight.
+
+    surface: number of the surface in PX4's parameters, from 0.
+    """
     for name, (title, topic) in _ALSO_MOVE.items():
         deflection_ratio = parameters.get(f"CA_SV_CS{surface}_{name}", 0.0)
-        setpoints = _samples(topics, topic, ("normalized_setpoint",)).values
+        setpoints = _read_samples(topics, topic, ("normalized_setpoint",)).values
         if len(setpoints) and abs(deflection_ratio) * float(np.ptp(setpoints)) > _FLAP_MOVE_TOLERANCE:
             message = f"{title} deflect this surface in flight, which the model does not represent"
-            raise _parameter_error(topics, f"CA_SV_CS{surface}_{name}", deflection_ratio, message)
+            raise _make_parameter_error(topics, f"CA_SV_CS{surface}_{name}", deflection_ratio, message)
 
 
-def _actuators(topics: Topics, topic: str, size: int) -> Samples:
-    """Return the outputs of a topic's actuators, (n, size), sorted by time; no rows if the log lacks the topic.
+def _read_actuators(topics: Topics, topic: str, size: int) -> Samples:
+    """Return the outputs of the actuators in a topic, (n, size), by time; no rows without the topic.
 
     NaN stands for an unused or stopped actuator.
     """
@@ -298,14 +303,14 @@ def _actuators(topics: Topics, topic: str, size: int) -> Samples:
 
 def _is_armed(topics: Topics, time: Floats) -> Flags:
     """Return a mask (n,): True at times when the vehicle was armed; all True if the log does not state it."""
-    states = _samples(topics, "vehicle_status", ("arming_state",))
+    states = _read_samples(topics, "vehicle_status", ("arming_state",))
     if not len(states.time):
         return np.ones(len(time), np.bool_)
     rows = np.clip(np.searchsorted(states.time, time, side="right") - 1, 0, None)
     return np.asarray(states.values[rows, 0] == _ARMED)
 
 
-def _parameter_error(topics: Topics, field: str, value: float, message: str) -> LogError:
+def _make_parameter_error(topics: Topics, field: str, value: float, message: str) -> LogError:
     """Return the error for a parameter of surfaces or motors that cannot be modelled.
 
     message: reason, shown after name and value.

@@ -181,7 +181,7 @@ def example_raw_log(lat: float = 46.0, lon: float = 8.0, up: float = EXAMPLE_ALT
     course = np.where(distance_run < EXAMPLE_LEG_M, 0.0, 0.5 * math.pi)
     zeros, boot_time = np.zeros(time.size), time + 20.0
 
-    def series(name: str, *columns: np.ndarray) -> LogSeries:
+    def make_series(name: str, *columns: np.ndarray) -> LogSeries:
         """Return a series of columns at all times of the flight."""
         return LogSeries(name, boot_time, np.column_stack(columns))
 
@@ -200,14 +200,16 @@ def example_raw_log(lat: float = 46.0, lon: float = 8.0, up: float = EXAMPLE_ALT
         program="ArduPlane V4.5.0",
         vehicle="plane",
         series={
-            "position": series("POS", lats, lons, height),
-            "velocity": series("XKF1", EXAMPLE_SPEED_MPS * np.sin(course), EXAMPLE_SPEED_MPS * np.cos(course), zeros),
-            "attitude": series("ATT", zeros, zeros + 0.05, course),
-            "airspeed": series("ARSP", zeros + EXAMPLE_SPEED_MPS),
-            "wind": series("XKF2", zeros, zeros - 3.0),
-            "throttle": series("CTUN", zeros + 0.6),
+            "position": make_series("POS", lats, lons, height),
+            "velocity": make_series(
+                "XKF1", EXAMPLE_SPEED_MPS * np.sin(course), EXAMPLE_SPEED_MPS * np.cos(course), zeros
+            ),
+            "attitude": make_series("ATT", zeros, zeros + 0.05, course),
+            "airspeed": make_series("ARSP", zeros + EXAMPLE_SPEED_MPS),
+            "wind": make_series("XKF2", zeros, zeros - 3.0),
+            "throttle": make_series("CTUN", zeros + 0.6),
         },
-        heights=(HeightSource("GPS.Alt", "amsl", series("GPS", height + 0.5)),),
+        heights=(HeightSource("GPS.Alt", "amsl", make_series("GPS", height + 0.5)),),
         datum="amsl",
         modes=(ModeChange(20.0, "AUTO", True),),
         missions=(LoggedMission(20.0, Mission(home, items, source="example.BIN"), "CMD"),),

@@ -24,10 +24,10 @@ from logs.importers.logged_missions import (
     LoggedItem,
     LoggedItemGroup,
     combine_items,
+    describe_plane_mode,
+    describe_px4_mode,
     make_logged_mission,
-    plane_mode,
-    px4_items,
-    px4_mode,
+    renumber_px4_items,
     without_gaps,
 )
 from logs.importers.raw_log import (
@@ -95,7 +95,7 @@ class TelemetryReader:
             if position >= piece_end:
                 self.release_memory()
                 piece_end = position + PIECE_BYTES
-            length = self._record_length(position)
+            length = self._find_record_length(position)
             if length == 0:
                 self.places += is_in_record
                 self.size += 1
@@ -106,7 +106,7 @@ class TelemetryReader:
                 self.cut = True
                 break
             is_in_record = True
-            if self._message_number(position) in self.wanted:
+            if self._read_message_number(position) in self.wanted:
                 stamp = _STAMP.unpack_from(self.data, position)[0] * 1e-6
                 message = self._decode(bytes(self.data[position + _STAMP.size : position + length]))
                 if message is None:
@@ -119,7 +119,7 @@ class TelemetryReader:
         """Return the damage found so far."""
         return Damage(self.places, self.size, self.cut, self.unreadable)
 
-    def _record_length(self, position: int) -> int:
+    def _find_record_length(self, position: int) -> int:
         """Return the length of the record at a position, including its time, bytes.
 
         Return 0 if no record begins there.
@@ -136,7 +136,7 @@ class TelemetryReader:
             return _STAMP.size + _V2_FRAME + payload_size + signature_size
         return 0
 
-    def _message_number(self, position: int) -> int:
+    def _read_message_number(self, position: int) -> int:
         """Return the message number of the packet in the record at a position."""
         packet = position + _STAMP.size
         if self.data[packet] == _V1:
@@ -191,6 +191,8 @@ class SystemMessages:
     """Messages sent by one system."""
 
     def __init__(self) -> None:
+        """Start without messages."""
+        # Time of reception (s since 1970) and the vehicle's own time (s; NaN if not stated) of each message.
         self._stamps, self._boots = array("d"), array("d")
         self._rows: dict[str, array[float]] = {}
         self._named: dict[str, list[tuple[int, Any]]] = {}
@@ -290,11 +292,11 @@ _MISSION_TYPE = 0
 
 def read_telemetry(path: Path) -> RawLog:
     """Read a telemetry log.  Raises LogError for a log without positions or without a vehicle."""
-    messages, damage = vehicle_messages(path)
+    messages, damage = read_vehicle_messages(path)
     return messages.to_raw_log(damage)
 
 
-def vehicle_messages(path: Path) -> tuple["VehicleMessages", Damage]:
+def read_vehicle_messages(path: Path) -> tuple["VehicleMessages", Damage]:
     """Return the messages of the vehicle with the most messages, and the damage of the file.
 
     Raises LogError for a log without a vehicle.
@@ -313,7 +315,7 @@ def vehicle_messages(path: Path) -> tuple["VehicleMessages", Damage]:
         if any(_is_vehicle(heartbeat) for _, heartbeat in messages.named("HEARTBEAT"))
     ]
     if not vehicles:
-        raise LogError(f"{path}: no HEARTBEAT of a vehicle: nothing says what flew", file=path)
+        raise LogError(f"{path}: no HEARTBEAT of a vehicle: the kind of vehicle is unknown", file=path)
     # Of several vehicles take the one with the most messages.
     return VehicleMessages(max(vehicles, key=len), items, str(path)), reader.damage()
 
@@ -331,19 +333,19 @@ class VehicleMessages:
 
         items: messages on missions with their times of reception, s since 1970.
         """
-        self._source, self._found = source, messages
+        self._source, self._messages = source, messages
         clock = messages.boot_clock()
         self._offset, self.jumps, self._times = clock.offset, clock.jumps, clock.time
         # Missions are sent to the vehicle: their messages come from the station.
         self._items = [(stamp - self._offset, message) for stamp, message in items]
-        self._own = {
+        self._named_messages = {
             name: [(float(self._times[k]), message) for k, message in messages.named(name)] for name in _KEPT_MESSAGES
         }
 
     def to_raw_log(self, damage: Damage) -> RawLog:
         """Return the log with all data that a verdict needs.  Raises LogError for a log without positions."""
-        series = {name: log_series for name, log_series in self._series() if log_series is not None}
-        heartbeats = [message for _, message in self._own.get("HEARTBEAT", []) if _is_vehicle(message)]
+        series = {name: log_series for name, log_series in self._read_series() if log_series is not None}
+        heartbeats = [message for _, message in self._named_messages.get("HEARTBEAT", []) if _is_vehicle(message)]
         if "position" not in series:
             raise LogError(
                 f"{self._source}: no GLOBAL_POSITION_INT or GPS_RAW_INT with a fix: the flown position is unknown",
@@ -352,29 +354,35 @@ class VehicleMessages:
         return RawLog(
             source=self._source,
             format=FORMAT,
-            program=self._program(heartbeats[0]),
+            program=self._find_program(heartbeats[0]),
             vehicle=_TYPES.get(heartbeats[0].type, "unknown"),
             series=series,
-            heights=tuple(self._heights()),
+            heights=tuple(self._read_heights()),
             datum="amsl",
-            modes=tuple(self._modes()),
-            missions=tuple(self._missions()),
-            parameters=self._parameters(),
-            events=tuple((time, _text(message.text)) for time, message in self._own.get("STATUSTEXT", [])),
+            modes=tuple(self._read_modes()),
+            missions=tuple(self._read_missions()),
+            parameters=self._read_parameters(),
+            events=tuple(
+                (time, _decode_text(message.text)) for time, message in self._named_messages.get("STATUSTEXT", [])
+            ),
             utc_start=self._offset,
             clock_jumps=self.jumps,
             damage=damage,
         )
 
     def table(self, name: str, columns: Iterable[str]) -> LogSeries | None:
-        """Return columns of a message in the units as sent, by the vehicle's clock; None if it was never sent."""
-        rows = self._found.table(name)
+        """Return fields of a message in the units in which they were sent; None if the message was never sent.
+
+        name: name of the message, a key of `NUMBERS`.
+        columns: names of the fields.
+        """
+        rows = self._messages.table(name)
         if not len(rows):
             return None
         column_numbers = [1 + NUMBERS[name].index(column) for column in columns]
         return LogSeries(name, self._times[rows[:, 0].astype(np.int64)], rows[:, column_numbers])
 
-    def _series(self) -> Iterable[tuple[str, LogSeries | None]]:
+    def _read_series(self) -> Iterable[tuple[str, LogSeries | None]]:
         """Yield the name and the values of each series of a `RawLog`; None for a series that the log lacks."""
         positions = self.table("GLOBAL_POSITION_INT", ("lat", "lon", "alt", "vy", "vx", "vz"))
         if positions is not None:
@@ -391,9 +399,9 @@ class VehicleMessages:
             yield "position", LogSeries(positions.source, positions.time, scaled[:, :3])
             yield "velocity", LogSeries(positions.source, positions.time, scaled[:, 3:])
         else:
-            yield "position", self._gps_position()
+            yield "position", self._read_gps_position()
         yield "attitude", self.table("ATTITUDE", ("roll", "pitch", "yaw"))
-        yield "wind", self._wind()
+        yield "wind", self._read_wind()
         hud = self.table("VFR_HUD", ("airspeed", "alt", "throttle", "groundspeed"))
         if hud is not None:
             # Some vehicles without an airspeed sensor send the ground speed instead.
@@ -403,12 +411,12 @@ class VehicleMessages:
                 ratio = np.array([eas_to_tas_ratio(float(height)) for height in up])
                 yield "airspeed", LogSeries("VFR_HUD", hud.time, hud.values[:, :1] * ratio[:, None])
             yield "throttle", LogSeries("VFR_HUD", hud.time, hud.values[:, 2:3] * 0.01)
-        yield "battery", self._battery_with_energy()
+        yield "battery", self._read_battery_with_energy()
 
-    def _gps_position(self) -> LogSeries | None:
-        """Return the positions of GPS with a 3-D fix; None without a fix.
+    def _read_gps_position(self) -> LogSeries | None:
+        """Return the GPS positions with a 3-D fix: latitude and longitude (deg) and altitude (m), (n, 3).
 
-        They are latitude (deg), longitude (deg) and altitude (m), (n, 3).
+        Return None if the receiver never had a fix.
         """
         table = self.table("GPS_RAW_INT", ("lat", "lon", "alt", "fix_type"))
         if table is None:
@@ -419,8 +427,8 @@ class VehicleMessages:
         scaled = np.round(table.values[has_fix, :3] * np.array([1e-7, 1e-7, 1e-3]), 7)
         return LogSeries("GPS_RAW_INT", table.time[has_fix], scaled)
 
-    def _wind(self) -> LogSeries | None:
-        """Return the wind velocity to east and north, m/s, (n, 2); None if no wind was sent or all of it is 0."""
+    def _read_wind(self) -> LogSeries | None:
+        """Return the wind velocity to east and north, m/s, (n, 2); None if it was not sent or is always 0."""
         wind = self.table("WIND", ("direction", "speed"))
         if wind is not None and np.any(wind.values[:, 1]):
             # The direction is the direction from which the wind blows.
@@ -429,9 +437,9 @@ class VehicleMessages:
         wind = self.table("WIND_COV", ("wind_y", "wind_x"))
         return wind if wind is not None and np.any(wind.values) else None
 
-    def _battery_with_energy(self) -> LogSeries | None:
+    def _read_battery_with_energy(self) -> LogSeries | None:
         """Return the battery's current (A) and the energy used (Wh), (n, 2); None if neither was measured."""
-        table = self._measured_table("BATTERY_STATUS", ("current_battery", "energy_consumed"))
+        table = self._read_measured_table("BATTERY_STATUS", ("current_battery", "energy_consumed"))
         if table is not None and np.any(table.values[:, 1] > 0.0):
             current = np.maximum(table.values[:, 0] * 0.01, 0.0)
             return LogSeries(table.source, table.time, np.stack([current, table.values[:, 1] / 36.0], axis=1))
@@ -440,40 +448,44 @@ class VehicleMessages:
 
     def battery(self) -> LogSeries | None:
         """Return the battery's voltage (V) and current (A), (n, 2); None if the current was not measured."""
-        table = self._measured_table("SYS_STATUS", ("voltage_battery", "current_battery"))
+        table = self._read_measured_table("SYS_STATUS", ("voltage_battery", "current_battery"))
         if table is None or not np.any(table.values[:, 1] > 0.0):
             return None
         return LogSeries(table.source, table.time, table.values * np.array([1e-3, 0.01]))
 
-    def _measured_table(self, name: str, columns: tuple[str, ...]) -> LogSeries | None:
-        """Return columns of a battery message, only with measured values; None if no row has them."""
+    def _read_measured_table(self, name: str, columns: tuple[str, ...]) -> LogSeries | None:
+        """Return fields of a battery message, only the rows with measurements; None if there are none."""
         table = self.table(name, columns)
         if table is None:
             return None
         is_measured = np.all([table.values[:, k] != NOT_MEASURED[column] for k, column in enumerate(columns)], axis=0)
         return LogSeries(name, table.time[is_measured], table.values[is_measured]) if is_measured.any() else None
 
-    def _heights(self) -> Iterable[HeightSource]:
+    def _read_heights(self) -> Iterable[HeightSource]:
         """Yield the altitudes in the log other than the altitude of the position."""
-        gps = self._gps_position()
-        if gps is not None and len(self._found.table("GLOBAL_POSITION_INT")):
+        gps = self._read_gps_position()
+        if gps is not None and len(self._messages.table("GLOBAL_POSITION_INT")):
             yield HeightSource("GPS_RAW_INT.alt", "amsl", LogSeries(gps.source, gps.time, gps.values[:, 2:]))
         hud = self.table("VFR_HUD", ("alt",))
         if hud is not None:
             yield HeightSource("VFR_HUD.alt", "amsl", hud)
 
-    def _modes(self) -> Iterable[ModeChange]:
+    def _read_modes(self) -> Iterable[ModeChange]:
         """Yield the changes of the vehicle's mode, the first mode included."""
         last_mode: tuple[str, bool] | None = None
-        for time, heartbeat in self._own.get("HEARTBEAT", []):
+        for time, heartbeat in self._named_messages.get("HEARTBEAT", []):
             if not _is_vehicle(heartbeat):
                 continue
-            mode = px4_mode(heartbeat.custom_mode) if heartbeat.autopilot == _PX4 else plane_mode(heartbeat.custom_mode)
+            mode = (
+                describe_px4_mode(heartbeat.custom_mode)
+                if heartbeat.autopilot == _PX4
+                else describe_plane_mode(heartbeat.custom_mode)
+            )
             if mode != last_mode:
                 yield ModeChange(time, *mode)
                 last_mode = mode
 
-    def _missions(self) -> Iterable[LoggedMission]:
+    def _read_missions(self) -> Iterable[LoggedMission]:
         """Yield the missions whose items a station uploaded or downloaded."""
         rows: list[LoggedItem] = []
         total, begins_mission = 0, False
@@ -489,16 +501,18 @@ class VehicleMessages:
                 )
                 begins_mission = False
         for logged in combine_items(rows):
-            mission = (_px4_mission if self.is_px4 else make_logged_mission)(logged, self._source, "mission items")
+            mission = (_make_px4_mission if self.is_px4 else make_logged_mission)(logged, self._source, "mission items")
             if mission is not None:
                 yield replace(mission, mission=self._with_home(mission.mission))
 
     def _with_home(self, mission: Mission) -> Mission:
-        """Return a mission with the home that the vehicle reported last; unchanged if it reported none.
+        """Replace a mission's home by the last home that the vehicle reported, if it reported any.
 
-        The home in an uploaded mission is only an assumption of the station.
+        The home in an uploaded mission is only an assumption of the ground station.
         """
-        reports = [message for _, message in self._own["HOME_POSITION"] if message.latitude or message.longitude]
+        reports = [
+            message for _, message in self._named_messages["HOME_POSITION"] if message.latitude or message.longitude
+        ]
         if not reports:
             return mission
         report = reports[-1]
@@ -507,43 +521,45 @@ class VehicleMessages:
 
     def mode_numbers(self) -> Iterator[tuple[float, int]]:
         """Yield the time and the mode number of each heartbeat of the vehicle."""
-        for time, heartbeat in self._own.get("HEARTBEAT", []):
+        for time, heartbeat in self._named_messages.get("HEARTBEAT", []):
             if _is_vehicle(heartbeat):
                 yield time, int(heartbeat.custom_mode)
 
     @property
     def is_px4(self) -> bool:
-        """True if PX4 flew."""
-        return any(heartbeat.autopilot == _PX4 for _, heartbeat in self._own["HEARTBEAT"] if _is_vehicle(heartbeat))
+        """True if the vehicle's autopilot is PX4."""
+        return any(
+            heartbeat.autopilot == _PX4 for _, heartbeat in self._named_messages["HEARTBEAT"] if _is_vehicle(heartbeat)
+        )
 
-    def _parameters(self) -> dict[str, float]:
+    def _read_parameters(self) -> dict[str, float]:
         """Return the last finite value of each parameter that the vehicle sent."""
         values: dict[str, float] = {}
-        for _, message in self._own.get("PARAM_VALUE", []):
-            name = _text(message.param_id)
+        for _, message in self._named_messages.get("PARAM_VALUE", []):
+            name = _decode_text(message.param_id)
             if name and math.isfinite(message.param_value):
                 values[name] = float(message.param_value)
         return values
 
-    def _program(self, heartbeat: Any) -> str:
+    def _find_program(self, heartbeat: Any) -> str:
         """Return ArduPilot's start message with its version, or the autopilot's name; "" if unknown."""
-        for _, message in self._own.get("STATUSTEXT", []):
-            text = _text(message.text)
+        for _, message in self._named_messages.get("STATUSTEXT", []):
+            text = _decode_text(message.text)
             if "Ardu" in text and " V" in text:
                 return text
         return _NAMES.get(heartbeat.autopilot, "")
 
 
-def _text(value: str | bytes) -> str:
+def _decode_text(value: str | bytes) -> str:
     """Return a text field up to its first zero byte, without surrounding spaces."""
     text = value.decode("latin-1") if isinstance(value, bytes) else value
     return text.partition("\0")[0].strip()
 
 
 def _parse_item(message: Any, *, scaled: bool) -> MissionItem:
-    """Return the item of a mission message.
+    """Convert a MAVLink mission message to a mission item.
 
-    scaled: True if its coordinates are integers of 1e-7 degrees.
+    scaled: True if latitude and longitude are integers of 1e-7 degrees.
     """
     command, frame = int(message.command), int(message.frame)
     lat, lon = (message.x * 1e-7, message.y * 1e-7) if scaled else (float(message.x), float(message.y))
@@ -553,11 +569,11 @@ def _parse_item(message: Any, *, scaled: bool) -> MissionItem:
     )
 
 
-def _px4_mission(logged: LoggedItemGroup, source: str, origin: str) -> LoggedMission | None:
-    """Make a mission of PX4 items, which are numbered from 0 and contain no home.
+def _make_px4_mission(logged: LoggedItemGroup, source: str, origin: str) -> LoggedMission | None:
+    """Make a mission from logged items of PX4, which are numbered from 0 and contain no home.
 
     Return None if the mission is complete but has fewer than two items.
     """
-    mission = Mission(None, px4_items(logged.items), source=f"{source}: {origin}")
+    mission = Mission(None, renumber_px4_items(logged.items), source=f"{source}: {origin}")
     end = max(logged.total, mission.items[-1].seq)
     return without_gaps(LoggedMission(logged.time, mission, origin), logged.total, end)

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import numpy as np
 
-from logs.importers.motion import OUTPUTS, MotionLog, Samples, first_ground_position, sort_samples
+from logs.importers.motion import OUTPUTS, MotionLog, Samples, find_first_ground_position, sort_samples
 from logs.importers.raw_log import LogSeries
-from logs.importers.telemetry_log import VehicleMessages, vehicle_messages
+from logs.importers.telemetry_log import VehicleMessages, read_vehicle_messages
 from logs.importers.wind_triangle import estimate_wind
 from world.arrays import Floats
 from world.errors import LogError
@@ -28,9 +28,9 @@ def read_telemetry_motion(path: Path, digest: str) -> MotionLog:
     Raises LogError for a log without a vehicle, and for PX4, because its telemetry does not state which surface each
     output moves.
     """
-    messages, damage = vehicle_messages(path)
+    messages, damage = read_vehicle_messages(path)
     if messages.is_px4:
-        advice = "a .ulg of the same flight does"
+        advice = "use the .ulg of the same flight"
         raise LogError(f"{path}: telemetry of PX4 does not state what its outputs move; {advice}", file=path)
     raw = messages.to_raw_log(damage)
     velocity = _select_columns(raw.series.get("velocity"), [1, 0, 2], [1.0, 1.0, -1.0])
@@ -45,8 +45,8 @@ def read_telemetry_motion(path: Path, digest: str) -> MotionLog:
         sha256=digest,
         program=raw.program,
         vehicle=raw.vehicle,
-        inertial=_inertial(messages),
-        outputs=_outputs(messages),
+        inertial=_read_inertial(messages),
+        outputs=_read_outputs(messages),
         attitude=attitude,
         velocity=velocity,
         wind=wind,
@@ -58,49 +58,49 @@ def read_telemetry_motion(path: Path, digest: str) -> MotionLog:
         battery=_select_columns(messages.battery(), [0, 1]),
         modes=tuple(messages.mode_numbers()),
         parameters=raw.parameters,
-        home=first_ground_position(_select_columns(position, [0, 1, 2]), velocity),
+        home=find_first_ground_position(_select_columns(position, [0, 1, 2]), velocity),
         program_kind="telemetry",
     )
 
 
 def _select_columns(series: LogSeries | None, columns: list[int], factors: list[float] | None = None) -> Samples:
-    """Return columns of a series, sorted by time, each times its factor; no rows without a series."""
+    """Return columns of a series, sorted by time, multiplied by one factor each; no rows without series."""
     if series is None:
         return NO_SAMPLES
     return sort_samples(series.time, series.values[:, columns] * np.array([1.0] if factors is None else factors))
 
 
-def _message_times(time: Floats, microseconds: Floats) -> Floats:
-    """Return the times at which messages were made, instead of the times of their reception, s, (n,).
+def _correct_message_times(time: Floats, microseconds: Floats) -> Floats:
+    """Return the times at which the vehicle made its messages, s, (n,), instead of their reception.
 
     time: times of reception on the vehicle's clock, s, (n,).
     microseconds: times in the messages since the vehicle was switched on, us, (n,); the count may wrap after 32 bits.
 
-    If both times differ too much, the time of reception is kept.
+    The time of reception is returned where the two times differ by `_MAX_CLOCK_DIFFERENCE_S` or more.
 
-    >>> _message_times(np.array([4300.0, 4300.3]), np.array([5.1e6, 5.2e6])).round(3).tolist()
+    >>> _correct_message_times(np.array([4300.0, 4300.3]), np.array([5.1e6, 5.2e6])).round(3).tolist()
     [4300.067, 4300.167]
     """
-    own_time = microseconds * 1e-6
-    own_time = own_time + _WRAP_S * np.round((time - own_time) / _WRAP_S)
-    return np.asarray(np.where(np.abs(own_time - time) < _MAX_CLOCK_DIFFERENCE_S, own_time, time))
+    message_time = microseconds * 1e-6
+    message_time = message_time + _WRAP_S * np.round((time - message_time) / _WRAP_S)
+    return np.asarray(np.where(np.abs(message_time - time) < _MAX_CLOCK_DIFFERENCE_S, message_time, time))
 
 
-def _inertial(messages: VehicleMessages) -> Samples:
+def _read_inertial(messages: VehicleMessages) -> Samples:
     """Return specific force (m/s²) and angular rates (rad/s), (n, 6); no rows if the log lacks them."""
     table = messages.table("RAW_IMU", ("time_usec", "xacc", "yacc", "zacc", "xgyro", "ygyro", "zgyro"))
     if table is None:
         return NO_SAMPLES
     units = np.repeat([_STANDARD_GRAVITY_MPS2 * 1e-3, 1e-3], 3)
-    return sort_samples(_message_times(table.time, table.values[:, 0]), table.values[:, 1:] * units)
+    return sort_samples(_correct_message_times(table.time, table.values[:, 0]), table.values[:, 1:] * units)
 
 
-def _outputs(messages: VehicleMessages) -> Samples:
+def _read_outputs(messages: VehicleMessages) -> Samples:
     """Return the servo outputs of the first port, us, (n, OUTPUTS); no rows if the log lacks them."""
     names = tuple(f"servo{k}_raw" for k in range(1, OUTPUTS + 1))
     table = messages.table("SERVO_OUTPUT_RAW", ("time_usec", "port", *names))
     if table is None:
         return Samples(np.zeros(0), np.zeros((0, OUTPUTS)))
     is_first_port = table.values[:, 1] == 0.0
-    times = _message_times(table.time[is_first_port], table.values[is_first_port, 0])
+    times = _correct_message_times(table.time[is_first_port], table.values[is_first_port, 0])
     return sort_samples(times, table.values[is_first_port, 2:])

@@ -37,7 +37,7 @@ MAX_BYTES = 256 * 2**20
 _DOCUMENT_TYPE = re.compile(r"<!(DOCTYPE|ENTITY)", re.IGNORECASE)
 
 
-def track_text(path: Path, *, xml: bool) -> str:
+def read_track_text(path: Path, *, xml: bool) -> str:
     """Read the text of a track file; bytes that are not UTF-8 are replaced.
 
     In a zipped file (`.kmz`) the first `.kml` is read.  Raises LogError for a file of more than `MAX_BYTES`, and for
@@ -51,7 +51,7 @@ def track_text(path: Path, *, xml: bool) -> str:
     text = _read_bytes(path).decode("utf-8-sig", errors="replace")
     if xml and _DOCUMENT_TYPE.search(text):
         raise LogError(
-            f"{path}: a document type is declared, which a track must not have; entities are not expanded", file=path
+            f"{path}: the file declares a document type (DOCTYPE or ENTITY), which a track must not have", file=path
         )
     return text
 
@@ -68,22 +68,22 @@ def _read_bytes(path: Path) -> bytes:
             # Google Earth has one, doc.kml, and reads the first of several (OGC 12-007, "KMZ").
             entry = next((info for info in archive.infolist() if info.filename.lower().endswith(".kml")), None)
             if entry is None:
-                raise LogError(f"{path}: a zipped file without a .kml in it", file=path)
+                raise LogError(f"{path}: the zipped file contains no .kml", file=path)
             with archive.open(entry) as file:
                 # The archive may state a wrong size.
                 data = file.read(MAX_BYTES + 1)
     # bzip2 raises OSError for bytes that it cannot unpack.
     except (zipfile.BadZipFile, zlib.error, lzma.LZMAError, RuntimeError, EOFError, OSError) as error:
         cause = " ".join(str(error).split())[:120]
-        raise LogError(f"{path}: an unreadable zipped file: {cause}", file=path) from error
+        raise LogError(f"{path}: the zipped file cannot be unpacked: {cause}", file=path) from error
     if len(data) > MAX_BYTES:
-        message = f"{path}: too large: more than {MAX_BYTES:,} bytes when unpacked, which is the limit for a track"
+        message = f"{path}: too large: more than {MAX_BYTES:,} bytes when unpacked, the limit for a track"
         raise LogError(message, file=path)
     return data
 
 
-def _earliest_time(stamps: NDArray[np.float64]) -> float:
-    """Return the earliest of a track's times, s, ignoring damaged times far from the median.
+def _find_earliest_time(stamps: NDArray[np.float64]) -> float:
+    """Return the earliest of a track's times, s, ignoring times `MAX_TIME_S` or more from the median.
 
     stamps: times, s, (n,).
     """
@@ -100,7 +100,7 @@ GPX = "GPX track"
 
 def read_gpx(path: Path) -> RawLog:
     """Read a GPX track.  Raises LogError for a track with fewer than two points that have a time."""
-    text = track_text(path, xml=True)
+    text = read_track_text(path, xml=True)
     try:
         gpx = gpxpy.parse(text)
     except (gpxpy.gpx.GPXException, ValueError) as error:
@@ -114,7 +114,7 @@ def read_gpx(path: Path) -> RawLog:
     # Times without a zone are UTC, the zone of all times in the format.
     times = [point.time if point.time.tzinfo else point.time.replace(tzinfo=UTC) for point in timed if point.time]
     stamps = np.array([time.timestamp() for time in times])
-    start = _earliest_time(stamps)
+    start = _find_earliest_time(stamps)
     up = [math.nan if point.elevation is None else point.elevation for point in timed]
     values = np.array([[point.latitude, point.longitude, height] for point, height in zip(timed, up, strict=True)])
     return RawLog(
@@ -125,14 +125,14 @@ def read_gpx(path: Path) -> RawLog:
         series={"position": LogSeries("trkpt", stamps - start, values)},
         heights=(),
         datum="unstated",
-        missions=tuple(_routes(gpx, str(path))),
+        missions=tuple(_make_routes(gpx, str(path))),
         clock="start",
         utc_start=start,
         damage=Damage(unreadable=len(points) - len(timed)),
     )
 
 
-def _routes(gpx: gpxpy.gpx.GPX, source: str) -> list[LoggedMission]:
+def _make_routes(gpx: gpxpy.gpx.GPX, source: str) -> list[LoggedMission]:
     """Return the routes of a GPX file with at least two points as missions."""
     missions = []
     for route in gpx.routes:
@@ -179,8 +179,8 @@ def read_igc(path: Path) -> RawLog:
 
     The altitude is the GNSS altitude if most fixes have one, otherwise the pressure altitude.
     """
-    lines = re.split(r"\r\n|\n|\r", track_text(path, xml=False))
-    rows, unreadable = _fixes(lines)
+    lines = re.split(r"\r\n|\n|\r", read_track_text(path, xml=False))
+    rows, unreadable = _parse_fixes(lines)
     if len(rows) < 2:
         raise LogError(f"{path}: {len(rows)} fixes (B records); expected at least 2", file=path)
     table = np.array(rows)
@@ -188,31 +188,31 @@ def read_igc(path: Path) -> RawLog:
     gnss, pressure = table[:, 4], table[:, 3]
     has_gnss = bool((np.isfinite(gnss) & (gnss != 0.0)).mean() > 0.5)
     up, source = (gnss, "B record, GNSS altitude") if has_gnss else (pressure, "B record, pressure altitude")
-    midnight = _midnight(lines)
+    midnight = _parse_midnight(lines)
     start = float(time.min())
     pressure_heights = HeightSource("pressure altitude", "pressure", LogSeries("B", time - start, pressure[:, None]))
     return RawLog(
         source=str(path),
         format=IGC,
-        program=_recorder(lines),
+        program=_parse_recorder(lines),
         vehicle="unknown",
         series={"position": LogSeries(source, time - start, np.column_stack([table[:, 1:3], up]))},
         heights=(pressure_heights,) if has_gnss else (),
-        datum=_datum(lines) if has_gnss else "pressure",
-        missions=_task(lines, str(path)),
+        datum=_parse_datum(lines) if has_gnss else "pressure",
+        missions=_make_task(lines, str(path)),
         clock="start",
         utc_start=midnight + start,
         damage=Damage(unreadable=unreadable),
     )
 
 
-def _degrees(degrees: str, minutes: str, thousandths: str, side: str) -> float:
-    """Return a latitude or longitude in degrees, negative to the south and west.  side: N, S, E or W."""
+def _parse_degrees(degrees: str, minutes: str, thousandths: str, side: str) -> float:
+    """Convert degrees, minutes and thousandths of minutes to degrees, negative for the sides S and W."""
     value = int(degrees) + (int(minutes) + int(thousandths) / 1000.0) / 60.0
     return -value if side in "SW" else value
 
 
-def _fixes(lines: list[str]) -> tuple[list[tuple[float, float, float, float, float]], int]:
+def _parse_fixes(lines: list[str]) -> tuple[list[tuple[float, float, float, float, float]], int]:
     """Return the readable fixes, and the number of unreadable ones.
 
     A fix is the second of the day, latitude and longitude (deg), and pressure and GNSS altitude (m; NaN if missing).
@@ -226,21 +226,21 @@ def _fixes(lines: list[str]) -> tuple[list[tuple[float, float, float, float, flo
             unreadable += 1
             continue
         hour, minute, second, *fields = match.groups()
-        lat, lon = _degrees(*fields[:4]), _degrees(*fields[4:8])
+        lat, lon = _parse_degrees(*fields[:4]), _parse_degrees(*fields[4:8])
         gnss = float(fields[10]) if fields[8] == "A" else math.nan
         rows.append((int(hour) * 3600.0 + int(minute) * 60.0 + int(second), lat, lon, float(fields[9]), gnss))
     return rows, unreadable
 
 
 def _unwrap_midnight(time: np.ndarray) -> np.ndarray:
-    """Return seconds of the day as times that increase over midnight, s."""
+    """Add a day to the times after each midnight, so that seconds of the day keep increasing, s, (n,)."""
     steps = np.diff(time)
     days = np.cumsum(np.where(steps < -_HALF_DAY_S, 1.0, np.where(steps > _HALF_DAY_S, -1.0, 0.0)))
     return time + np.concatenate([[0.0], days]) * _DAY_S
 
 
-def _midnight(lines: list[str]) -> float:
-    """Return the beginning of the flight's day, s since 1970; NaN if the file states no valid date."""
+def _parse_midnight(lines: list[str]) -> float:
+    """Return the UTC midnight before the flight, s since 1970; NaN if the file states no valid date."""
     for line in lines:
         match = _DATE.match(line)
         if match:
@@ -250,8 +250,8 @@ def _midnight(lines: list[str]) -> float:
     return math.nan
 
 
-def _datum(lines: list[str]) -> VerticalDatum:
-    """Return the datum of the GNSS altitude."""
+def _parse_datum(lines: list[str]) -> VerticalDatum:
+    """Return the vertical datum of the GNSS altitude, from the file's HFALG or HOALG line."""
     for line in lines:
         if line.startswith("HFALG") or line.startswith("HOALG"):
             return next((datum for word, datum in _DATUMS.items() if word in line[5:]), "unstated")
@@ -259,13 +259,13 @@ def _datum(lines: list[str]) -> VerticalDatum:
     return "ellipsoid"
 
 
-def _recorder(lines: list[str]) -> str:
+def _parse_recorder(lines: list[str]) -> str:
     """Return the type of the flight recorder, or "" if the file does not state it."""
     recorder_line = next((line for line in lines if line.startswith("HFFTY")), "")
     return recorder_line.partition(":")[2].strip()
 
 
-def _task(lines: list[str], source: str) -> tuple[LoggedMission, ...]:
+def _make_task(lines: list[str], source: str) -> tuple[LoggedMission, ...]:
     """Return the declared task as a mission, or () if it has fewer than two turn points.
 
     If it has more than three points, the first and the last, the take-off and the landing, are left out.
@@ -274,7 +274,7 @@ def _task(lines: list[str], source: str) -> tuple[LoggedMission, ...]:
     for line in lines:
         match = _TASK_POINT.match(line)
         if match:
-            lat, lon = _degrees(*match.groups()[:4]), _degrees(*match.groups()[4:])
+            lat, lon = _parse_degrees(*match.groups()[:4]), _parse_degrees(*match.groups()[4:])
             if (lat, lon) != (0.0, 0.0):
                 points.append((lat, lon))
     # The first and the last point are the take-off and the landing on the ground, not turn points of the task.
@@ -308,15 +308,15 @@ def read_kml(path: Path) -> RawLog:
     Raises LogError for a file with fewer than two positions with a time.
     """
     try:
-        root = ElementTree.fromstring(track_text(path, xml=True))
+        root = ElementTree.fromstring(read_track_text(path, xml=True))
     except (ElementTree.ParseError, ValueError) as error:
         raise LogError(f"{path}: not a readable KML file: {' '.join(str(error).split())[:120]}", file=path) from error
     rows, unreadable, mode = [], 0, "clampToGround"
     for track in root.iter():
-        if _local_name(track) != "Track":
+        if _get_local_name(track) != "Track":
             continue
-        mode = next((str(child.text).strip() for child in track if _local_name(child) == "altitudeMode"), mode)
-        pairs, unpaired_count = _time_position_pairs(track, path)
+        mode = next((str(child.text).strip() for child in track if _get_local_name(child) == "altitudeMode"), mode)
+        pairs, unpaired_count = _pair_times_with_positions(track, path)
         unreadable += unpaired_count
         for when, coord in pairs:
             row = _parse_position(when, coord)
@@ -325,14 +325,14 @@ def read_kml(path: Path) -> RawLog:
             else:
                 rows.append(row)
     if len(rows) < 2:
-        lines = sum(_local_name(element) == "LineString" for element in root.iter())
-        reason = f"; {count_text(lines, 'line')} without times" if lines else ""
+        lines = sum(_get_local_name(element) == "LineString" for element in root.iter())
+        reason = f"; the file also has {count_text(lines, 'line')} without times" if lines else ""
         raise LogError(
             f"{path}: only {count_text(len(rows), 'position')} with a time (gx:Track); at least 2 are needed{reason}",
             file=path,
         )
     table = np.array(rows)
-    start = _earliest_time(table[:, 0])
+    start = _find_earliest_time(table[:, 0])
     datum: VerticalDatum = "amsl" if mode == "absolute" else "unstated"
     return RawLog(
         source=str(path),
@@ -348,25 +348,27 @@ def read_kml(path: Path) -> RawLog:
     )
 
 
-def _local_name(element: ElementTree.Element) -> str:
+def _get_local_name(element: ElementTree.Element) -> str:
     """Return the name of an element without its namespace, which may be Google's, OGC's or none."""
     return element.tag.rpartition("}")[2] if isinstance(element.tag, str) else ""
 
 
-def _time_position_pairs(track: ElementTree.Element, path: Path) -> tuple[list[tuple[str, str]], int]:
+def _pair_times_with_positions(track: ElementTree.Element, path: Path) -> tuple[list[tuple[str, str]], int]:
     """Return the pairs of time and position of a track as texts, and the number of unpaired elements.
 
     Either all times come before all positions, or each time comes before its position.  Raises LogError if the numbers
     of times and positions differ in the first case.
     """
-    elements = [(_local_name(child), child.text or "") for child in track if _local_name(child) in ("when", "coord")]
+    elements = [
+        (_get_local_name(child), child.text or "") for child in track if _get_local_name(child) in ("when", "coord")
+    ]
     times = [text for name, text in elements if name == "when"]
     positions = [text for name, text in elements if name == "coord"]
     last_time = max((k for k, (name, _) in enumerate(elements) if name == "when"), default=-1)
     if all(name == "when" for name, _ in elements[: last_time + 1]):
         if len(times) != len(positions):
             raise LogError(
-                f"{path}: a track of {count_text(len(times), 'time')} (when) and"
+                f"{path}: a track has {count_text(len(times), 'time')} (when) and"
                 f" {count_text(len(positions), 'position')} (gx:coord): expected equal numbers",
                 file=path,
             )

@@ -164,19 +164,20 @@ class Chart:
 
 
 def series(name: str, role: str, along: Floats, values: ArrayLike, **options: Any) -> Layer:
-    """Return a line layer over a long axis, thinned so that its peaks remain.
+    """Make a line layer from a long series, thinned so that its peaks remain.
 
     along, values: position along the axis, and value, of each row, (t,).
+    options: other fields of `Layer`.
     """
     column = np.asarray(values, dtype=np.float64)
-    rows = outline_rows(column, BLOCKS)
+    rows = find_outline_rows(column, BLOCKS)
     return Layer("line", name, role, along[rows], column[rows], **options)
 
 
 def filled_series(name: str, role: str, along: Floats, values: ArrayLike) -> Layer:
-    """Return a layer like `series`, filled from zero."""
+    """Make a layer like `series` does, filled between zero and the values."""
     column = np.asarray(values, dtype=np.float64)
-    rows = outline_rows(column, BLOCKS)
+    rows = find_outline_rows(column, BLOCKS)
     return Layer("band", name, role, along[rows], column[rows], np.zeros(len(rows)))
 
 
@@ -192,7 +193,7 @@ def join_with_gaps(parts: Sequence[Floats]) -> tuple[Floats, Floats]:
     return points[:, 0], points[:, 1]
 
 
-def saturation_band(is_saturated: NDArray[np.bool_], along: Floats, span: tuple[float, float]) -> Layer:
+def make_saturation_band(is_saturated: NDArray[np.bool_], along: Floats, span: tuple[float, float]) -> Layer:
     """Return a layer that shades the parts of a long axis in which a control is at its limit.
 
     is_saturated: True at rows where the control is at its limit, (t,).
@@ -207,7 +208,7 @@ def saturation_band(is_saturated: NDArray[np.bool_], along: Floats, span: tuple[
     return Layer("band", "held at its limit", "held", x, y, np.full(len(x), span[0]), quiet=True)
 
 
-def leg_marks(legs: NDArray[Any], along: Floats) -> tuple[tuple[float, str], ...]:
+def make_leg_marks(legs: NDArray[Any], along: Floats) -> tuple[tuple[float, str], ...]:
     """Return a mark at the start of each leg: its position along an axis, and the leg's name.
 
     legs: number of each row's leg in messages, (t,).
@@ -217,10 +218,10 @@ def leg_marks(legs: NDArray[Any], along: Floats) -> tuple[tuple[float, str], ...
     return tuple((float(along[row]), f"leg {legs[row]}") for row in starts)
 
 
-def outline_rows(values: ArrayLike, count: int) -> Indices:
+def find_outline_rows(values: ArrayLike, count: int) -> Indices:
     """Return the rows of the lowest and highest value of each of `count` blocks of a long series.
 
-    They keep its outline.  All rows of a short series are returned.
+    A line through these rows has the same outline as the series.  All rows of a short series are returned.
 
     values: (t,); NaN rows are omitted unless a block has no other rows.
     """
@@ -268,9 +269,7 @@ def numbers(values: Iterable[float], digits: int) -> list[float | None]:
 
 
 def screen_decimals(values: Floats) -> int:
-    """Return the number of decimals that resolves a ten-thousandth of the range of values.
-
-    A screen resolves about as much.
+    """Return the number of decimals that resolves a ten-thousandth of the values' range, as a screen does.
 
     >>> screen_decimals(np.array([0.0, 90.0])), screen_decimals(np.array([0.001, 0.002]))
     (3, 7)
@@ -334,14 +333,14 @@ def _layer_json(layer: Layer) -> Json:
 
 @dataclass(frozen=True, slots=True)
 class LegendEntry:
-    """One line of a legend: its text and its layers, of which one is drawn."""
+    """One line of a legend: its text, and its layers, the first of which is drawn as the sample."""
 
     text: str
     layers: tuple[Layer, ...] = field(default=())
 
 
 def legend_entries(panels: Sequence[Panel]) -> tuple[LegendEntry, ...]:
-    """Return one legend entry per layer name, in order, then one per limit label (an empty line layer)."""
+    """Return a legend entry for each layer name, then one for each limit label, in the panels' order."""
     layers_by_name: dict[str, list[Layer]] = {}
     for panel in panels:
         for layer in panel.layers:

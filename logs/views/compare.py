@@ -9,7 +9,7 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.verdict.imported.model_comparison import Reflight
 from logs.verdict.measures.route_requirements import with_fence_zones
-from logs.views.charts import Chart, Layer, Panel, filled_series, leg_marks, series, shorten
+from logs.views.charts import Chart, Layer, Panel, filled_series, make_leg_marks, series, shorten
 from logs.views.map import DrawnTrack, MapChart, NamedWind, map_chart
 from logs.views.time_series import to_float64
 from world.arrays import Floats
@@ -57,11 +57,11 @@ def make_two_flights_chart(flights: tuple[NamedFlight, NamedFlight]) -> Chart:
     The panels are altitude, height above ground (omitted without terrain), airspeed, bank, cross-track error and
     throttle.
     """
-    distances = [_distance_flown(flight.track) for flight in flights]
+    distances = [_compute_distance_flown(flight.track) for flight in flights]
     along = np.linspace(0.0, max(float(distance[-1]) for distance in distances), _POINTS)
 
-    def flight_lines(values: list[Floats]) -> tuple[Layer, ...]:
-        """Return a line for each flight: its values of a quantity over the distance flown."""
+    def make_flight_lines(values: list[Floats]) -> tuple[Layer, ...]:
+        """Make a line for each flight, from its values of one quantity, over the distance flown."""
         return tuple(
             series(shorten(flight.name, 22), role, along / 1e3, np.interp(along, distance, value, right=np.nan))
             for flight, role, distance, value in zip(flights, ROLES, distances, values, strict=True)
@@ -69,39 +69,48 @@ def make_two_flights_chart(flights: tuple[NamedFlight, NamedFlight]) -> Chart:
 
     tracks = [flight.track for flight in flights]
     panels = (
-        Panel("altitude", "m AMSL", flight_lines([track.position[:, 2] for track in tracks])),
-        Panel("height above ground", "m", flight_lines([_height_above_ground(flight) for flight in flights])),
-        Panel("airspeed", "m/s", flight_lines([to_float64(track.airspeed) for track in tracks]), min_span=4.0),
-        Panel("bank, right +", "°", flight_lines([np.degrees(to_float64(_roll_angle(track))) for track in tracks])),
+        Panel("altitude", "m AMSL", make_flight_lines([track.position[:, 2] for track in tracks])),
         Panel(
-            "cross-track, right +", "m", flight_lines([to_float64(track.cross_track) for track in tracks]), min_span=0.1
+            "height above ground", "m", make_flight_lines([_compute_height_above_ground(flight) for flight in flights])
         ),
-        Panel("throttle", "%", flight_lines([100.0 * to_float64(_throttle_fraction(track)) for track in tracks])),
+        Panel("airspeed", "m/s", make_flight_lines([to_float64(track.airspeed) for track in tracks]), min_span=4.0),
+        Panel(
+            "bank, right +",
+            "°",
+            make_flight_lines([np.degrees(to_float64(_get_roll_angle(track))) for track in tracks]),
+        ),
+        Panel(
+            "cross-track, right +",
+            "m",
+            make_flight_lines([to_float64(track.cross_track) for track in tracks]),
+            min_span=0.1,
+        ),
+        Panel("throttle", "%", make_flight_lines([100.0 * to_float64(_get_throttle(track)) for track in tracks])),
     )
     return Chart("Two flights along their paths", "distance flown over the ground", "km", panels)
 
 
-def _roll_angle(track: Track) -> NDArray[np.float32]:
+def _get_roll_angle(track: Track) -> NDArray[np.float32]:
     """Return the roll angle of each row, rad."""
     roll: NDArray[np.float32]
     roll, _, _ = track.attitude.T
     return roll
 
 
-def _throttle_fraction(track: Track) -> NDArray[np.float32]:
+def _get_throttle(track: Track) -> NDArray[np.float32]:
     """Return the throttle of each row, 0 to 1."""
     throttle: NDArray[np.float32]
     _, _, _, throttle = track.controls.T
     return throttle
 
 
-def _distance_flown(track: Track) -> Floats:
+def _compute_distance_flown(track: Track) -> Floats:
     """Return the distance flown over the ground up to each row, m."""
     steps = np.nan_to_num(np.hypot(*np.diff(track.position[:, :2], axis=0).T))
     return np.concatenate([[0.0], np.cumsum(steps)])
 
 
-def _height_above_ground(flight: NamedFlight) -> Floats:
+def _compute_height_above_ground(flight: NamedFlight) -> Floats:
     """Return the height above ground of each row, m; NaN without terrain."""
     terrain, position = flight.setup.scenario.terrain, flight.track.position
     if terrain is None:
@@ -138,7 +147,7 @@ def refly_charts(reflight: Reflight) -> dict[str, Chart]:
     """
     along = reflight.distance / 1e3
     legs = np.searchsorted(reflight.ends, reflight.distance, side="right")
-    marks = leg_marks(reflight.setup.route.leg_numbers_of(legs), along)
+    marks = make_leg_marks(reflight.setup.route.leg_numbers_of(legs), along)
     charts = {}
     for file, name, title, unit, factor, span in _REFLOWN:
         flown_values = factor * getattr(reflight.flown, name)

@@ -13,7 +13,15 @@ from matplotlib.ticker import FuncFormatter, MultipleLocator
 
 from logs import theme
 from logs.views.charts import legend_entries, nice_step, shorten
-from logs.views.drawing import WIDTH, clean_style, draw_layers, draw_legend, legend_handle, new_figure, write_labels
+from logs.views.drawing import (
+    WIDTH,
+    clean_style,
+    draw_layers,
+    draw_legend,
+    make_legend_handle,
+    new_figure,
+    write_labels,
+)
 from logs.views.map import MapChart, NamedWind
 from logs.views.relief import relief
 from world.arrays import Floats
@@ -42,8 +50,8 @@ _LINE = 0.145
 def draw_map(chart: MapChart) -> Figure:
     """Draw the top view: north up, equal scales, axes in m labelled in km from the scenario's origin."""
     with clean_style():
-        handles = [legend_handle(entry) for entry in legend_entries([chart.panel])]
-        legend_height = _legend_height(handles)
+        handles = [make_legend_handle(entry) for entry in legend_entries([chart.panel])]
+        legend_height = _compute_legend_height(handles)
         figure, axes = make_map_axes(chart.east, chart.north, legend_height)
         axes.set_xlabel(f"east of {chart.origin} (km)")
         axes.set_ylabel("north (km)")
@@ -56,7 +64,7 @@ def draw_map(chart: MapChart) -> Figure:
     return figure
 
 
-def _legend_height(handles: list[Any]) -> float:
+def _compute_legend_height(handles: list[Any]) -> float:
     """Return the height (inches) of a legend of four columns with contours, at least `_LEGEND`."""
     lines = [1 + str(handle.get_label()).count("\n") for handle in handles] + [1]
     return max(_LEGEND, 0.08 + _LEGEND_LINE * max(int(column.sum()) for column in np.array_split(lines, 4)))
@@ -72,8 +80,8 @@ def make_map_axes(east: tuple[float, float], north: tuple[float, float], legend_
     frame_height = max(height, _MIN_HEIGHT)
     figure_height = _TOP + frame_height + _BOTTOM + legend_height
     figure = new_figure(figure_height)
-    base = legend_height + _BOTTOM + 0.5 * (frame_height - height)
-    axes = figure.add_axes((_LEFT / WIDTH, base / figure_height, _MAP_WIDTH / WIDTH, height / figure_height))
+    axes_bottom = legend_height + _BOTTOM + 0.5 * (frame_height - height)
+    axes = figure.add_axes((_LEFT / WIDTH, axes_bottom / figure_height, _MAP_WIDTH / WIDTH, height / figure_height))
     axes.set(xlim=east, ylim=north, aspect="equal", facecolor=theme.colour("unknown"))
     step = nice_step(max(east[1] - east[0], north[1] - north[0]), 14)
     kilometres = FuncFormatter(lambda value, _: f"{value / 1000.0:g}".replace("-", "\N{MINUS SIGN}"))
@@ -152,7 +160,7 @@ def draw_compass(figure: Figure, winds: Sequence[NamedWind], column: float, lege
     figure_height = float(figure.get_figheight())
     dial_size = 1.0
     notes = [
-        (_wind_text(named_wind), theme.colour(named_wind.role) if len(winds) > 1 else theme.colour("ink"))
+        (_describe_wind(named_wind), theme.colour(named_wind.role) if len(winds) > 1 else theme.colour("ink"))
         for named_wind in winds
     ]
     lines = sum(text.count("\n") + 1 for text, _ in notes)
@@ -183,7 +191,7 @@ def draw_compass(figure: Figure, winds: Sequence[NamedWind], column: float, lege
         note_top -= _LINE * (text.count("\n") + 2)
 
 
-def _wind_text(named_wind: NamedWind) -> str:
+def _describe_wind(named_wind: NamedWind) -> str:
     """Return the note below the compass on a wind: flight, speed, direction and turbulence."""
     wind = named_wind.wind
     text = f"{shorten(named_wind.name, 22)}:\n" if named_wind.name else ""

@@ -15,10 +15,10 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs import theme
 from logs.views.charts import Label, LabelRank, Layer, LayerKind, LegendEntry, shorten
-from logs.views.drawing import WIDTH, clean_style, draw_legend, legend_handle, new_figure, write_label
+from logs.views.drawing import WIDTH, clean_style, draw_legend, make_legend_handle, new_figure, write_label
 from logs.views.failures import Failures, route_distance, route_samples, stop_rows
 from logs.views.labels import LabelPlacer
-from logs.views.scene import GroundGrid, SceneView, drawn_rows, exaggeration, ground_grid, scene_bounds
+from logs.views.scene import GroundGrid, SceneView, exaggeration, ground_grid, scene_bounds, select_drawn_rows
 from world.airspace.zones_on_map import zone_walls
 from world.arrays import Floats
 from world.terrain import Terrain
@@ -51,17 +51,18 @@ _MAX_NAMES = 30
 class Projection:
     """A parallel projection.
 
-    azimuth: direction from the center to the viewer, rad, from east to north.  middle: center (3,), m.  stretch: factor
-    on heights.
+    azimuth: direction from the center to the viewer, rad, counter-clockwise from east.
+    center: position shown at the center of the picture, m, (3,).
+    stretch: factor by which heights are exaggerated.
     """
 
     azimuth: float
-    middle: Floats
+    center: Floats
     stretch: float
 
     def project(self, points: Floats) -> Floats:
         """Return picture coordinates and depth towards the viewer, m: (..., 3) from points (..., 3)."""
-        east, north, up = np.moveaxis(points - self.middle, -1, 0)
+        east, north, up = np.moveaxis(points - self.center, -1, 0)
         cos_azimuth, sin_azimuth = math.cos(self.azimuth), math.sin(self.azimuth)
         across = -sin_azimuth * east + cos_azimuth * north
         toward = cos_azimuth * east + sin_azimuth * north
@@ -74,7 +75,7 @@ class Projection:
 
     @property
     def toward(self) -> Floats:
-        """Step towards the viewer in world axes, 1 m long on the ground."""
+        """Step towards the viewer to east, north and up, (3,), m; its horizontal length is 1 m."""
         return np.array([math.cos(self.azimuth), math.sin(self.azimuth), math.tan(_ELEVATION) / self.stretch])
 
 
@@ -102,7 +103,7 @@ def draw_scene(view: SceneView) -> Figure:
         _draw_labels(setup, projection, route, failed, placer)
         name = shorten(setup.scenario.name, 60)
         scale_text = "true to scale" if projection.stretch == 1.0 else f"heights × {projection.stretch:g}"
-        viewer_side = _compass_name(projection.azimuth)
+        viewer_side = _name_compass_direction(projection.azimuth)
         axes.set_title(f"{name}: seen from the {viewer_side}, {scale_text}", fontweight="bold")
         draw_legend(figure, handles, _LEFT + 0.1, (_BOTTOM - 0.08) / float(figure.get_figheight()))
     return figure
@@ -130,7 +131,7 @@ def _make_projection(route: Floats, bounds: Floats, stretch: float, is_narrow: b
     return Projection(azimuth, np.array([*bounds.mean(axis=1), float(route[:, 2].mean())]), stretch)
 
 
-def _compass_name(azimuth: float) -> str:
+def _name_compass_direction(azimuth: float) -> str:
     """Return the name of the side from which a viewer looks, such as "south-west".
 
     azimuth: direction of the viewer, rad, counter-clockwise from east.
@@ -142,7 +143,11 @@ def _compass_name(azimuth: float) -> str:
 def _make_axes(
     setup: FlightSetup, projection: Projection, bounds: Floats, grid: GroundGrid | None
 ) -> tuple[Figure, Any]:
-    """Make a figure and axes, with equal scales, into which route, threats and ground fit."""
+    """Make a figure with axes of equal scales, whose limits contain route, threats and ground.
+
+    bounds: range of the scene, (2, 2), m: rows east and north, columns minimum and maximum.
+    grid: ground of the scene; None without terrain.
+    """
     min_altitude = float(np.nanmin(grid.heights)) if grid is not None else float(setup.route.positions[:, 2].min())
     corners = np.array([[east, north, min_altitude] for east in bounds[0] for north in bounds[1]])
     threats = setup.scenario.threats
@@ -186,7 +191,7 @@ def _draw_ground(axes: Any, projection: Projection, grid: GroundGrid | None, bou
     Without terrain, draw a level plane.  Return the legend's handles.
     """
     if grid is None:
-        level_altitude = float(projection.middle[2])
+        level_altitude = float(projection.center[2])
         corners = np.array(
             [
                 [east, north, level_altitude]
@@ -201,7 +206,7 @@ def _draw_ground(axes: Any, projection: Projection, grid: GroundGrid | None, bou
                 zorder=1,
             )
         )
-        return [_legend_handle("band", "level-ground", "no terrain: level at mid height")]
+        return [_make_legend_handle("band", "level-ground", "no terrain: level at mid height")]
     east, north = np.meshgrid(grid.east, grid.north)
     corners = projection.project(np.stack([east, north, grid.heights], axis=-1))
     cells = np.stack([corners[:-1, :-1], corners[:-1, 1:], corners[1:, 1:], corners[1:, :-1]], axis=2).reshape(-1, 4, 3)
@@ -258,14 +263,14 @@ def _draw_threats(axes: Any, projection: Projection, setup: FlightSetup, failed:
             dome = projection.project(threats.position[entered_index])[:2] + float(radii[entered_index]) * shape
             axes.add_patch(Polygon(dome, fill=False, edgecolor=theme.colour("fail"), linewidth=2.2, zorder=4.6))
         if indices.size:
-            handles.append(_legend_handle("band", kind, f"{kind}'s reach"))
+            handles.append(_make_legend_handle("band", kind, f"{kind}'s reach"))
     return handles
 
 
 def _draw_zones(axes: Any, projection: Projection, setup: FlightSetup) -> list[Any]:
-    """Draw the walls of the zones, from ground or floor to the ceiling, or to above the path.
+    """Draw the walls of the zones, and return their legend handles.
 
-    Return the legend's handles.
+    A wall reaches from the floor of the zone, or the ground, to its ceiling.  Without a ceiling it ends above the path.
     """
     zones, route = setup.scenario.zones, setup.route.positions
     min_altitude, max_altitude = float(route[:, 2].min()), float(route[:, 2].max()) + 50.0
@@ -285,14 +290,16 @@ def _draw_zones(axes: Any, projection: Projection, setup: FlightSetup) -> list[A
                     zorder=3.3,
                 )
     kinds = {zone.kind for zone in zones}
-    handles = [_legend_handle("area", "zone", "zone to keep out of")] if "exclusion" in kinds else []
-    return handles + ([_legend_handle("line", "stay-in", "edge of a zone to stay in")] if "inclusion" in kinds else [])
+    handles = [_make_legend_handle("area", "zone", "zone to keep out of")] if "exclusion" in kinds else []
+    return handles + (
+        [_make_legend_handle("line", "stay-in", "edge of a zone to stay in")] if "inclusion" in kinds else []
+    )
 
 
-def _legend_handle(kind: LayerKind, role: str, text: str) -> Any:
+def _make_legend_handle(kind: LayerKind, role: str, text: str) -> Any:
     """Return the handle of a legend entry, drawn in the style of a role."""
     empty = np.zeros(0)
-    return legend_handle(LegendEntry(text, (Layer(kind, text, role, empty, empty),)))
+    return make_legend_handle(LegendEntry(text, (Layer(kind, text, role, empty, empty),)))
 
 
 def _find_hidden_points(projection: Projection, terrain: Terrain | None, points: Floats) -> NDArray[np.bool_]:
@@ -334,12 +341,11 @@ def _draw_paths(
             solid_capstyle="butt",
         )
     _draw_path(axes, projection, terrain, samples, theme.colour("planned"), 3.6, 5)
-    handles: list[Any] = [_legend_handle("line", "planned", "planned path")]
+    handles: list[Any] = [_make_legend_handle("line", "planned", "planned path")]
     if track is not None:
-        _draw_path(
-            axes, projection, terrain, track.position[drawn_rows(track, _MAX_TRACK)], theme.colour("flown"), 1.2, 6
-        )
-        handles.append(_legend_handle("line", "flown", "flown track"))
+        flown_positions = track.position[select_drawn_rows(track, _MAX_TRACK)]
+        _draw_path(axes, projection, terrain, flown_positions, theme.colour("flown"), 1.2, 6)
+        handles.append(_make_legend_handle("line", "flown", "flown track"))
     corners = projection.project(route)
     placer.avoid(*projection.project(samples)[:, :2].T)
     axes.plot(
@@ -354,14 +360,16 @@ def _draw_paths(
     for waypoint in failed.waypoints:
         axes.plot(*corners[waypoint, :2], "o", markersize=12, mfc="none", mec=theme.colour("fail"), mew=2.2, zorder=7.5)
     if terrain is not None:
-        handles.append(_legend_handle("line", "pole", "waypoint above the ground"))
+        handles.append(_make_legend_handle("line", "pole", "waypoint above the ground"))
     failure_entries: tuple[tuple[object, LayerKind, str, str], ...] = (
         (failed.legs, "line", "failing-leg", "leg that fails a rule"),
         (failed.waypoints, "rings", "fail", "waypoint that fails a rule"),
         (failed.threats, "line", "fail", "threat that is entered"),
     )
     return handles + [
-        _legend_handle(kind, role, text) for failing_elements, kind, role, text in failure_entries if failing_elements
+        _make_legend_handle(kind, role, text)
+        for failing_elements, kind, role, text in failure_entries
+        if failing_elements
     ]
 
 

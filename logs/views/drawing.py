@@ -142,7 +142,7 @@ def png_bytes(figure: Figure) -> bytes:
     (1500, 300)
     """
     canvas: Any = FigureCanvasAgg(figure)
-    with _picture_settings():
+    with _use_picture_settings():
         canvas.draw()
     # Without transparency, at this compression, a map takes half of the time to write that matplotlib's PNG takes.
     picture = Image.frombuffer("RGBA", canvas.get_width_height(), canvas.buffer_rgba()).convert("RGB")
@@ -169,7 +169,7 @@ def jpeg_bytes(png: bytes) -> bytes:
 def svg_bytes(figure: Figure) -> bytes:
     """Render the figure as an SVG with letters as outlines; the same figure gives the same bytes."""
     buffer = io.BytesIO()
-    with _picture_settings():
+    with _use_picture_settings():
         figure.savefig(buffer, format="svg", dpi=DPI, metadata={"Date": None, "Creator": None})
     return buffer.getvalue()
 
@@ -201,7 +201,7 @@ def page_svg(figure: Figure, description: str) -> str:
 
 
 @contextmanager
-def _picture_settings() -> Iterator[None]:
+def _use_picture_settings() -> Iterator[None]:
     """Use the common settings for a picture, without warnings about letters that the font lacks."""
     with clean_style(), warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph .* missing from font", category=UserWarning)
@@ -230,38 +230,42 @@ def draw_chart(chart: Chart) -> Figure:
     entries = legend_entries(panels) if chart.legend == "below" else ()
     top_margin = (_TOP if chart.legend == "beside" else _PLAIN_TOP) + (_SHARED_LEGEND if has_shared_legend else 0.0)
     right_margin = _LEGENDS if chart.legend == "beside" and not has_shared_legend else _RIGHT
-    columns = _legend_column_count(entries)
-    legend_height = _legend_height(entries, columns)
+    columns = _choose_legend_columns(entries)
+    legend_height = _compute_legend_height(entries, columns)
     rows = 1 if chart.widths else len(panels)
     gap = _GAP if chart.shared else _OWN_AXIS_GAP
-    total = top_margin + _BOTTOM + legend_height + max(1, rows) * chart.print_height + max(0, rows - 1) * gap
+    total_height = top_margin + _BOTTOM + legend_height + max(1, rows) * chart.print_height + max(0, rows - 1) * gap
     with clean_style():
-        figure = new_figure(total)
+        figure = new_figure(total_height)
         for k, panel in enumerate(panels):
             row = 0 if chart.widths else k
-            base = _BOTTOM + legend_height + (rows - 1 - row) * (chart.print_height + gap)
-            left, width = _panel_extent(chart, k, right_margin)
-            axes = figure.add_axes((left, base / total, width, chart.print_height / total))
+            panel_bottom = _BOTTOM + legend_height + (rows - 1 - row) * (chart.print_height + gap)
+            left, width = _compute_panel_extent(chart, k, right_margin)
+            axes = figure.add_axes((left, panel_bottom / total_height, width, chart.print_height / total_height))
             _draw_panel(axes, chart, panel, has_leg_numbers=k == 0)
             if chart.legend == "beside" and not has_shared_legend:
                 _add_legend_beside(axes)
             if chart.shared and row < rows - 1:
                 axes.tick_params(labelbottom=False)
             else:
-                axes.set_xlabel(_axis_label(chart, panel, axes))
+                axes.set_xlabel(_make_axis_label(chart, panel, axes))
         text_style: dict[str, Any] = {"fontsize": 11, "fontweight": "bold", "va": "center"}
-        figure.text(_LEFT / WIDTH, 1 - 0.3 / total, chart.title, **text_style)
+        figure.text(_LEFT / WIDTH, 1 - 0.3 / total_height, chart.title, **text_style)
         if has_shared_legend:
-            _add_legend_above(figure, 1 - 0.45 / total)
+            _add_legend_above(figure, 1 - 0.45 / total_height)
         if entries:
             draw_legend(
-                figure, [legend_handle(entry) for entry in entries], _LEFT, (legend_height - 0.02) / total, columns
+                figure,
+                [make_legend_handle(entry) for entry in entries],
+                _LEFT,
+                (legend_height - 0.02) / total_height,
+                columns,
             )
     return figure
 
 
-def _panel_extent(chart: Chart, k: int, right_margin: float) -> tuple[float, float]:
-    """Return a panel's left edge and width as fractions of the picture's width."""
+def _compute_panel_extent(chart: Chart, k: int, right_margin: float) -> tuple[float, float]:
+    """Return the left edge and the width of panel number `k` as fractions of the picture's width."""
     total_width = WIDTH - _LEFT - right_margin
     if not chart.widths:
         return _LEFT / WIDTH, total_width / WIDTH
@@ -272,7 +276,7 @@ def _panel_extent(chart: Chart, k: int, right_margin: float) -> tuple[float, flo
     ) / WIDTH
 
 
-def _axis_label(chart: Chart, panel: Panel, axes: Any) -> str:
+def _make_axis_label(chart: Chart, panel: Panel, axes: Any) -> str:
     """Return the label of the horizontal axis.
 
     If the chart is scaled, the label states how much larger heights are drawn than distances.
@@ -287,16 +291,16 @@ def _axis_label(chart: Chart, panel: Panel, axes: Any) -> str:
 
 
 def can_share_legend(panels: Sequence[Panel]) -> bool:
-    """Return True if all panels can share a legend.
+    """Return True if all panels can share one legend.
 
-    This is the case if, in all panels, each look has one meaning and each meaning one look, and some looks repeat.
+    In all panels, each look must have the same meaning, and each meaning the same look; some looks must repeat.
 
     >>> none = np.zeros(2)
-    >>> flown, asked = Layer("line", "flown", "flown", none, none), Layer("line", "asked", "commanded", none, none)
-    >>> can_share_legend([Panel("bank", "", (asked, flown)), Panel("speed", "", (asked, flown))])
+    >>> flown, wanted = Layer("line", "flown", "flown", none, none), Layer("line", "command", "commanded", none, none)
+    >>> can_share_legend([Panel("bank", "", (wanted, flown)), Panel("speed", "", (wanted, flown))])
     True
-    >>> own = Layer("line", "own", "flown", none, none)
-    >>> can_share_legend([Panel("bank", "", (flown,)), Panel("height", "", (own,))])
+    >>> height = Layer("line", "height", "flown", none, none)
+    >>> can_share_legend([Panel("bank", "", (flown,)), Panel("height", "", (height,))])
     False
     """
     entries: list[tuple[str, Any]] = [
@@ -312,7 +316,10 @@ def can_share_legend(panels: Sequence[Panel]) -> bool:
 
 
 def _draw_panel(axes: Any, chart: Chart, panel: Panel, *, has_leg_numbers: bool) -> None:
-    """Draw one panel of a chart: range, leg marks, layers, labels and note."""
+    """Draw one panel of a chart: range, leg marks, layers, labels and note.
+
+    has_leg_numbers: True to write the numbers of the legs above the panel.
+    """
     min_x, max_x = chart.shown_axis_range()
     if chart.shared:
         axes.set_xlim(min_x, max(max_x, min_x + 1e-3))
@@ -333,13 +340,13 @@ def _draw_panel(axes: Any, chart: Chart, panel: Panel, *, has_leg_numbers: bool)
             "fontsize": 7,
         }
         axes.annotate(panel.note, (1.0, 1.0), (0, 3), color=theme.colour("limit"), **text_options)
-    axes.set_ylabel(panel.label if chart.print_height > 2.0 else "\n".join(_title_lines(panel)))
+    axes.set_ylabel(panel.label if chart.print_height > 2.0 else "\n".join(_wrap_title(panel)))
     axes.yaxis.set_label_coords(-_LABEL / (WIDTH * axes.get_position().width), 0.5)
     axes.grid(visible=True, axis="both" if chart.shared else "y")
     axes.set_axisbelow(True)
 
 
-def _title_lines(panel: Panel) -> list[str]:
+def _wrap_title(panel: Panel) -> list[str]:
     """Wrap a panel's title and unit to at most two lines.
 
     A third line would be cut off at the left edge of the picture.
@@ -416,7 +423,7 @@ def draw_layers(axes: Any, panel: Panel, min_zorder: float = 2.0) -> None:
             value,
             color=look.light,
             linewidth=look.width,
-            linestyle=_dash_pattern(look),
+            linestyle=_make_dash_pattern(look),
             label=label or None,
             zorder=min_zorder + 0.95,
         )
@@ -429,7 +436,7 @@ def draw_layers(axes: Any, panel: Panel, min_zorder: float = 2.0) -> None:
         )
 
 
-def _dash_pattern(look: theme.Look, dashed: bool = False) -> Any:
+def _make_dash_pattern(look: theme.Look, dashed: bool = False) -> Any:
     """Return the line style of a look in units of its line width; "-" for a solid line."""
     pattern = look.dash or ((8.0, 3.5) if dashed else ())
     return (0, tuple(part / max(look.width, 0.1) for part in pattern)) if pattern else "-"
@@ -446,7 +453,7 @@ def _draw_line(axes: Any, layer: Layer, look: theme.Look, **options: Any) -> Non
         layer.y,
         color=look.light,
         linewidth=look.width,
-        linestyle=_dash_pattern(look, layer.dashed),
+        linestyle=_make_dash_pattern(look, layer.dashed),
         solid_capstyle=cap,
         solid_joinstyle="round",
         **options,
@@ -470,10 +477,10 @@ def _draw_band(axes: Any, layer: Layer, look: theme.Look, **options: Any) -> Non
         )
         for start, end in zip(edges[::2], edges[1::2], strict=True)
     ]
-    axes.add_collection(PolyCollection(polygons, **_area_look(look), **options))
+    axes.add_collection(PolyCollection(polygons, **_make_area_style(look), **options))
 
 
-def _area_look(look: theme.Look) -> dict[str, Any]:
+def _make_area_style(look: theme.Look) -> dict[str, Any]:
     """Return matplotlib's style options of a filled area."""
     edge = theme.colour(look.edge) if look.edge else look.light
     if not look.width and not look.hatch:
@@ -482,7 +489,7 @@ def _area_look(look: theme.Look) -> dict[str, Any]:
         "facecolor": (*theme.rgb(look.light), look.fill),
         "edgecolor": edge,
         "linewidth": look.width,
-        "linestyle": _dash_pattern(look),
+        "linestyle": _make_dash_pattern(look),
         "hatch": look.hatch or None,
     }
 
@@ -493,7 +500,7 @@ def _draw_area(axes: Any, layer: Layer, look: theme.Look, **options: Any) -> Non
     gaps = np.flatnonzero(np.isnan(layer.x))
     rings = [ring[np.isfinite(ring[:, 0])] for ring in np.split(points, gaps)]
     shape = Path.make_compound_path(*(Path(ring, closed=True) for ring in rings))
-    axes.add_patch(PathPatch(shape, **_area_look(look), **options))
+    axes.add_patch(PathPatch(shape, **_make_area_style(look), **options))
 
 
 def _draw_bars(axes: Any, layer: Layer, look: theme.Look, **options: Any) -> None:
@@ -503,10 +510,10 @@ def _draw_bars(axes: Any, layer: Layer, look: theme.Look, **options: Any) -> Non
 
 def _draw_dots(axes: Any, layer: Layer, look: theme.Look, **options: Any) -> None:
     """Draw a layer as markers."""
-    axes.plot(layer.x, layer.y, **_dot_look(look, len(layer.x)), **options)
+    axes.plot(layer.x, layer.y, **_make_dot_style(look, len(layer.x)), **options)
 
 
-def _dot_look(look: theme.Look, count: int = 1) -> dict[str, Any]:
+def _make_dot_style(look: theme.Look, count: int = 1) -> dict[str, Any]:
     """Return matplotlib's style options of markers; many markers are smaller."""
     size = 3.0 if count > _MAX_TICKS and look.size == 5.5 else look.size
     style: dict[str, Any] = {"marker": _MARKERS[look.marker], "linestyle": "", "markersize": size, "color": look.light}
@@ -518,10 +525,10 @@ def _dot_look(look: theme.Look, count: int = 1) -> dict[str, Any]:
 
 def _draw_rings(axes: Any, layer: Layer, look: theme.Look, **options: Any) -> None:
     """Draw a layer as hollow circles."""
-    axes.plot(layer.x, layer.y, **_ring_look(look), **options)
+    axes.plot(layer.x, layer.y, **_make_ring_style(look), **options)
 
 
-def _ring_look(look: theme.Look) -> dict[str, Any]:
+def _make_ring_style(look: theme.Look) -> dict[str, Any]:
     """Return matplotlib's style options of hollow circles."""
     return {
         "marker": "o",
@@ -579,19 +586,19 @@ def write_label(placer: LabelPlacer, label: Label) -> None:
     placer.place(label.text, label.x, label.y, **options)
 
 
-def legend_handle(entry: LegendEntry) -> Any:
+def make_legend_handle(entry: LegendEntry) -> Any:
     """Return the handle that a legend shows next to the text of an entry."""
     layer = entry.layers[0]
     look, text = theme.LOOKS[layer.role], textwrap.fill(entry.text, 36)
     if layer.kind in ("band", "area"):
-        return Patch(label=text, **_area_look(look))
+        return Patch(label=text, **_make_area_style(look))
     if layer.kind == "bars":
         return Patch(label=text, color=look.light)
     if layer.kind == "dots":
-        return Line2D([], [], label=text, **_dot_look(look) | {"alpha": 1.0})
+        return Line2D([], [], label=text, **_make_dot_style(look) | {"alpha": 1.0})
     if layer.kind == "rings":
-        return Line2D([], [], label=text, **_ring_look(look) | {"markersize": 9.0})
-    dashes: Any = "-" if layer.kind == "dashes" else _dash_pattern(look, layer.dashed)
+        return Line2D([], [], label=text, **_make_ring_style(look) | {"markersize": 9.0})
+    dashes: Any = "-" if layer.kind == "dashes" else _make_dash_pattern(look, layer.dashed)
     return Line2D([], [], label=text, color=look.light, linewidth=min(look.width, 6.0), linestyle=dashes)
 
 
@@ -613,7 +620,7 @@ def draw_legend(figure: Figure, handles: list[Any], left: float, top: float, col
     )
 
 
-def _legend_column_count(entries: Sequence[LegendEntry]) -> int:
+def _choose_legend_columns(entries: Sequence[LegendEntry]) -> int:
     """Return the number of legend columns that fit into a picture, at most four."""
     for columns in (4, 3, 2):
         rows = -(-len(entries) // columns)
@@ -625,7 +632,7 @@ def _legend_column_count(entries: Sequence[LegendEntry]) -> int:
     return 1
 
 
-def _legend_height(entries: Sequence[LegendEntry], columns: int) -> float:
+def _compute_legend_height(entries: Sequence[LegendEntry], columns: int) -> float:
     """Return the height of a legend, inches; 0 without entries."""
     if not entries:
         return 0.0

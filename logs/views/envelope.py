@@ -28,7 +28,7 @@ class EnvelopeLine:
     descent: Floats
 
 
-def envelope_lines(setup: FlightSetup) -> list[EnvelopeLine]:
+def sample_envelope_lines(setup: FlightSetup) -> list[EnvelopeLine]:
     """Return the envelope at the lowest and the highest altitude of the route."""
     envelope, altitudes = setup.envelope, setup.route.positions[:, 2]
     speeds = np.linspace(envelope.airspeed[0], envelope.airspeed[-1], 120)
@@ -53,7 +53,7 @@ class FlownMoments:
     bank: Floats
 
 
-def flown_moments(track: Track, count: int = _MAX_DOTS) -> FlownMoments:
+def select_flown_moments(track: Track, count: int = _MAX_DOTS) -> FlownMoments:
     """Return at most ``count`` moments of a flight, evenly spaced; moments with NaN values are omitted."""
     rows = np.unique(np.linspace(0, len(track) - 1, min(len(track), count)).astype(np.intp))
     air_velocity = (track.velocity[rows] - track.wind[rows]).astype(np.float64)
@@ -77,12 +77,12 @@ def envelope_chart(setup: FlightSetup, track: Track | None) -> Chart:
     ['path angle through the air', 'bank, either side']
     """
     slopes, banks = [], []
-    for line, dashed in zip(envelope_lines(setup), (False, True), strict=False):
+    for line, dashed in zip(sample_envelope_lines(setup), (False, True), strict=False):
         for name, role, angle in (("climb", "steady-limit", line.climb), ("descent", "second", line.descent)):
             line_name = f"steepest {name} at {line.amsl} m"
             slopes.append(Layer("line", line_name, role, line.airspeed, angle, dashed=dashed))
     if track is not None and len(track):
-        moments = flown_moments(track)
+        moments = select_flown_moments(track)
         slopes.append(Layer("dots", "flown, moment by moment", "moment", moments.airspeed, moments.angle))
         banks.append(Layer("dots", "flown, moment by moment", "moment", moments.airspeed, moments.bank))
     leg_slopes_deg = np.degrees(leg_slopes(setup.display_waypoints))

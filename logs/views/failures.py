@@ -62,14 +62,14 @@ def failures(verdict: Verdict | None, waypoint_count: int) -> Failures:
     failed_findings = [finding for finding in verdict.findings if finding.ok is False] if verdict is not None else []
     places = [finding.place for finding in failed_findings if finding.place.index is not None]
     return Failures(
-        legs=_failed_rules_by_number(failed_findings, "leg", waypoint_count - 1),
-        waypoints=_failed_rules_by_number(failed_findings, "waypoint", waypoint_count),
+        legs=_collect_failed_rules(failed_findings, "leg", waypoint_count - 1),
+        waypoints=_collect_failed_rules(failed_findings, "waypoint", waypoint_count),
         threats=tuple(dict.fromkeys(place for place in places if place.kind in ("missile", "radar"))),
         places={(place.kind, place.index or 0): place for place in places},
     )
 
 
-def _failed_rules_by_number(failed_findings: list[Finding], kind: PlaceKind, count: int) -> dict[int, tuple[str, ...]]:
+def _collect_failed_rules(failed_findings: list[Finding], kind: PlaceKind, count: int) -> dict[int, tuple[str, ...]]:
     """Return the failed rules of each leg or waypoint below number `count`, keyed by its number."""
     rules_by_place: dict[int, list[str]] = {}
     for finding in failed_findings:
@@ -83,7 +83,9 @@ def _failed_rules_by_number(failed_findings: list[Finding], kind: PlaceKind, cou
 
 
 def stop_rows(stops: Sequence[int]) -> list[int]:
-    """Return the index of the first waypoint of each stop; a loiter is one stop with several corners.
+    """Return the index of the first waypoint of each stop of a mission.
+
+    A stop is a place as numbered in messages; a loiter is one stop with several waypoints.
 
     stops: number of the stop of each waypoint, in flying order.
 
@@ -114,11 +116,13 @@ def paths_differ(first_path: Floats, second_path: Floats, tolerance: float) -> b
 
     first_path, second_path: corners of the paths, m, (n, 3) and (k, 3).
     """
-    return max(_max_distance(first_path, second_path), _max_distance(second_path, first_path)) > tolerance
+    return (
+        max(_compute_max_distance(first_path, second_path), _compute_max_distance(second_path, first_path)) > tolerance
+    )
 
 
-def _max_distance(points: Floats, path: Floats) -> float:
-    """Return the largest distance (m) of any of the points from the path."""
+def _compute_max_distance(points: Floats, path: Floats) -> float:
+    """Return the largest distance (m) of points (n, 3) from a path with corners (k, 3)."""
     start, step = path[:-1], np.diff(path, axis=0)
     length_square = (step**2).sum(axis=1)
     max_distance = 0.0
@@ -149,7 +153,7 @@ def track_distance(waypoints: Floats, track: Track) -> Floats:
     return np.asarray(np.maximum.accumulate(np.where(np.isfinite(distance), distance, 0.0)))
 
 
-def fail_labels(
+def make_fail_labels(
     failed: Failures, corners: Floats, threat_positions: Mapping[int, tuple[float, float]]
 ) -> tuple[Label, ...]:
     """Return labels with the names of failing rules, at the first failing legs, threats and waypoints.
@@ -175,7 +179,7 @@ def threat_radius(threats: Threats, place: Place) -> float:
     return float(radii[place.index or 0])
 
 
-def inside_threats(failed: Failures, threats: Threats, track: Track) -> NDArray[np.bool_]:
+def find_rows_inside_threats(failed: Failures, threats: Threats, track: Track) -> NDArray[np.bool_]:
     """Return a mask (t,): True for rows of the track inside a sphere whose rule fails."""
     is_inside = np.zeros(len(track), dtype=bool)
     for place in failed.threats:

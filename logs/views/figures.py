@@ -19,7 +19,7 @@ from logs.views.charts import Chart, chart_json
 from logs.views.envelope import envelope_chart
 from logs.views.failures import failures
 from logs.views.glides import glide_chart
-from logs.views.link import DrawnLink, draw_scenario_link, link_chart, link_map
+from logs.views.link import DrawnLink, compute_scenario_link, link_chart, link_map
 from logs.views.map import MapChart, flight_map, map_json
 from logs.views.moments import waypoint_names
 from logs.views.profile import profile_chart
@@ -85,8 +85,8 @@ class FigureEntry:
     still: bool = False
 
 
-def _path_arguments(subject: Subject) -> dict[str, Any]:
-    """Return the keyword arguments that the map and the profile share: plan, route, track, verdict, stops."""
+def _make_path_arguments(subject: Subject) -> dict[str, Any]:
+    """Return keyword arguments for `flight_map` and `profile_chart`: plan, route, track, verdict, stops."""
     plan = subject.setup.plan
     return {
         "plan_waypoints": plan.waypoints if plan is not None else None,
@@ -99,7 +99,9 @@ def _path_arguments(subject: Subject) -> dict[str, Any]:
 
 def _make_map(subject: Subject) -> MapChart:
     """Make the map of a flight."""
-    return flight_map(subject.setup.scenario, **_path_arguments(subject), waypoint_texts=waypoint_names(subject.setup))
+    return flight_map(
+        subject.setup.scenario, **_make_path_arguments(subject), waypoint_texts=waypoint_names(subject.setup)
+    )
 
 
 def _make_scene(subject: Subject) -> SceneView:
@@ -108,7 +110,7 @@ def _make_scene(subject: Subject) -> SceneView:
     return SceneView(subject.setup, subject.track, failures(subject.verdict, waypoints))
 
 
-def _flight_view(make_chart: Callable[[FlightSetup, Track], Chart | None]) -> Callable[[Subject], Chart | None]:
+def _make_flight_view(make_chart: Callable[[FlightSetup, Track], Chart | None]) -> Callable[[Subject], Chart | None]:
     """Make a function that builds a view of a flight, and returns None for a plan that was not flown."""
     return lambda subject: None if subject.track is None else make_chart(subject.setup, subject.track)
 
@@ -129,47 +131,47 @@ def return_views(setup: FlightSetup, drawn_returns: DrawnReturns, track: Track |
     return {name: view for name, view in views if view is not None and drawn_returns.returns.each}
 
 
-def _returns_view(name: str) -> Callable[[Subject], View | None]:
+def _make_returns_view(name: str) -> Callable[[Subject], View | None]:
     """Make a function that builds one of the `RETURN_FIGURES`, and returns None if no returns were judged."""
 
-    def view(subject: Subject) -> View | None:
+    def make_view(subject: Subject) -> View | None:
         """Return the figure's view, or None if no returns were judged."""
         if subject.returns is None or not subject.returns.returns.each:
             return None
         return RETURN_FIGURES[name](subject.setup, subject.returns, subject.track)
 
-    return view
+    return make_view
 
 
-def _link_view(make_view: Callable[[FlightSetup, DrawnLink], View]) -> Callable[[Subject], View | None]:
+def _make_link_view(make_view: Callable[[FlightSetup, DrawnLink], View]) -> Callable[[Subject], View | None]:
     """Make a function that builds a view of the radio link, and returns None without a link."""
     return lambda subject: None if subject.link is None else make_view(subject.setup, subject.link)
 
 
-def _link_caption(subject: Subject) -> str:
+def _write_link_caption(subject: Subject) -> str:
     """Return the caption of the map of the radio link: the finding, and an explanation of the areas."""
     findings = [finding for finding in subject.verdict.findings if finding.rule == "link"]
-    heading = "".join(_as_sentence(finding.reason) for finding in findings)
+    heading = "".join(_make_sentence(finding.reason) for finding in findings)
     height_text = "" if subject.link is None else f" at {subject.link.coverage.height.text}"
-    return f"{heading}Areas: the link of an aircraft{height_text}, the median of this flight."
+    return f"{heading}The areas show the link of an aircraft{height_text}, the median height of this flight."
 
 
-def _fixed_caption(text: str) -> Callable[[Subject], str]:
+def _make_fixed_caption(text: str) -> Callable[[Subject], str]:
     """Make a caption function that returns the same text for every subject."""
     return lambda _: text
 
 
-def _returning_autopilot(subject: Subject) -> str:
-    """Return the autopilot whose returns are drawn, in a caption."""
+def _name_autopilot(subject: Subject) -> str:
+    """Name the autopilot whose returns are drawn, as the words before "model" in a caption."""
     return "the autopilot's" if subject.returns is None else f"the {subject.returns.returns.autopilot}"
 
 
-def _as_sentence(line: str) -> str:
+def _make_sentence(line: str) -> str:
     """Return a line as a sentence, with a capital letter, a full stop and a space."""
     return f"{line[:1].upper()}{line[1:]}. "
 
 
-def _map_caption(subject: Subject) -> str:
+def _write_map_caption(subject: Subject) -> str:
     """Return the caption of the map, which explains its lines."""
     arc_text = " At corners the two differ: the aircraft flies an arc inside the waypoint."
     flight_text = "The broad line is the plan, and the thin line on it is the flight." + (
@@ -185,14 +187,16 @@ FIGURES = (
         "Map",
         _make_map,
         alternative=lambda subject: f"Map, north up: {subject.contents_text}",
-        caption=_map_caption,
+        caption=_write_map_caption,
         still=True,
     ),
     FigureEntry(
         "profile",
         "Profile",
         lambda subject: profile_chart(
-            subject.setup.scenario, **_path_arguments(subject), above_ground=subject.setup.route.points["above_ground"]
+            subject.setup.scenario,
+            **_make_path_arguments(subject),
+            above_ground=subject.setup.route.points["above_ground"],
         ),
         alternative=lambda subject: (
             "Heights along the path: terrain, required clearance, "
@@ -213,7 +217,7 @@ FIGURES = (
         "3-D view",
         _make_scene,
         alternative=lambda subject: f"View from the side: {subject.contents_text}",
-        caption=_fixed_caption(
+        caption=_make_fixed_caption(
             "Domes are the missiles' reach, dashed domes the radars' reach; thin poles join the "
             "ground and the waypoints. Parts behind a ridge are faint."
         ),
@@ -222,11 +226,11 @@ FIGURES = (
         "turns",
         "Turn by turn, leg by leg",
         lambda subject: turn_chart(subject.setup.scenario.name, subject.verdict),
-        alternative=_fixed_caption(
+        alternative=_make_fixed_caption(
             "Bars, dots and dashes: planned value, flown value and limit of each turn, slope, "
             "height above ground, waypoint distance, and distance from the legs."
         ),
-        caption=_fixed_caption(
+        caption=_make_fixed_caption(
             "Bar: planned. Dot: flown. Dash: limit (the tighter one of scenario and aircraft; "
             "for a waypoint, the distance within which it counts as reached). Ringed: fails."
         ),
@@ -234,51 +238,51 @@ FIGURES = (
     FigureEntry(
         "returns",
         "Returns to launch",
-        _returns_view("returns"),
-        alternative=_fixed_caption(
+        _make_returns_view("returns"),
+        alternative=_make_fixed_caption(
             "Map, north up: the route coloured by the outcome of a return from there, and the worst returns."
         ),
         caption=lambda subject: (
-            ("" if subject.returns is None else _as_sentence(headline(subject.returns.returns)))
+            ("" if subject.returns is None else _make_sentence(headline(subject.returns.returns)))
             + "The worst returns are drawn; their numbers refer to the profiles below."
         ),
     ),
     FigureEntry(
         "worst-returns",
         "The worst returns",
-        _returns_view("worst-returns"),
-        alternative=_fixed_caption("Heights along the worst returns: terrain, required clearance and spheres."),
+        _make_returns_view("worst-returns"),
+        alternative=_make_fixed_caption("Heights along the worst returns: terrain, required clearance and spheres."),
         caption=lambda subject: (
-            f"Simulated with {_returning_autopilot(subject)} model on a point mass, in the mean wind, from the point"
+            f"Simulated with {_name_autopilot(subject)} model on a point mass, in the mean wind, from the point"
             " where each return begins."
         ),
     ),
     FigureEntry(
         "return-heights",
         "Return to launch, or engine failure",
-        _returns_view("return-heights"),
-        alternative=_fixed_caption(
+        _make_returns_view("return-heights"),
+        alternative=_make_fixed_caption(
             "Over time: the flight's altitude coloured by the outcome of a return, the lowest "
             "altitude from which a return is safe, and the altitude to spare of a glide without "
             "the engine."
         ),
-        caption=_fixed_caption(
-            "Lowest safe height: the lowest height from which a return is safe. Where a return "
-            "from the flight's height is not safe, it is the nearest safe height above the "
-            "flight. Left over: the flight's height minus the height that a glide needs; below "
+        caption=_make_fixed_caption(
+            "The limit line is the lowest altitude from which a return is safe. Where a return "
+            "from the flight's altitude is not safe, the line is the nearest safe altitude above the "
+            "flight. Altitude to spare: the flight's altitude minus the altitude that a glide needs; below "
             "zero the glide does not arrive."
         ),
     ),
     FigureEntry(
         "glide",
         "Without its engine",
-        _returns_view("glide"),
-        alternative=_fixed_caption(
+        _make_returns_view("glide"),
+        alternative=_make_fixed_caption(
             "Map, north up: the lowest height from which the aircraft can glide home; flat ground suitable for a "
             "landing; and the route, coloured by what a glide from each point can reach."
         ),
         caption=lambda subject: (
-            ("" if subject.returns is None else _as_sentence(glides_headline(subject.returns.glides)))
+            ("" if subject.returns is None else _make_sentence(glides_headline(subject.returns.glides)))
             + (
                 "Blue: the lowest height above ground from which home or another chosen place is in "
                 "reach, up to 3 km from the route. Flat ground is flat according to the elevation "
@@ -289,80 +293,80 @@ FIGURES = (
     FigureEntry(
         "survey",
         "Photo lines",
-        _flight_view(survey_chart),
-        alternative=_fixed_caption(
+        _make_flight_view(survey_chart),
+        alternative=_make_fixed_caption(
             "Each survey's photo lines from above: the usable parts, the lost parts, and the flown track."
         ),
-        caption=_fixed_caption(
-            "Broad: flown on the line, level, at its height above ground and with the camera on. "
-            "Marked: lost. The axes have different scales."
+        caption=_make_fixed_caption(
+            "Broad line: flown on the photo line, level, at its height above ground and with the camera on. "
+            "Marked line: lost. The axes have different scales."
         ),
     ),
     FigureEntry(
         "link-map",
         "Radio link",
-        _link_view(link_map),
-        alternative=_fixed_caption(
+        _make_link_view(link_map),
+        alternative=_make_fixed_caption(
             "Map, north up: the path coloured by the margin of the radio link, the station, and the areas in which the "
             "link is weak or lost at the height of the flight."
         ),
-        caption=_link_caption,
+        caption=_write_link_caption,
     ),
     FigureEntry(
         "link",
         "Radio link over time",
-        _link_view(link_chart),
-        alternative=_fixed_caption(
+        _make_link_view(link_chart),
+        alternative=_make_fixed_caption(
             "Plots over time: margin of the radio link, diffraction loss, Fresnel clearance, and distance of the "
             "station."
         ),
-        caption=_fixed_caption(
-            "Margin: what is left above the fade margin. Fresnel clearance: height of the line of sight above the "
-            "ground, in radii of the first Fresnel zone; below 0 the terrain hides the aircraft."
+        caption=_make_fixed_caption(
+            "Link margin: strength of the signal above the fade margin. Fresnel clearance: height of the line of sight "
+            "above the ground, in radii of the first Fresnel zone; below 0 the terrain hides the aircraft."
         ),
     ),
     FigureEntry(
         "time",
         "Over time",
-        _flight_view(time_chart),
-        alternative=_fixed_caption(
+        _make_flight_view(time_chart),
+        alternative=_make_fixed_caption(
             "Plots over time: airspeed, bank, load factor, cross-track error, height error, height above ground."
         ),
-        caption=_fixed_caption(
-            "Cross-track and height error are those of the guidance, relative to the path with "
-            "its corners rounded. Height above ground is computed from track and terrain."
+        caption=_make_fixed_caption(
+            "Cross-track and height error are errors of the guidance, relative to the path with "
+            "rounded corners. Height above ground is computed from track and terrain."
         ),
     ),
     FigureEntry(
         "exposure",
         "Exposure",
-        _flight_view(exposure_chart),
-        alternative=_fixed_caption(
+        _make_flight_view(exposure_chart),
+        alternative=_make_fixed_caption(
             "Plots along the flown distance: strength and sum of the exposure to missiles and to radars."
         ),
-        caption=_fixed_caption(
+        caption=_make_fixed_caption(
             "Strength is the sum over all units of (scale/distance)⁴ inside their reach: 1 where "
-            "distance equals scale (Yang, Tang and Lozano 2014, eq. 9 and 10, as a density). So "
-            "far: its integral over time."
+            "distance equals scale (Yang, Tang and Lozano 2014, eq. 9 and 10, as a density). The panels "
+            "“so far” show the integral of the strength over time."
         ),
     ),
     FigureEntry(
         "controls",
         "Controls",
-        _flight_view(control_chart),
-        alternative=_fixed_caption(
+        _make_flight_view(control_chart),
+        alternative=_make_fixed_caption(
             "Plots over time: elevator, aileron, rudder and throttle, commanded and actual, with their limits."
         ),
-        caption=_fixed_caption("Shaded: the command is at the control's limit (saturated)."),
+        caption=_make_fixed_caption("Shaded: the command is at the control's limit (saturated)."),
     ),
     FigureEntry(
         "energy",
         "Energy",
-        _flight_view(energy_chart),
-        alternative=_fixed_caption(
+        _make_flight_view(energy_chart),
+        alternative=_make_fixed_caption(
             "Plots over time: battery energy used, power, current, and the aircraft's energy as a height."
         ),
-        caption=_fixed_caption(
+        caption=_make_fixed_caption(
             "Energy height: height plus airspeed²/2g. Its slope is the climb that the motor provides."
         ),
     ),
@@ -370,10 +374,10 @@ FIGURES = (
         "envelope",
         "Envelope",
         lambda subject: envelope_chart(subject.setup, subject.track),
-        alternative=_fixed_caption(
+        alternative=_make_fixed_caption(
             "Path angle over airspeed with the steepest climbs and descents, and bank over airspeed with its limit."
         ),
-        caption=_fixed_caption(
+        caption=_make_fixed_caption(
             "Lines: the steepest steady climb and descent of the aircraft, from trims of its "
             "model. A dot may be outside for a moment, in a gust or a pull-up; a leg may not."
         ),
@@ -384,10 +388,13 @@ FIGURES = (
 def make_subject(
     setup: FlightSetup, track: Track | None, verdict: Verdict, returns: DrawnReturns | None = None
 ) -> Subject:
-    """Return the subject of the figures; a track without rows is omitted."""
+    """Collect the data that the figures of a flight or a plan show, with its fence and its radio link.
+
+    track: track of the flight; a track without rows counts as None, a plan that was not flown.
+    """
     track = track if track is not None and len(track) else None
     setup = with_fence_zones(setup)
-    return Subject(setup, track, verdict, returns, draw_scenario_link(setup, track))
+    return Subject(setup, track, verdict, returns, compute_scenario_link(setup, track))
 
 
 def figure_views(subject: Subject) -> dict[str, View]:

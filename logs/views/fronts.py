@@ -27,7 +27,7 @@ class _NamedPlan:
     role: str
 
 
-def _named_plans(front: Front) -> list[_NamedPlan]:
+def _find_best_plans(front: Front) -> list[_NamedPlan]:
     """Return the best plan in each objective.
 
     A plan that is best in several objectives is named after the first of them.  An objective in which all plans are
@@ -49,7 +49,7 @@ def front_map(front: Front) -> MapChart:
 
     The best plan in each objective is numbered and stands out.
     """
-    scenario, named_plans = front.plans[0].plan.scenario, _named_plans(front)
+    scenario, named_plans = front.plans[0].plan.scenario, _find_best_plans(front)
     named_rows = {plan.row for plan in named_plans}
     layers, labels = [], []
     for row, plan in enumerate(front.plans):
@@ -77,7 +77,7 @@ def front_map(front: Front) -> MapChart:
 
 def front_chart(front: Front) -> Chart:
     """Chart each plan's exposure, height above ground, energy and time of flight over its length."""
-    named_plans, plans = _named_plans(front), front.plans
+    named_plans, plans = _find_best_plans(front), front.plans
     lengths = np.array([plan.length for plan in plans]) / 1e3
     other_rows = np.setdiff1d(np.arange(len(plans)), [plan.row for plan in named_plans])
     columns = [
@@ -107,7 +107,7 @@ def front_chart(front: Front) -> Chart:
     length_range = (float(lengths.min()) - margin, float(lengths.max()) + margin)
     name = plans[0].plan.scenario.name
     return Chart(
-        f"{name}: what each plan of the front gains for its length",
+        f"{name}: objectives of each plan of the front, over its length",
         "length",
         "km",
         tuple(panels),

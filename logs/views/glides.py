@@ -10,7 +10,7 @@ from logs.verdict.returns.glides_text import reached_text, site_text
 from logs.verdict.returns.judge_glides import REACHES, Glide, Reach
 from logs.views.charts import Label, Layer
 from logs.views.map import Extent, MapChart, NamedWind, end_labels, map_extent, scenario_map
-from logs.views.returns import east_and_north, path_by_reach, path_layers
+from logs.views.returns import east_and_north, path_layers, split_path_by_reach
 
 # Role and name of the path by destination within reach without an engine.
 _LOOKS: dict[Reach, tuple[str, str]] = {reach: (f"reach-{reach}", reached_text(reach)) for reach in REACHES}
@@ -28,12 +28,12 @@ def glide_chart(setup: FlightSetup, drawn_returns: DrawnReturns, track: Track | 
         return None
     sites = np.array([[site.east, site.north, 0.0] for site in glides.sites])
     extent = map_extent(scenario, route, [sites, np.array([glide.start for glide in glides.each])])
-    layers = footprint_layers(drawn_returns, extent)
-    segments = path_by_reach(setup, drawn_returns, track)
-    layers += path_layers(segments, _LOOKS, east_and_north, lambda point: _glide_text(point.element, drawn_returns))
+    layers = make_footprint_layers(drawn_returns, extent)
+    segments = split_path_by_reach(setup, drawn_returns, track)
+    layers += path_layers(segments, _LOOKS, east_and_north, lambda point: _describe_glide(point.element, drawn_returns))
     impacts = np.array([glide.own_return.impact for glide in glides.each if glide.own_return.end == "ground"])
     if len(impacts):
-        name = f"where {glides.autopilot}'s own return comes down"
+        name = f"place where {glides.autopilot}'s own return meets the ground"
         layers.append(Layer("dots", name, "comes-down", impacts[:, 0], impacts[:, 1], quiet=True))
     names = tuple(site_text(site) for site in glides.sites)
     layers.append(
@@ -53,14 +53,14 @@ def glide_chart(setup: FlightSetup, drawn_returns: DrawnReturns, track: Track | 
     )
 
 
-def _glide_text(glide: Glide, drawn_returns: DrawnReturns) -> str:
+def _describe_glide(glide: Glide, drawn_returns: DrawnReturns) -> str:
     """Return the hover text of a glide: its best destination, and the altitude to spare."""
     altitude_left = drawn_returns.glides.altitude_left(glide)
     left_text = f", {altitude_left:.0f} m of altitude to spare" if altitude_left >= 0.0 else ""
     return f"{glide.time:.0f} s: {reached_text(glide.reach)}{left_text}"
 
 
-def footprint_layers(drawn_returns: DrawnReturns, extent: Extent) -> list[Layer]:
+def make_footprint_layers(drawn_returns: DrawnReturns, extent: Extent) -> list[Layer]:
     """Return layers of the glide footprint; [] if none was computed.
 
     They are the areas by the lowest height above ground from which a site can be reached, and flat ground.
@@ -71,14 +71,14 @@ def footprint_layers(drawn_returns: DrawnReturns, extent: Extent) -> list[Layer]
     layers, place = [], "home, rally point or landing" if len(drawn_returns.glides.sites) > 1 else "home"
     for band in footprint.bands(*extent):
         name = f"{place} in reach from {band.max_height:.0f} m above ground"
-        layers.append(area_layer(name, BAND_ROLES[band.max_height], band.parts))
+        layers.append(make_area_layer(name, BAND_ROLES[band.max_height], band.parts))
     flat_parts = footprint.landings(*extent)
     return layers + (
-        [area_layer("flat ground according to the elevation file", "landable", flat_parts)] if flat_parts else []
+        [make_area_layer("flat ground according to the elevation file", "landable", flat_parts)] if flat_parts else []
     )
 
 
-def area_layer(name: str, role: str, parts: tuple[Part, ...]) -> Layer:
+def make_area_layer(name: str, role: str, parts: tuple[Part, ...]) -> Layer:
     """Make a layer of areas with holes; NaN separates their rings."""
     gap = np.full((1, 2), np.nan)
     x, y = np.vstack([points for part in parts for ring in part for points in (ring, gap)])[:-1].T

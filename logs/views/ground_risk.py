@@ -10,7 +10,7 @@ from shapely.geometry.base import BaseGeometry
 from flight.simulation.setup import FlightSetup
 from logs.verdict.returns.glide_footprint import outline_parts
 from logs.views.charts import Label, Layer
-from logs.views.glides import area_layer
+from logs.views.glides import make_area_layer
 from logs.views.map import MapChart, NamedWind, end_labels, map_extent, scenario_map
 from world.population import DENSITY_LIMITS_PER_KM2, Population, format_density
 
@@ -37,18 +37,22 @@ class RiskVolume(NamedTuple):
 
 
 def ground_risk_map(setup: FlightSetup, volumes: Sequence[RiskVolume], population: Population | None) -> MapChart:
-    """Return a map of the volumes, the largest last, over the population."""
+    """Make a map of the volumes of a mission's ground risk over the population.
+
+    volumes: volumes from the smallest to the largest.
+    population: None to draw no population.
+    """
     scenario, route = setup.scenario, setup.route.positions
     outline = shapely.get_coordinates(shapely.union_all([volume.area for volume in volumes]))
     extent = map_extent(scenario, route, [np.column_stack([outline, np.zeros(len(outline))])])
     layers, labels = [], []
     if population is not None:
         layers += [
-            area_layer(_BAND_NAMES[band], f"population-{band}", parts)
+            make_area_layer(_BAND_NAMES[band], f"population-{band}", parts)
             for band, area in population.bands
             if (parts := outline_parts(area))
         ]
-    layers += [area_layer(volume.name, volume.role, outline_parts(volume.area)) for volume in reversed(volumes)]
+    layers += [make_area_layer(volume.name, volume.role, outline_parts(volume.area)) for volume in reversed(volumes)]
     layers.append(Layer("line", "route of the mission", "planned", route[:, 0], route[:, 1], quiet=True))
     if population is not None:
         east, north = population.max_place

@@ -46,7 +46,7 @@ class LabelPlacer:
     points: list[tuple[float, float]] = field(default_factory=list)
 
     def avoid(self, east: ArrayLike, north: ArrayLike, spacing: float = 6.0) -> None:
-        """Keep labels off a line through these data positions, sampled every `spacing` pixels."""
+        """Keep later labels off a line through these positions (map units), sampled every `spacing` pixels."""
         points = self._to_pixels(east, north)
         points = points[np.isfinite(points).all(axis=1)]
         if len(points) < 2:
@@ -91,8 +91,8 @@ class LabelPlacer:
         for ring, distance_in_heights in enumerate(ring_distances):
             for direction_rank, direction in enumerate((prefer, *_DIRECTIONS)):
                 box = self._make_box(point_x, point_y, width, height, gap + distance_in_heights * height, direction)
-                order_cost = 0.0 if "bbox" in style else self._order_cost(box, point_x, point_y)
-                cost = self._box_cost(box) + order_cost + 0.05 * direction_rank + 1.5 * ring
+                order_cost = 0.0 if "bbox" in style else self._compute_order_cost(box, point_x, point_y)
+                cost = self._compute_box_cost(box) + order_cost + 0.05 * direction_rank + 1.5 * ring
                 if cost < best_cost:
                     best_box, best_cost, best_ring = box, cost, ring
         if optional and any(_do_overlap(best_box, other) for other in self.boxes):
@@ -131,7 +131,7 @@ class LabelPlacer:
 
     @staticmethod
     def _make_box(x: float, y: float, width: float, height: float, distance: float, direction: tuple[int, int]) -> Box:
-        """Return the box of a label next to a point, in a direction from it.  All in pixels."""
+        """Return the box of a label at a distance and in a direction from a point, all in pixels."""
         dx, dy = direction
         # A diagonal label approaches the point with its corner, so it may stand closer.
         offset = distance * (0.7 if dx and dy else 1.0)
@@ -144,11 +144,12 @@ class LabelPlacer:
             middle_y + 0.5 * height,
         )
 
-    def _order_cost(self, box: Box, x: float, y: float) -> float:
-        """Return the cost of a box on the wrong side of the labels of near points.
+    def _compute_order_cost(self, box: Box, x: float, y: float) -> float:
+        """Return the cost of a label that stands in another order to near labels than their points do.
 
-        A framed label has no such cost, because it has a line to its point.
+        A reader could assign such labels to the wrong points.  A framed label has a line to its point instead.
 
+        box: box of the label, pixels.
         x, y: point of the label, pixels.
         """
         cost = 0.0
@@ -162,7 +163,7 @@ class LabelPlacer:
                 cost += _ORDER_COST
         return cost
 
-    def _box_cost(self, box: Box) -> float:
+    def _compute_box_cost(self, box: Box) -> float:
         """Return the cost of a box: 0 if it is free, more if it leaves the frame or covers labels or lines."""
         frame = self.axes.get_window_extent()
         cost = 0.0
@@ -182,6 +183,6 @@ class LabelPlacer:
         return cost
 
 
-def _do_overlap(a: Box, b: Box) -> bool:
-    """Return True if two boxes overlap."""
-    return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
+def _do_overlap(first: Box, second: Box) -> bool:
+    """Return True if two boxes (left, bottom, right, top) overlap."""
+    return first[0] < second[2] and second[0] < first[2] and first[1] < second[3] and second[1] < first[3]

@@ -13,7 +13,7 @@ from logs.verdict.measures.link_outages import LinkAlongPath, link_along_path, s
 from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.returns.glide_footprint import cell_outlines
 from logs.views.charts import Chart, Label, Layer, Panel, series, shorten
-from logs.views.glides import area_layer
+from logs.views.glides import make_area_layer
 from logs.views.map import Extent, MapChart, NamedWind, end_labels, map_extent, scenario_map
 from logs.views.returns import path_layers
 from world.arrays import Floats
@@ -63,8 +63,8 @@ class DrawnLink:
     is_flown: bool
 
 
-def draw_link(setup: FlightSetup, along: LinkAlongPath, antenna: Floats, *, is_flown: bool) -> DrawnLink | None:
-    """Compute the data of a radio link's pictures; None if link, terrain or path is missing.
+def compute_link(setup: FlightSetup, along: LinkAlongPath, antenna: Floats, *, is_flown: bool) -> DrawnLink | None:
+    """Compute the data for pictures of a radio link; None if link, terrain or path is missing.
 
     along: the link along the path.
     antenna: position of the station's antenna, m, (3,).
@@ -78,7 +78,7 @@ def draw_link(setup: FlightSetup, along: LinkAlongPath, antenna: Floats, *, is_f
     return DrawnLink(along, antenna, coverage, extent, is_flown)
 
 
-def draw_scenario_link(setup: FlightSetup, track: Track | None) -> DrawnLink | None:
+def compute_scenario_link(setup: FlightSetup, track: Track | None) -> DrawnLink | None:
     """Compute the data of the pictures of the scenario's radio link along a flight.
 
     Return None without a link, a terrain, or a known position of the station.
@@ -94,7 +94,7 @@ def draw_scenario_link(setup: FlightSetup, track: Track | None) -> DrawnLink | N
         along = link_along_path(link, terrain, antenna, path.times, path.points)
     else:
         along = link_along_path(link, terrain, antenna, track.time, track.position)
-    return draw_link(setup, along, antenna, is_flown=track is not None)
+    return compute_link(setup, along, antenna, is_flown=track is not None)
 
 
 def link_chart(setup: FlightSetup, drawn: DrawnLink) -> Chart:
@@ -102,7 +102,7 @@ def link_chart(setup: FlightSetup, drawn: DrawnLink) -> Chart:
     along, points = drawn.along, drawn.along.points
     name, role = ("flown", "flown") if drawn.is_flown else ("planned path", "planned")
 
-    def panel(
+    def make_panel(
         title: str, unit: str, values: Floats, limits: tuple[tuple[str, float], ...] = (), note: str = ""
     ) -> Panel:
         """Return a panel of values over time.
@@ -115,10 +115,12 @@ def link_chart(setup: FlightSetup, drawn: DrawnLink) -> Chart:
     clearance = np.clip(points.fresnel_clearance, -_MAX_SHOWN_CLEARANCE, _MAX_SHOWN_CLEARANCE)
     zone_limits = (("line of sight", 0.0), (f"{100.0 * _CLEAR_FRACTION:.0f} % of the first zone", _CLEAR_FRACTION))
     panels = (
-        panel("link margin", "dB", points.margin, (("required", 0.0),)),
-        panel("diffraction loss", "dB", points.diffraction_loss),
-        panel("Fresnel clearance", "radii", clearance, zone_limits, f"limited to {_MAX_SHOWN_CLEARANCE:.0f} radii"),
-        panel("distance", "km", points.distance / 1000.0),
+        make_panel("link margin", "dB", points.margin, (("required", 0.0),)),
+        make_panel("diffraction loss", "dB", points.diffraction_loss),
+        make_panel(
+            "Fresnel clearance", "radii", clearance, zone_limits, f"limited to {_MAX_SHOWN_CLEARANCE:.0f} radii"
+        ),
+        make_panel("distance", "km", points.distance / 1000.0),
     )
     title = f"{shorten(setup.scenario.name, 60)}: the radio link over time"
     return Chart(title, "time since the start", "s", panels, timed=drawn.is_flown)
@@ -135,15 +137,15 @@ def link_map(setup: FlightSetup, drawn: DrawnLink) -> MapChart:
         rows = list(group)
         segments.append((quality, [*rows, *range(rows[-1] + 1, min(rows[-1] + 2, len(qualities)))]))
 
-    def position(k: int) -> tuple[float, float]:
+    def find_position(k: int) -> tuple[float, float]:
         """Return east and north of point k, m."""
         return float(along.positions[k, 0]), float(along.positions[k, 1])
 
-    def point_text(k: int) -> str:
+    def describe_point(k: int) -> str:
         """Describe the link margin at point k."""
         return f"{along.time[k]:.0f} s: {points.margin[k]:.1f} dB above the fade margin"
 
-    layers = [*_coverage_layers(drawn.coverage), *path_layers(segments, _LOOKS, position, point_text)]
+    layers = [*_make_coverage_layers(drawn.coverage), *path_layers(segments, _LOOKS, find_position, describe_point)]
     layers.append(Layer("dots", "station", "waypoint", antenna[:1], antenna[1:2], hover_texts=("station",)))
     label = Label("station", float(antenna[0]), float(antenna[1]), "end", "waypoint", (1, 1))
     return scenario_map(
@@ -157,17 +159,17 @@ def link_map(setup: FlightSetup, drawn: DrawnLink) -> MapChart:
     )
 
 
-def _coverage_layers(coverage: LinkCoverage) -> list[Layer]:
+def _make_coverage_layers(coverage: LinkCoverage) -> list[Layer]:
     """Return layers of the areas in which the link is weak, lost or in the ground, at the flight's height."""
     is_weak = (coverage.margin >= 0.0) & (coverage.margin < WEAK_MARGIN_DB)
     height_text = coverage.height.text
     areas = (
-        (f"at {height_text}: less than {WEAK_MARGIN_DB:.0f} dB left", "coverage-weak", is_weak),
+        (f"at {height_text}: less than {WEAK_MARGIN_DB:.0f} dB above the fade margin", "coverage-weak", is_weak),
         (f"at {height_text}: below the fade margin", "coverage-lost", coverage.margin < 0.0),
         (f"ground above {height_text}", "coverage-ground", coverage.is_in_ground),
     )
     return [
-        area_layer(name, role, parts)
+        make_area_layer(name, role, parts)
         for name, role, is_chosen in areas
         if (parts := cell_outlines(coverage.west, coverage.south, coverage.side, is_chosen))
     ]

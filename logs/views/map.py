@@ -9,7 +9,7 @@ import numpy as np
 from flight.simulation.track import Track
 from logs.verdict.verdict import Verdict
 from logs.views.charts import Json, Label, Layer, Panel, numbers, panel_json, shorten
-from logs.views.failures import Failures, fail_labels, failures, inside_threats, paths_differ, stop_rows
+from logs.views.failures import Failures, failures, find_rows_inside_threats, make_fail_labels, paths_differ, stop_rows
 from logs.views.threats_and_zones import threat_circles, threat_labels, zone_labels, zone_shapes
 from world.airspace.zones_on_map import zone_rings
 from world.arrays import Floats
@@ -86,12 +86,14 @@ def flight_map(
     waypoint_texts: Sequence[str] = (),
     stops: Sequence[int] | None = None,
 ) -> MapChart:
-    """Return the map of a plan, or of its flight.
+    """Make the map of a plan, or of its flight.
 
-    plan_waypoints: (p, 3) m or None; route_waypoints: (w, 3) m as flown, or None for a plan alone.  The route is
-    numbered and carries the verdict's marks; a plan that differs from it by more than 1 m is drawn as a second line.
-    Missiles are drawn as the outline of the sphere (line) and its section at the altitude of the nearest path point
-    (fill).
+    The waypoints of the route are numbered, and failures of the verdict are marked on it.  A plan that differs from the
+    route by more than 1 m is drawn as a second line.  A missile is drawn as a line around its sphere; the filled circle
+    is the section of the sphere at the altitude of the nearest path point.
+
+    plan_waypoints: waypoints of the plan, m, (p, 3), or None.
+    route_waypoints: waypoints of the flown route, m, (w, 3); None for a plan alone.
     waypoint_texts: text of the page on each waypoint.
     stops: displayed number of each waypoint of the route; None if each waypoint is a stop.
     """
@@ -120,7 +122,7 @@ def map_chart(
     waypoint_texts: Sequence[str] = (),
     stops: Sequence[int] | None = None,
 ) -> MapChart:
-    """Return a map as `flight_map` does, with any number of tracks and winds.
+    """Make a map as `flight_map` does, with any number of tracks and winds.
 
     subject: part of the title after the name of the scenario.
     """
@@ -132,16 +134,16 @@ def map_chart(
     layers: list[Layer] = []
     labels: list[Label] = []
     if route is not None:
-        layers += _path_layers(route, plan_waypoints, failed)
-    layers += [_track_layer(drawn_track) for drawn_track in tracks]
+        layers += _make_path_layers(route, plan_waypoints, failed)
+    layers += [_make_track_layer(drawn_track) for drawn_track in tracks]
     for drawn_track in tracks if failed.threats else ():
-        layers += _inside_threat_layers(scenario, drawn_track.track, failed)
+        layers += _make_inside_threat_layers(scenario, drawn_track.track, failed)
     if route is not None:
-        layers += _waypoint_layers(route, stops, failed, waypoint_texts)
+        layers += _make_waypoint_layers(route, stops, failed, waypoint_texts)
         centres = {k: (float(east), float(north)) for k, (east, north, _) in enumerate(scenario.threats.position)}
-        labels += fail_labels(failed, route[:, :2], centres)
+        labels += make_fail_labels(failed, route[:, :2], centres)
     labels += end_labels(scenario, route, stops)
-    labels += [] if route is None else _waypoint_labels(route, stops, failed)
+    labels += [] if route is None else _make_waypoint_labels(route, stops, failed)
     extent = map_extent(scenario, route, [drawn_track.track.position for drawn_track in tracks])
     return scenario_map(
         scenario, subject, layers, labels, extent, route=route, failing_threats=frozenset(failing_threats), winds=winds
@@ -159,10 +161,9 @@ def scenario_map(
     failing_threats: frozenset[int] = frozenset(),
     winds: Sequence[NamedWind] = (),
 ) -> MapChart:
-    """Return a map of a scenario with the given layers.
+    """Make a map of a scenario with additional layers, such as paths.
 
-    They are drawn above area, threats and zones, and below start and destination.
-
+    layers: additional layers, drawn above area, threats and zones, and below start and destination.
     labels: labels that take precedence over the names of threats and zones.
     extent: range as from `map_extent`.
     route: waypoints (w, 3), m, whose ends are start and destination, and whose altitudes determine the filled sections
@@ -171,7 +172,7 @@ def scenario_map(
     """
     east, north = extent
     area_layers = [
-        *_area_edge_layers(scenario),
+        *_make_area_edge_layers(scenario),
         *threat_circles(scenario.threats, route, failing_threats),
         *zone_shapes(scenario.zones),
     ]
@@ -181,7 +182,11 @@ def scenario_map(
     return MapChart(
         f"{shorten(scenario.name, 60)}: {subject}",
         Panel(
-            "north", "km", (*area_layers, *layers, *_end_markers(scenario, route)), span=north, labels=(*labels, *names)
+            "north",
+            "km",
+            (*area_layers, *layers, *_make_end_markers(scenario, route)),
+            span=north,
+            labels=(*labels, *names),
         ),
         east,
         north,
@@ -204,8 +209,8 @@ def map_json(chart: MapChart) -> Json:
 def map_extent(scenario: Scenario, route: Floats | None, paths: Sequence[Floats]) -> Extent:
     """Return the east and north range that shows the scenario's area and all paths, with a margin, m.
 
-    Bounds that planfly made around an external mission are no limit: the range then covers the path, and the zones
-    within these bounds.
+    A mission without a scenario has no area: its range contains the paths, and the parts of zones within the bounds
+    that planfly made around the mission.
 
     paths: paths (t, 3), m; rows with NaN are ignored.
     """
@@ -228,10 +233,10 @@ def map_extent(scenario: Scenario, route: Floats | None, paths: Sequence[Floats]
     return (west, east), (south, north)
 
 
-def _area_edge_layers(scenario: Scenario) -> list[Layer]:
-    """Return the layer of the edge of the scenario's area; [] for an external mission.
+def _make_area_edge_layers(scenario: Scenario) -> list[Layer]:
+    """Return the layer of the edge of the scenario's area; [] for a mission without a scenario.
 
-    The bounds that planfly makes around an external mission are no limit.
+    The bounds that planfly makes around such a mission do not limit the flight.
     """
     if scenario.external:
         return []
@@ -241,7 +246,7 @@ def _area_edge_layers(scenario: Scenario) -> list[Layer]:
     return [Layer("line", "edge of the area", "area", x, y, quiet=True)]
 
 
-def _path_layers(route: Floats, plan: Floats | None, failed: Failures) -> list[Layer]:
+def _make_path_layers(route: Floats, plan: Floats | None, failed: Failures) -> list[Layer]:
     """Return the layers of the failing legs, of the plan if it differs from the route, and of the route."""
     has_different_plan = plan is not None and paths_differ(plan, route, 1.0)
     legs = [route[k : k + 2] for k in failed.legs]
@@ -252,7 +257,7 @@ def _path_layers(route: Floats, plan: Floats | None, failed: Failures) -> list[L
     return [*layers, Layer("line", name, "planned", route[:, 0], route[:, 1], quiet=True)]
 
 
-def _track_layer(drawn_track: DrawnTrack) -> Layer:
+def _make_track_layer(drawn_track: DrawnTrack) -> Layer:
     """Make the layer of a flown track, thinned to what a map can show."""
     count = len(drawn_track.track)
     rows = np.union1d(np.arange(0, count, max(1, count // _MAX_POINTS)), [count - 1])
@@ -260,16 +265,16 @@ def _track_layer(drawn_track: DrawnTrack) -> Layer:
     return Layer("line", drawn_track.label, drawn_track.role, east, north, flight=drawn_track.flight)
 
 
-def _inside_threat_layers(scenario: Scenario, track: Track, failed: Failures) -> list[Layer]:
+def _make_inside_threat_layers(scenario: Scenario, track: Track, failed: Failures) -> list[Layer]:
     """Return the layer of the part of a track inside a threat whose rule fails, if any."""
-    is_inside = inside_threats(failed, scenario.threats, track)
+    is_inside = find_rows_inside_threats(failed, scenario.threats, track)
     if not is_inside.any():
         return []
     east, north = np.where(is_inside, track.position[:, :2].T, np.nan)
     return [Layer("line", "flown inside a threat's reach", "inside", east, north, quiet=True)]
 
 
-def _waypoint_layers(
+def _make_waypoint_layers(
     route: Floats, stops: Sequence[int], failed: Failures, texts_by_waypoint: Sequence[str]
 ) -> list[Layer]:
     """Make the layers of waypoints, and of waypoints that fail a rule."""
@@ -285,17 +290,17 @@ def _waypoint_layers(
     return layers
 
 
-def _named_ends(scenario: Scenario, route: Floats | None) -> tuple[tuple[str, Floats], tuple[str, Floats]]:
+def _name_ends(scenario: Scenario, route: Floats | None) -> tuple[tuple[str, Floats], tuple[str, Floats]]:
     """Return start and destination, by name: the ends of the route, or the scenario's without a route."""
     first, last = (scenario.start, scenario.destination) if route is None else (route[0], route[-1])
     return ("start", first), ("destination", last)
 
 
-def _end_markers(scenario: Scenario, route: Floats | None) -> list[Layer]:
+def _make_end_markers(scenario: Scenario, route: Floats | None) -> list[Layer]:
     """Make the markers of start and destination."""
     return [
         Layer("dots", name, name, point[:1], point[1:2], hover_texts=(name,))
-        for name, point in _named_ends(scenario, route)
+        for name, point in _name_ends(scenario, route)
     ]
 
 
@@ -304,7 +309,7 @@ def end_labels(scenario: Scenario, route: Floats | None, stops: Sequence[int]) -
 
     stops: number of each waypoint of the route.
     """
-    ends = _named_ends(scenario, route)
+    ends = _name_ends(scenario, route)
     numbers_of_ends = ("", "") if route is None else (stops[0], stops[-1])
     start, destination = (
         Label(f"{stop} {name}".strip(), float(point[0]), float(point[1]), "end")
@@ -315,12 +320,12 @@ def end_labels(scenario: Scenario, route: Floats | None, stops: Sequence[int]) -
     return [replace(start, text=f"{start.text}, {destination.text}")]
 
 
-def _are_close(a: Floats, b: Floats) -> bool:
+def _are_close(first: Floats, second: Floats) -> bool:
     """Return True if two points lie within 50 m horizontally, so that one marker is enough for both."""
-    return float(np.hypot(*(a[:2] - b[:2]))) < 50.0
+    return float(np.hypot(*(first[:2] - second[:2]))) < 50.0
 
 
-def _waypoint_labels(route: Floats, stops: Sequence[int], failed: Failures) -> list[Label]:
+def _make_waypoint_labels(route: Floats, stops: Sequence[int], failed: Failures) -> list[Label]:
     """Return the numbers of waypoints as labels: at most `_MAX_NUMBERS`, and all that fail a rule.
 
     Waypoints at start and destination are left out.

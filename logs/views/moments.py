@@ -11,18 +11,18 @@ from logs.recording.foxglove_scene import MODEL_SPAN_M, model_colours, model_cor
 from logs.verdict.places import Place
 from logs.verdict.wording import place_text
 from logs.views.charts import numbers
-from logs.views.scene import drawn_rows
+from logs.views.scene import select_drawn_rows
 
 # Largest number of moments of a flight in a page.
 MAX_MOMENTS = 2000
 
 
 def flight_moments(setup: FlightSetup, track: Track, *, name: str = "flown", role: str = "flown") -> dict[str, Any]:
-    """Return columns of at most `MAX_MOMENTS` rows of a flight for the page, by name.
+    """Return at most `MAX_MOMENTS` rows of a flight as columns for the page, by name.
 
-    time (s); east, north, up (m AMSL), above (m above ground, null without terrain); airspeed, climb (m/s); bank (right
-    positive), pitch, heading (deg); leg.  Unknown values are null.  In addition, legs: names of the legs.  Rows without
-    a position are left out.
+    The columns are time (s); east, north (m), up (m AMSL) and above (m above ground); airspeed and climb (m/s); bank
+    (right positive), pitch and heading (deg); and leg.  The key "legs" has the names of the legs.  Unknown values are
+    null.  Rows without a position are left out.
 
     name, role: name and role of the line.
 
@@ -32,7 +32,7 @@ def flight_moments(setup: FlightSetup, track: Track, *, name: str = "flown", rol
     >>> len(moments["time"]) == len(moments["leg"]), moments["name"]
     (True, 'flown')
     """
-    rows = drawn_rows(track, MAX_MOMENTS)
+    rows = select_drawn_rows(track, MAX_MOMENTS)
     position, terrain = track.position[rows], setup.scenario.terrain
     east, north, up = position.T
     height_above_ground = np.full(len(rows), np.nan) if terrain is None else up - terrain.height(east, north)
@@ -66,8 +66,7 @@ def leg_names(setup: FlightSetup) -> list[str]:
     items = setup.route.items.tolist()
     numbers = setup.route.leg_numbers.tolist()
     return [
-        place_text(Place("leg", k, to_item=_item_or_none(items[k + 1]), number=numbers[k]))
-        for k in range(setup.route.legs)
+        place_text(Place("leg", k, to_item=_get_item(items[k + 1]), number=numbers[k])) for k in range(setup.route.legs)
     ]
 
 
@@ -75,12 +74,12 @@ def waypoint_names(setup: FlightSetup) -> list[str]:
     """Return the name of each waypoint, with its mission item and altitude."""
     heights, numbers = setup.display_waypoints[:, 2].tolist(), setup.route.stops.tolist()
     return [
-        f"{place_text(Place('waypoint', k, item=_item_or_none(item), number=numbers[k]))}\n{heights[k]:.0f} m AMSL"
+        f"{place_text(Place('waypoint', k, item=_get_item(item), number=numbers[k]))}\n{heights[k]:.0f} m AMSL"
         for k, item in enumerate(setup.route.items.tolist())
     ]
 
 
-def _item_or_none(item: int) -> int | None:
+def _get_item(item: int) -> int | None:
     """Return the number of a mission item, or None for a waypoint without an item."""
     return item if item >= 0 else None
 
@@ -91,8 +90,8 @@ def aircraft_model() -> dict[str, Any]:
     Corners are forward, left and up, in units of the span.
     """
 
-    def rounded_list(values: NDArray[np.float32]) -> Any:
+    def round_values(values: NDArray[np.float32]) -> Any:
         """Return values as a list, rounded to four decimals."""
         return np.round(values.astype(np.float64), 4).tolist()
 
-    return {"corners": rounded_list(model_corners() / MODEL_SPAN_M), "colours": rounded_list(model_colours()[:, :3])}
+    return {"corners": round_values(model_corners() / MODEL_SPAN_M), "colours": round_values(model_colours()[:, :3])}

@@ -13,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 from logs import theme
 from logs.views.charts import Label, Layer, Panel, legend_entries
 from logs.views.draw_map import draw_ground, make_map_axes
-from logs.views.drawing import clean_style, draw_layers, draw_legend, legend_handle, new_figure, write_label
+from logs.views.drawing import clean_style, draw_layers, draw_legend, make_legend_handle, new_figure, write_label
 from logs.views.labels import LabelPlacer
 from logs.views.threats_and_zones import threat_circles
 from world.arrays import Floats
@@ -131,7 +131,7 @@ def _draw_ground_and_threats(scenario: Scenario, title: str, legend_height: floa
     # The circles do not depend on altitude: a path inside a circle may pass over the sphere.
     threat_panel = Panel("north", "m", threat_circles(scenario.threats, None, frozenset()))
     draw_layers(axes, threat_panel)
-    return figure, axes, ground_handles + [legend_handle(entry) for entry in legend_entries([threat_panel])]
+    return figure, axes, ground_handles + [make_legend_handle(entry) for entry in legend_entries([threat_panel])]
 
 
 def _draw_ends(axes: Any, scenario: Scenario, paths: Sequence[Floats]) -> list[Any]:
@@ -146,7 +146,7 @@ def _draw_ends(axes: Any, scenario: Scenario, paths: Sequence[Floats]) -> list[A
     draw_layers(axes, panel, min_zorder=6.0)
     for name, position in endpoints:
         write_label(placer, Label(name, float(position[0]), float(position[1]), "end"))
-    return [legend_handle(entry) for entry in legend_entries([panel])]
+    return [make_legend_handle(entry) for entry in legend_entries([panel])]
 
 
 def draw_convergence(histories: Mapping[int, Mapping[str, Sequence[Floats]]]) -> Figure:
@@ -158,7 +158,7 @@ def draw_convergence(histories: Mapping[int, Mapping[str, Sequence[Floats]]]) ->
     >>> history = np.array([[1.4, 0.2, 1.0], [1.2, 0.0, 0.0], [1.1, 0.0, 0.0]])
     >>> figure = draw_convergence({30: {"umda": [history]}})
     >>> figure.axes[0].get_title(loc="left"), figure.axes[1].get_ylabel()
-    ('30 threats', 'length ratio of the safe ones')
+    ('30 threats', 'length ratio of safe paths')
     """
     count = len(histories)
     with clean_style():
@@ -193,7 +193,7 @@ def draw_convergence(histories: Mapping[int, Mapping[str, Sequence[Floats]]]) ->
                 )
             if column == 0:
                 upper.set_ylabel("runs with a safe path")
-                lower.set_ylabel("length ratio of the safe ones")
+                lower.set_ylabel("length ratio of safe paths")
         figure.text(0.012, 0.965, "Convergence over generations", fontsize=11, fontweight="bold")
         handles: list[Any] = [
             Line2D([], [], linewidth=1.8, label=name, **look) for name, look in zip(names, _LOOKS, strict=False)

@@ -37,16 +37,16 @@ def band_chart(bands: Sequence[Band], title: str, *, by_time: bool = True) -> Ch
         )
         top = float(np.nanmax([high, flown_values]))
         left = float(axis_values[0] + _LABEL_FRACTION * (np.nanmax(axis_values) - axis_values[0]))
-        share = Label(f"{100.0 * band.inside:.0f} % inside", left, top, "end", prefer=(0, -1))
-        panels.append(Panel(band.name, band.unit.replace("deg", "°"), layers, min_span=1.0, labels=(share,)))
+        inside_label = Label(f"{100.0 * band.inside:.0f} % inside", left, top, "end", prefer=(0, -1))
+        panels.append(Panel(band.name, band.unit.replace("deg", "°"), layers, min_span=1.0, labels=(inside_label,)))
     along_name, unit = ("time of the log", "s") if by_time else ("along the legs", "km")
     return Chart(title, along_name, unit, tuple(panels), page_height=170, print_height=1.3)
 
 
 def _with_gaps(along: Floats, *columns: Floats) -> tuple[Floats, ...]:
-    """Insert NaN into an axis and its columns wherever the axis jumps.
+    """Insert NaN into an axis and its columns where the axis jumps from one segment of a log to the next.
 
-    The axis jumps between the segments of a log.
+    Returns the axis, then the columns.
     """
     steps = np.diff(along)
     jumps = np.flatnonzero(steps > _MAX_STEP_RATIO * np.median(steps)) + 1

@@ -6,12 +6,12 @@ import numpy as np
 
 from flight.simulation.track import Track
 from logs.verdict.verdict import Verdict
-from logs.views.charts import Chart, Label, Layer, Panel, outline_rows, shorten
+from logs.views.charts import Chart, Label, Layer, Panel, find_outline_rows, shorten
 from logs.views.failures import (
     Failures,
-    fail_labels,
     failures,
-    inside_threats,
+    find_rows_inside_threats,
+    make_fail_labels,
     route_distance,
     route_samples,
     stop_rows,
@@ -69,18 +69,19 @@ def profile_chart(
     distance, points = route_samples(route, max(float(waypoint_distances[-1]) / _SAMPLES, 1.0))
     ground = terrain_altitudes(scenario, points)
     if above_ground is not None and ground is not None and len(above_ground) == len(route):
-        points[:, 2] = _planned_altitudes(
+        points[:, 2] = _compute_planned_altitudes(
             waypoint_distances, route, above_ground, distance, points[:, 2], ground, scenario
         )
-    min_altitude, max_altitude = _altitude_limits(scenario, route, track, ground)
-    plane = PathPlane(distance / 1000.0, points, ground, min_altitude, max_altitude)
+    altitude_span = _choose_altitude_limits(scenario, route, track, ground)
+    plane = PathPlane(distance / 1000.0, points, ground, *altitude_span)
     failed = failures(verdict, len(route))
     stops = range(len(route)) if stops is None else stops
     stop_starts = stop_rows(stops)
     zones, zone_labels = zone_bands(scenario.zones, plane)
     cuts, cut_names = threat_cuts(scenario.threats, plane, frozenset(failed.threat_names()))
-    flown_layers, entered_positions = _flown_layers(scenario, route, track, failed, plane)
-    layers = [*zones, *cuts, *ground_bands(scenario, plane), *_failing_legs(waypoint_distances, route, failed)]
+    flown_layers, entered_positions = _make_flown_layers(scenario, route, track, failed, plane)
+    layers = [*zones, *cuts, *make_ground_bands(scenario, plane)]
+    layers += _mark_failing_legs(waypoint_distances, route, failed)
     layers += [] if is_straight_line else [Layer("line", "planned", "planned", plane.kilometres, points[:, 2])]
     layers += flown_layers
     labels: list[Label] = []
@@ -88,14 +89,12 @@ def profile_chart(
         role = "waypoint" if len(stop_starts) <= _MAX_DOTS else "waypoint-small"
         positions = waypoint_distances[stop_starts] / 1000.0, route[stop_starts, 2]
         layers.append(Layer("dots", "waypoint, numbered", role, *positions, quiet=True))
-        labels = _waypoint_labels(waypoint_distances, route, stops, failed)
-    layers += _failing_waypoints(waypoint_distances, route, failed)
+        labels = _make_waypoint_labels(waypoint_distances, route, stops, failed)
+    layers += _mark_failing_waypoints(waypoint_distances, route, failed)
     corners = np.column_stack([waypoint_distances / 1000.0, route[:, 2]])
-    labels = [*fail_labels(failed, corners, entered_positions), *labels, *cut_names, *zone_labels]
-    limits, note = _limit_lines(scenario, min_altitude, max_altitude)
-    panel = Panel(
-        "altitude", "m AMSL", tuple(layers), limits, span=(min_altitude, max_altitude), note=note, labels=tuple(labels)
-    )
+    labels = [*make_fail_labels(failed, corners, entered_positions), *labels, *cut_names, *zone_labels]
+    limits, note = _make_limit_lines(scenario, *altitude_span)
+    panel = Panel("altitude", "m AMSL", tuple(layers), limits, span=altitude_span, note=note, labels=tuple(labels))
     return _make_chart(scenario, waypoint_distances, stop_starts, panel, is_straight=is_straight_line)
 
 
@@ -118,7 +117,7 @@ def _make_chart(
         # The leg to a loiter includes the loiter.
         marks=tuple(
             (float(waypoint_distances[end]) / 1000.0, f"leg {n}")
-            for n, end in enumerate(_leg_start_waypoints(stop_starts, len(waypoint_distances)))
+            for n, end in enumerate(_find_leg_start_waypoints(stop_starts, len(waypoint_distances)))
         ),
         page_height=420,
         print_height=4.05,
@@ -127,12 +126,12 @@ def _make_chart(
     )
 
 
-def _leg_start_waypoints(stop_starts: list[int], count: int) -> list[int]:
+def _find_leg_start_waypoints(stop_starts: list[int], count: int) -> list[int]:
     """Return the waypoint at which each displayed leg begins, which is the end of the stop before it."""
     return [0, *(k - 1 for k in stop_starts[2:])] if count > 1 else []
 
 
-def _planned_altitudes(
+def _compute_planned_altitudes(
     waypoint_distances: Floats,
     route: Floats,
     height_above_ground: Floats,
@@ -165,7 +164,7 @@ def terrain_altitudes(scenario: Scenario, points: Floats) -> Floats | None:
     return heights if np.isfinite(heights).any() else None
 
 
-def _altitude_limits(
+def _choose_altitude_limits(
     scenario: Scenario, route: Floats, track: Track | None, ground: Floats | None
 ) -> tuple[float, float]:
     """Return the limits of the altitude axis, m AMSL, which contain ground, plan and flight.
@@ -188,7 +187,7 @@ def _altitude_limits(
     return min_altitude - 0.12 * span, max_altitude + 0.14 * span
 
 
-def ground_bands(scenario: Scenario, plane: PathPlane) -> list[Layer]:
+def make_ground_bands(scenario: Scenario, plane: PathPlane) -> list[Layer]:
     """Return layers of the ground, of the required clearance above it, and of the height limit.
 
     A limit that the scenario does not set has no layer.  Return [] without terrain.
@@ -211,7 +210,7 @@ def ground_bands(scenario: Scenario, plane: PathPlane) -> list[Layer]:
     return layers
 
 
-def _flown_layers(
+def _make_flown_layers(
     scenario: Scenario, route: Floats, track: Track | None, failed: Failures, plane: PathPlane
 ) -> tuple[list[Layer], dict[int, tuple[float, float]]]:
     """Return layers of flown altitudes and entered threats, and label positions of these threats.
@@ -221,7 +220,7 @@ def _flown_layers(
     if track is None:
         return entered_cuts(scenario.threats, failed, plane)
     progress, heights = track_distance(route, track) / 1000.0, track.position[:, 2]
-    rows = outline_rows(heights, _BLOCKS)
+    rows = find_outline_rows(heights, _BLOCKS)
     line = Layer("line", "flown", "flown", progress[rows], heights[rows])
     if not failed.threats:
         return [line], {}
@@ -229,7 +228,7 @@ def _flown_layers(
     layers, label_positions = entered_cuts(
         scenario.threats, failed, PathPlane(progress, track.position, ground, plane.min_altitude, plane.max_altitude)
     )
-    altitudes_inside = np.where(inside_threats(failed, scenario.threats, track), heights, np.nan)
+    altitudes_inside = np.where(find_rows_inside_threats(failed, scenario.threats, track), heights, np.nan)
     return [
         *layers,
         line,
@@ -237,7 +236,7 @@ def _flown_layers(
     ], label_positions
 
 
-def _failing_legs(waypoint_distances: Floats, route: Floats, failed: Failures) -> list[Layer]:
+def _mark_failing_legs(waypoint_distances: Floats, route: Floats, failed: Failures) -> list[Layer]:
     """Return layers that mark the legs that fail a rule."""
     return [
         Layer(
@@ -252,7 +251,7 @@ def _failing_legs(waypoint_distances: Floats, route: Floats, failed: Failures) -
     ]
 
 
-def _failing_waypoints(waypoint_distances: Floats, route: Floats, failed: Failures) -> list[Layer]:
+def _mark_failing_waypoints(waypoint_distances: Floats, route: Floats, failed: Failures) -> list[Layer]:
     """Return the layer that marks the waypoints that fail a rule, if any."""
     if not failed.waypoints:
         return []
@@ -264,7 +263,9 @@ def _failing_waypoints(waypoint_distances: Floats, route: Floats, failed: Failur
     ]
 
 
-def _waypoint_labels(waypoint_distances: Floats, route: Floats, stops: Sequence[int], failed: Failures) -> list[Label]:
+def _make_waypoint_labels(
+    waypoint_distances: Floats, route: Floats, stops: Sequence[int], failed: Failures
+) -> list[Label]:
     """Return the numbers of waypoints as labels: at most `_MAX_NUMBERS`, and all that fail a rule."""
     stop_starts = stop_rows(stops)
     step = max(1, -(-len(stop_starts) // _MAX_NUMBERS))
@@ -277,7 +278,7 @@ def _waypoint_labels(waypoint_distances: Floats, route: Floats, stops: Sequence[
     ]
 
 
-def _limit_lines(
+def _make_limit_lines(
     scenario: Scenario, min_altitude: float, max_altitude: float
 ) -> tuple[tuple[tuple[str, float], ...], str]:
     """Return ceiling and floor as horizontal lines, and a note if the ceiling is outside the picture."""

@@ -14,7 +14,7 @@ from logs.verdict.returns.return_starts import planned_positions
 from logs.verdict.returns.returns_text import outcome_text, segment_text
 from logs.views.charts import Chart, Label, Layer, Panel, join_with_gaps, series, shorten
 from logs.views.map import MapChart, NamedWind, end_labels, map_extent, scenario_map
-from logs.views.profile import ground_bands, terrain_altitudes
+from logs.views.profile import make_ground_bands, terrain_altitudes
 from logs.views.threats_and_zones import PathPlane, threat_cuts, zone_bands
 from world.arrays import Floats
 from world.scenario import Scenario
@@ -44,7 +44,7 @@ class PathPoint(NamedTuple, Generic[Element]):
     element: Element
 
 
-def judged_path(
+def split_judged_path(
     setup: FlightSetup,
     track: Track | None,
     elements: Sequence[Element],
@@ -66,7 +66,7 @@ def judged_path(
     times = np.array([time_of(element) for element in elements])
     # The first and the last element stand for the path beyond them, too, as far as the others do.
     margin = 0.5 * float(np.diff(times).max(initial=0.0))
-    path_times, positions = _path_positions(setup, track, float(times[0]) - margin, float(times[-1]) + margin)
+    path_times, positions = _sample_path(setup, track, float(times[0]) - margin, float(times[-1]) + margin)
     nearest = np.searchsorted(0.5 * (times[1:] + times[:-1]), path_times)
     points = [PathPoint(float(path_times[k]), positions[k], elements[nearest[k]]) for k in range(len(path_times))]
     return group_segments(points, lambda point: key_of(point.element))
@@ -104,12 +104,12 @@ def returns_map(setup: FlightSetup, drawn_returns: DrawnReturns, track: Track | 
     scenario, route = setup.scenario, setup.route.positions
     limit = drawn_returns.returns.limit
 
-    def return_text(ret: SimulatedReturn) -> str:
+    def describe_return(ret: SimulatedReturn) -> str:
         """Return the hover text of a return: start, target and outcome."""
         return f"{ret.time:.0f} s: to {ret.target.name}: {outcome_text(ret, limit)}"
 
-    segments = path_by_outcome(setup, drawn_returns, track)
-    layers = path_layers(segments, _LOOKS, east_and_north, lambda point: return_text(point.element))
+    segments = split_path_by_outcome(setup, drawn_returns, track)
+    layers = path_layers(segments, _LOOKS, east_and_north, lambda point: describe_return(point.element))
     for worst in drawn_returns.worst:
         name = "path of one of the worst returns, numbered"
         layers.append(
@@ -119,16 +119,16 @@ def returns_map(setup: FlightSetup, drawn_returns: DrawnReturns, track: Track | 
                 "return-way",
                 worst.path[:, 0],
                 worst.path[:, 1],
-                hover_texts=(return_text(worst.simulated),),
+                hover_texts=(describe_return(worst.simulated),),
             )
         )
     unsafe = [worst for worst in drawn_returns.worst if not worst.simulated.safe]
     if unsafe:
         positions = np.array([worst.marked_position for worst in unsafe])
-        texts = tuple(return_text(worst.simulated) for worst in unsafe)
+        texts = tuple(describe_return(worst.simulated) for worst in unsafe)
         layers.append(Layer("rings", "where it fails", "fail", positions[:, 0], positions[:, 1], hover_texts=texts))
     targets = {ret.target.name: ret.target.position for ret in drawn_returns.returns.each}
-    layers += _target_layers(targets)
+    layers += _make_target_layers(targets)
     labels = [
         Label(str(number), float(worst.marked_position[0]), float(worst.marked_position[1]), "number", "fail")
         for number, worst in enumerate(drawn_returns.worst, 1)
@@ -155,24 +155,26 @@ def east_and_north(point: PathPoint[Any]) -> tuple[float, float]:
     return float(point.position[0]), float(point.position[1])
 
 
-def path_by_outcome(
+def split_path_by_outcome(
     setup: FlightSetup, drawn_returns: DrawnReturns, track: Track | None
 ) -> list[tuple[Kind, list[PathPoint[SimulatedReturn]]]]:
     """Split the path into segments by the outcome of the nearest return."""
     flown_track = track if drawn_returns.returns.flown else None
-    return judged_path(setup, flown_track, drawn_returns.worst_by_start, lambda ret: ret.time, lambda ret: ret.kind)
+    return split_judged_path(
+        setup, flown_track, drawn_returns.worst_by_start, lambda ret: ret.time, lambda ret: ret.kind
+    )
 
 
-def path_by_reach(
+def split_path_by_reach(
     setup: FlightSetup, drawn_returns: DrawnReturns, track: Track | None
 ) -> list[tuple[Reach, list[PathPoint[Glide]]]]:
     """Split the path into segments by the best destination of the nearest glide."""
     flown_track = track if drawn_returns.returns.flown else None
     glides = drawn_returns.glides.each
-    return judged_path(setup, flown_track, glides, lambda glide: glide.time, lambda glide: glide.reach)
+    return split_judged_path(setup, flown_track, glides, lambda glide: glide.time, lambda glide: glide.reach)
 
 
-def _target_layers(targets: dict[str, tuple[float, float, float]]) -> list[Layer]:
+def _make_target_layers(targets: dict[str, tuple[float, float, float]]) -> list[Layer]:
     """Return the layer that marks the targets of returns, if any."""
     if not targets:
         return []
@@ -192,9 +194,11 @@ def worst_returns_chart(setup: FlightSetup, drawn_returns: DrawnReturns) -> Char
     if not drawn_returns.worst:
         return None
     scenario = setup.scenario
-    spans = [_altitude_span(scenario, worst) for worst in drawn_returns.worst]
+    spans = [_find_altitude_span(scenario, worst) for worst in drawn_returns.worst]
     span = (min(bottom for bottom, _ in spans), max(top for _, top in spans))
-    panels = tuple(_profile_panel(scenario, worst, number, span) for number, worst in enumerate(drawn_returns.worst, 1))
+    panels = tuple(
+        _make_profile_panel(scenario, worst, number, span) for number, worst in enumerate(drawn_returns.worst, 1)
+    )
     return Chart(
         f"{shorten(scenario.name, 60)}: the worst returns to launch",
         "distance since it turned back",
@@ -207,7 +211,7 @@ def worst_returns_chart(setup: FlightSetup, drawn_returns: DrawnReturns) -> Char
     )
 
 
-def _altitude_span(scenario: Scenario, worst: WorstReturn) -> tuple[float, float]:
+def _find_altitude_span(scenario: Scenario, worst: WorstReturn) -> tuple[float, float]:
     """Return the lowest and highest altitude of a return's path and the ground under it, with a margin, m."""
     ground = terrain_altitudes(scenario, worst.path)
     altitudes = np.concatenate([worst.path[:, 2], np.zeros(0) if ground is None else ground])
@@ -216,14 +220,14 @@ def _altitude_span(scenario: Scenario, worst: WorstReturn) -> tuple[float, float
     return min_altitude - margin, max_altitude + margin
 
 
-def _profile_panel(scenario: Scenario, worst: WorstReturn, number: int, span: tuple[float, float]) -> Panel:
+def _make_profile_panel(scenario: Scenario, worst: WorstReturn, number: int, span: tuple[float, float]) -> Panel:
     """Return the profile of one of the worst returns, with ground, zones and spheres."""
     path = worst.path
     along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path[:, :2], axis=0).T))]) / 1000.0
     plane = PathPlane(along, path, terrain_altitudes(scenario, path), *span)
     zones, zone_labels = zone_bands(scenario.zones, plane)
     cuts, cut_names = threat_cuts(scenario.threats, plane, frozenset())
-    layers = [*zones, *cuts, *ground_bands(scenario, plane)]
+    layers = [*zones, *cuts, *make_ground_bands(scenario, plane)]
     layers.append(Layer("line", "path of the return", "return-way", along, path[:, 2]))
     if not worst.simulated.safe:
         nearest_row = int(np.argmin(np.linalg.norm(path - worst.marked_position, axis=1)))
@@ -247,7 +251,7 @@ def return_heights_chart(setup: FlightSetup, drawn_returns: DrawnReturns, track:
     if not drawn_returns.returns.each:
         return None
     scenario, limit = setup.scenario, drawn_returns.returns.limit
-    segments = path_by_outcome(setup, drawn_returns, track)
+    segments = split_path_by_outcome(setup, drawn_returns, track)
     points = [point for _, segment in segments for point in segment]
     time = np.array([point.time for point in points])
     positions = np.array([point.position for point in points])
@@ -258,7 +262,7 @@ def return_heights_chart(setup: FlightSetup, drawn_returns: DrawnReturns, track:
     span = (min_altitude - margin, max_altitude + margin)
     name = f"lowest altitude for a safe return (no line: not safe even {safe_altitudes.search_range:.0f} m higher)"
     layers = [
-        *ground_bands(scenario, PathPlane(time, positions, ground, *span)),
+        *make_ground_bands(scenario, PathPlane(time, positions, ground, *span)),
         *path_layers(
             segments,
             _LOOKS,
@@ -269,7 +273,7 @@ def return_heights_chart(setup: FlightSetup, drawn_returns: DrawnReturns, track:
     ]
     panels = [Panel("altitude", "m AMSL", tuple(layers), span=span)]
     if drawn_returns.glides.each:
-        panels.append(_glide_margin_panel(drawn_returns.glides))
+        panels.append(_make_glide_margin_panel(drawn_returns.glides))
     return Chart(
         f"{shorten(scenario.name, 60)}: return to launch, or engine failure",
         "time since the start",
@@ -282,8 +286,8 @@ def return_heights_chart(setup: FlightSetup, drawn_returns: DrawnReturns, track:
     )
 
 
-def _path_positions(setup: FlightSetup, track: Track | None, first: float, last: float) -> tuple[Floats, Floats]:
-    """Return times, s, (t,), and positions, m, (t, 3), of the flown or planned path from one time to another.
+def _sample_path(setup: FlightSetup, track: Track | None, first: float, last: float) -> tuple[Floats, Floats]:
+    """Return times, s, (t,), and positions, m, (t, 3), of the flown or planned path between two times (s).
 
     track: the flown track, whose rows are thinned; None for the planned path.
     """
@@ -297,11 +301,11 @@ def _path_positions(setup: FlightSetup, track: Track | None, first: float, last:
     return track.time[rows], track.position[rows]
 
 
-def _glide_margin_panel(glides: Glides) -> Panel:
-    """Return a panel with the spare altitude of engine-out glides over time, by destination."""
+def _make_glide_margin_panel(glides: Glides) -> Panel:
+    """Make a panel with the altitude to spare of glides without engine over time, by destination."""
     time = np.array([glide.time for glide in glides.each])
 
-    def line(name: str, role: str, values: list[float]) -> Layer:
+    def make_line(name: str, role: str, values: list[float]) -> Layer:
         """Make a line over time, with gaps at values that are not finite."""
         column = np.array(values)
         return series(name, role, time, np.where(np.isfinite(column), column, np.nan))
@@ -314,8 +318,10 @@ def _glide_margin_panel(glides: Glides) -> Panel:
         if np.array_equal(site_margins, home_margins, equal_nan=True):
             home_name = "to spare for home, and for a rally point or landing place there"
         else:
-            layers.append(line(site_name, "left-site", site_margins))
-    layers.append(line(home_name, "left-home", home_margins))
-    layers.append(line("to spare for flat ground", "left-flat", [glide.flat_altitude_left for glide in glides.each]))
+            layers.append(make_line(site_name, "left-site", site_margins))
+    layers.append(make_line(home_name, "left-home", home_margins))
+    layers.append(
+        make_line("to spare for flat ground", "left-flat", [glide.flat_altitude_left for glide in glides.each])
+    )
     limits = (("nothing to spare", 0.0),)
     return Panel("altitude to spare without the engine", "m", tuple(layers), limits, min_span=_MIN_SPAN)

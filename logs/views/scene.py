@@ -81,7 +81,7 @@ def exaggeration(setup: FlightSetup, bounds: Floats, grid: GroundGrid | None) ->
     return max(factor for factor in (1.0, 1.5, 2.0, 3.0) if factor <= max(requested_factor, 1.0))
 
 
-def drawn_rows(track: Track, max_rows: int) -> NDArray[np.intp]:
+def select_drawn_rows(track: Track, max_rows: int) -> NDArray[np.intp]:
     """Return at most ``max_rows`` rows of the track with a known position, including the first and last."""
     finite_rows = np.flatnonzero(np.isfinite(track.position).all(axis=1))
     return finite_rows[
@@ -115,7 +115,7 @@ def scene_data(view: SceneView) -> dict[str, object]:
         "name": setup.scenario.name,
         "bounds": np.round(bounds, 1).tolist(),
         "stretch": exaggeration(setup, bounds, grid),
-        "ground": None if grid is None else _ground_data(grid),
+        "ground": None if grid is None else _encode_ground(grid),
         "threats": [
             {
                 "name": name,
@@ -125,14 +125,14 @@ def scene_data(view: SceneView) -> dict[str, object]:
             }
             for k, name in enumerate(threats.names)
         ],
-        **_zone_walls(setup),
+        **_make_zone_walls(setup),
         "plan": np.round(setup.display_waypoints, 1).tolist(),
         "numbers": [[k, stops[k]] for k in stop_rows(stops)],
         "failing": {"legs": list(failed.legs), "waypoints": list(failed.waypoints)},
     }
 
 
-def _zone_walls(setup: FlightSetup) -> dict[str, object]:
+def _make_zone_walls(setup: FlightSetup) -> dict[str, object]:
     """Return the zones as JSON data: name, kind, and rings with the lower and upper end of each corner.
 
     The result is empty without zones.
@@ -156,7 +156,7 @@ def _zone_walls(setup: FlightSetup) -> dict[str, object]:
     }
 
 
-def _ground_data(grid: GroundGrid) -> dict[str, object]:
+def _encode_ground(grid: GroundGrid) -> dict[str, object]:
     """Return the ground as JSON data, with altitudes as 16-bit fractions of their range in base64."""
     min_height, max_height = float(np.nanmin(grid.heights)), float(np.nanmax(grid.heights))
     fraction = (grid.heights - min_height) / max(max_height - min_height, 1e-6)

@@ -33,7 +33,7 @@ def survey_chart(setup: FlightSetup, track: Track) -> Chart | None:
         line_measures = [measure_line(requirements, aligned, survey, line) for line in survey.lines]
         rows = slice(int(aligned.rows[survey.first]), int(aligned.rows[survey.last]) + 1)
         name = "survey" if len(requirements.surveys) == 1 else f"survey {number}"
-        panels.append(_survey_panel(requirements, survey, line_measures, aligned.track.position[rows], name))
+        panels.append(_make_survey_panel(requirements, survey, line_measures, aligned.track.position[rows], name))
     return Chart(
         f"{setup.scenario.name}: photo lines",
         "along the first line",
@@ -45,7 +45,7 @@ def survey_chart(setup: FlightSetup, track: Track) -> Chart | None:
     )
 
 
-def _survey_panel(
+def _make_survey_panel(
     requirements: RouteRequirements,
     survey: Survey,
     line_measures: list[LineMeasure | None],
@@ -74,10 +74,10 @@ def _survey_panel(
         for parts, spans in (
             (lost_parts, lost_spans),
             (unknown_parts, unknown_spans),
-            (usable_parts, _usable_spans(measure)),
+            (usable_parts, _find_usable_spans(measure)),
         ):
             for span_start, span_end in spans:
-                parts.append(_line_part(corners, span_start, span_end))
+                parts.append(_cut_line(corners, span_start, span_end))
         if (number - 1) % step == 0:
             labels.append(Label(str(number), float(corners[0, 0]), float(corners[0, 1]), "number"))
     track_points = to_panel(position[:: max(1, len(position) // _POINTS)])
@@ -92,7 +92,7 @@ def _survey_panel(
     return Panel(f"{name}: to the left of its first line", "m", layers, labels=tuple(labels))
 
 
-def _usable_spans(measure: LineMeasure | None) -> list[tuple[float, float]]:
+def _find_usable_spans(measure: LineMeasure | None) -> list[tuple[float, float]]:
     """Return the start and end of each usable part of a photo line, m; [] for an unmeasured line."""
     if measure is None:
         return []
@@ -102,7 +102,7 @@ def _usable_spans(measure: LineMeasure | None) -> list[tuple[float, float]]:
     return [(start, end) for start, end in zip(starts, ends, strict=True) if end > start]
 
 
-def _line_part(corners: Floats, start: float, end: float) -> Floats:
+def _cut_line(corners: Floats, start: float, end: float) -> Floats:
     """Return the part of a line (n, 2) between two distances along it, m."""
     distances = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(corners, axis=0).T))])
     cut_distances = np.concatenate(

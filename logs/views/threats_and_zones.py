@@ -44,9 +44,9 @@ def threat_circles(threats: Threats, route: Floats | None, failing_threats: froz
         kill_radius = float(threats.kill_radius[k])
         detection_radius = float(threats.detection_radius[k])
         center = threats.position[k, :2]
-        texts = (_threat_text(name, kill_radius, detection_radius),)
+        texts = (_describe_threat(name, kill_radius, detection_radius),)
         if detection_radius > 0.0:
-            x, y = circle_points(center, detection_radius)
+            x, y = make_circle_points(center, detection_radius)
             radars.append(
                 Layer(
                     "line",
@@ -55,14 +55,14 @@ def threat_circles(threats: Threats, route: Floats | None, failing_threats: froz
                     x,
                     y,
                     quiet=True,
-                    legend="radar: circle of its sphere (at altitude it reaches less far)",
+                    legend="radar: circle of its sphere (its reach is smaller at altitude)",
                 )
             )
         if radius_at_path[k] > 0.0:
-            x, y = circle_points(center, float(radius_at_path[k]))
+            x, y = make_circle_points(center, float(radius_at_path[k]))
             sections.append(Layer("area", name, "missile-reach", x, y, legend=section_name, hover_texts=texts))
         if kill_radius > 0.0:
-            x, y = circle_points(center, kill_radius)
+            x, y = make_circle_points(center, kill_radius)
             is_entered = k in failing_threats
             legend = "threat that is entered" if is_entered else "missile: circle of its sphere"
             missiles.append(Layer("line", name, "fail" if is_entered else "missile", x, y, quiet=True, legend=legend))
@@ -70,7 +70,7 @@ def threat_circles(threats: Threats, route: Floats | None, failing_threats: froz
     return (*radars, *sections, *missiles, *units)
 
 
-def _threat_text(name: str, kill_radius: float, detection_radius: float) -> str:
+def _describe_threat(name: str, kill_radius: float, detection_radius: float) -> str:
     """Return the hover text of a threat: its name and the radii of its spheres."""
     return "\n".join(
         [
@@ -81,7 +81,7 @@ def _threat_text(name: str, kill_radius: float, detection_radius: float) -> str:
     )
 
 
-def circle_points(center: Floats, radius: float) -> tuple[Floats, Floats]:
+def make_circle_points(center: Floats, radius: float) -> tuple[Floats, Floats]:
     """Return the east and north coordinates of the points of a closed circle, (73,) each."""
     return center[0] + radius * np.cos(_CIRCLE_ANGLES_RAD), center[1] + radius * np.sin(_CIRCLE_ANGLES_RAD)
 
@@ -115,7 +115,7 @@ def kill_radius_at_path(threats: Threats, indices: NDArray[np.intp], route: Floa
     return section_radii
 
 
-def sphere_cuts(center: Floats, radius: float, points: Floats) -> tuple[Floats, Floats]:
+def cut_sphere(center: Floats, radius: float, points: Floats) -> tuple[Floats, Floats]:
     """Return the altitude of the lower and upper surface of a sphere at each point, m AMSL, (s,) each.
 
     Both are NaN at points outside the sphere's circle.
@@ -166,7 +166,9 @@ def outline_label_position(
 class PathPlane:
     """Vertical plane through a path, for its profile.
 
-    kilometres: (s,) along the path.  points: (s, 3) m.  ground: (s,) m AMSL under the points, or None if unknown.
+    kilometres: distance of each sample along the path, km, (s,).
+    points: positions of the samples, m, (s, 3).
+    ground: ground altitude under the samples, m AMSL, (s,); None if unknown.
     min_altitude, max_altitude: altitude range of the profile, m AMSL.
     """
 
@@ -185,10 +187,11 @@ class PathPlane:
 def threat_cuts(
     threats: Threats, plane: PathPlane, labelled_elsewhere: frozenset[int]
 ) -> tuple[list[Layer], list[Label]]:
-    """Return layers of the missile and radar spheres cut by the plane, and labels of the units.
+    """Return layers of the sections of missile and radar spheres with a vertical plane, and their labels.
 
     Radars come first.
 
+    plane: vertical plane along the path.
     labelled_elsewhere: indices of threats with their own labels.
     """
     layers: list[Layer] = []
@@ -200,7 +203,7 @@ def threat_cuts(
     )
     for kind, radii in (("radar", threats.detection_radius), ("missile", threats.kill_radius)):
         for k in np.flatnonzero((radii > 0.0) & (distances <= radii)):
-            lower, upper = sphere_cuts(threats.position[k], float(radii[k]), plane.points)
+            lower, upper = cut_sphere(threats.position[k], float(radii[k]), plane.points)
             samples_inside = np.flatnonzero(np.isfinite(upper))
             if not samples_inside.size:
                 continue
@@ -221,11 +224,14 @@ def threat_cuts(
 def entered_cuts(
     threats: Threats, failed: Failures, plane: PathPlane
 ) -> tuple[list[Layer], dict[int, tuple[float, float]]]:
-    """Return layers of the entered spheres cut by the plane, and label positions by index of the threat."""
+    """Return layers of the sections of entered spheres with a vertical plane, and label positions.
+
+    The label positions (km, m AMSL) are keyed by the index of the threat.
+    """
     layers, label_positions = [], {}
     for place in failed.threats:
         k = place.index or 0
-        lower, upper = sphere_cuts(threats.position[k], threat_radius(threats, place), plane.points)
+        lower, upper = cut_sphere(threats.position[k], threat_radius(threats, place), plane.points)
         if not np.isfinite(upper).any():
             continue
         legend = "threat that is entered"
@@ -251,14 +257,14 @@ def zone_text(zone: Zone) -> str:
     name = shorten(zone.name, 24)
     if zone.floor is not None and zone.ceiling is not None:
         if zone.floor.datum == zone.ceiling.datum:
-            return f"{name}, {zone.floor.height:g} to {_level_text(zone.ceiling)}"
-        return f"{name}, {_level_text(zone.floor)} to {_level_text(zone.ceiling)}"
+            return f"{name}, {zone.floor.height:g} to {_format_level(zone.ceiling)}"
+        return f"{name}, {_format_level(zone.floor)} to {_format_level(zone.ceiling)}"
     if zone.floor is not None:
-        return f"{name}, above {_level_text(zone.floor)}"
-    return name if zone.ceiling is None else f"{name}, below {_level_text(zone.ceiling)}"
+        return f"{name}, above {_format_level(zone.floor)}"
+    return name if zone.ceiling is None else f"{name}, below {_format_level(zone.ceiling)}"
 
 
-def _level_text(level: ZoneLevel) -> str:
+def _format_level(level: ZoneLevel) -> str:
     """Return an altitude limit of a zone as text, with its datum."""
     return f"{level.height:g} m {'AMSL' if level.datum == 'amsl' else 'above ground'}"
 
@@ -311,9 +317,10 @@ class ZoneCut:
 
 
 def zone_cuts(zones: tuple[Zone, ...], plane: PathPlane) -> list[ZoneCut]:
-    """Return the parts of the plane that zones forbid; zones away from the path are left out.
+    """Return the parts of a vertical plane along a path that zones forbid.
 
-    An inclusion zone forbids the altitudes below its floor and above its ceiling, and everything outside it.
+    An inclusion zone forbids the altitudes below its floor and above its ceiling, and everything outside it.  Zones
+    away from the path are left out.
     """
     min_altitude, max_altitude, points = plane.min_altitude, plane.max_altitude, plane.points
     terrain = np.full(len(points), min_altitude)

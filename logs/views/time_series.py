@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from aircraft.envelope import GRAVITY
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track, control_limits, saturated_rows
-from logs.views.charts import Chart, Panel, filled_series, leg_marks, saturation_band, series, shorten
+from logs.views.charts import Chart, Panel, filled_series, make_leg_marks, make_saturation_band, series, shorten
 from world.arrays import Floats
 from world.geometry import segment_exposure
 from world.kernels import compiled
@@ -26,7 +26,7 @@ def to_float64(values: NDArray[np.float32]) -> Floats:
 def chart_over_time(setup: FlightSetup, subject: str, panels: list[Panel], track: Track) -> Chart:
     """Return a chart over time since the start, with a mark at the start of each leg."""
     title = f"{shorten(setup.scenario.name, 60)}: {subject}"
-    marks = leg_marks(setup.route.leg_numbers_of(track.leg), track.time)
+    marks = make_leg_marks(setup.route.leg_numbers_of(track.leg), track.time)
     return Chart(title, "time since the start", "s", tuple(panels), marks=marks, timed=True)
 
 
@@ -46,18 +46,18 @@ def time_chart(setup: FlightSetup, track: Track) -> Chart:
     )
     turn_limits = (("limit of planned turns; corrections may bank beyond it", bank_limit), ("", -bank_limit))
 
-    def single_line_panel(title: str, unit: str, values: Floats, min_span: float, name: str = "flown") -> Panel:
+    def make_single_line_panel(title: str, unit: str, values: Floats, min_span: float, name: str = "flown") -> Panel:
         """Make a panel with one line."""
         return Panel(title, unit, (series(name, "flown", time, values),), min_span=min_span)
 
     panels = [
         Panel("airspeed", "m/s", airspeed, min_span=4.0),
-        replace(single_line_panel("bank, right +", "°", np.degrees(to_float64(roll)), 1.0), limits=turn_limits),
-        single_line_panel("climb rate", "m/s", to_float64(climb), 1.0),
-        single_line_panel("load factor", "g", to_float64(track.load_factor), 0.2),
-        single_line_panel("wind, with gusts", "m/s", np.hypot(east, north), 1.0),
-        single_line_panel("cross-track, right +", "m", to_float64(track.cross_track), 0.1, _GUIDANCE_SERIES),
-        single_line_panel("height error, high +", "m", to_float64(track.height_error), 0.1, _GUIDANCE_SERIES),
+        replace(make_single_line_panel("bank, right +", "°", np.degrees(to_float64(roll)), 1.0), limits=turn_limits),
+        make_single_line_panel("climb rate", "m/s", to_float64(climb), 1.0),
+        make_single_line_panel("load factor", "g", to_float64(track.load_factor), 0.2),
+        make_single_line_panel("wind, with gusts", "m/s", np.hypot(east, north), 1.0),
+        make_single_line_panel("cross-track, right +", "m", to_float64(track.cross_track), 0.1, _GUIDANCE_SERIES),
+        make_single_line_panel("height error, high +", "m", to_float64(track.height_error), 0.1, _GUIDANCE_SERIES),
     ]
     terrain = setup.scenario.terrain
     if terrain is not None:
@@ -65,7 +65,7 @@ def time_chart(setup: FlightSetup, track: Track) -> Chart:
         clearance_limit = (("required", setup.scenario.limits.min_clearance_m),)
         panels.append(
             replace(
-                single_line_panel("height above ground", "m", height_above_ground, 1.0, "from track and terrain"),
+                make_single_line_panel("height above ground", "m", height_above_ground, 1.0, "from track and terrain"),
                 limits=clearance_limit,
             )
         )
@@ -94,7 +94,7 @@ def control_chart(setup: FlightSetup, track: Track) -> Chart:
         )
         is_saturated = saturated_rows(track, k, min_value, max_value)
         if is_saturated.any():
-            panel = replace(panel, layers=(saturation_band(is_saturated, track.time, panel.shown_span()), *layers))
+            panel = replace(panel, layers=(make_saturation_band(is_saturated, track.time, panel.shown_span()), *layers))
         panels.append(panel)
     return chart_over_time(setup, "controls and their limits", panels, track)
 
@@ -138,7 +138,7 @@ def energy_chart(setup: FlightSetup, track: Track) -> Chart:
 _MAX_SEGMENTS = 12_000
 
 
-def exposure_rates(position: Floats, centres: Floats, radii: Floats, scales: Floats) -> Floats:
+def compute_exposure_rates(position: Floats, centres: Floats, radii: Floats, scales: Floats) -> Floats:
     """Return the exposure rate on each segment of a track, (t - 1,), summed over spheres.
 
     The rate is the segment's mean of (scale/d)^4 within a sphere (paper eq. 9, 10): 1 at a distance of one scale.  It
@@ -155,7 +155,7 @@ def exposure_rates(position: Floats, centres: Floats, radii: Floats, scales: Flo
 
 @compiled
 def _sum_exposure_rates(position: Floats, centres: Floats, radii: Floats, scales: Floats) -> Floats:
-    """Return the exposure rate on each segment, summed over spheres, as `exposure_rates` does."""
+    """Return the exposure rate on each segment, summed over spheres, as `compute_exposure_rates` does."""
     count = position.shape[0] - 1
     rates = np.zeros(max(0, count))
     for k in range(count):
@@ -188,7 +188,7 @@ def exposure_chart(setup: FlightSetup, track: Track) -> Chart | None:
     ):
         if not (radii > 0.0).any():
             continue
-        rate = exposure_rates(position, threats.position, radii, scales)
+        rate = compute_exposure_rates(position, threats.position, radii, scales)
         if not np.nansum(rate):
             continue
         exposure = np.concatenate([[0.0], np.cumsum(np.nan_to_num(rate) * np.diff(time))])
@@ -198,5 +198,5 @@ def exposure_chart(setup: FlightSetup, track: Track) -> Chart | None:
     if not panels:
         return None
     title = f"{shorten(setup.scenario.name, 60)}: exposure along the flown track"
-    marks = leg_marks(setup.route.leg_numbers_of(track.leg[rows]), kilometres)
+    marks = make_leg_marks(setup.route.leg_numbers_of(track.leg[rows]), kilometres)
     return Chart(title, "distance flown over the ground", "km", tuple(panels), marks=marks)

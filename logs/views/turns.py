@@ -36,7 +36,7 @@ class PlaceValue:
     ok: bool | None
 
 
-def place_values(findings: Sequence[Finding], rule: str) -> list[PlaceValue]:
+def list_place_values(findings: Sequence[Finding], rule: str) -> list[PlaceValue]:
     """Sort the findings of a rule by the number of their waypoint or leg; other findings are left out."""
     place_rows = []
     for finding in findings:
@@ -62,15 +62,15 @@ def turn_chart(name: str, verdict: Verdict) -> Chart:
     ()
     """
     panels = tuple(
-        _rule_panel(rule, title, unit, place, values)
+        _make_rule_panel(rule, title, unit, place, values)
         for rule, place, title, unit in PLACE_PANELS
-        if (values := place_values(verdict.findings, rule))
+        if (values := list_place_values(verdict.findings, rule))
     )
     title = f"{shorten(name, 60)}: turn by turn, leg by leg"
     return Chart(title, "", "", panels, shared=False, page_height=170, print_height=1.55, legend="below")
 
 
-def _rule_panel(rule: str, title: str, unit: str, place: str, values: list[PlaceValue]) -> Panel:
+def _make_rule_panel(rule: str, title: str, unit: str, place: str, values: list[PlaceValue]) -> Panel:
     """Return the panel of a rule with planned and flown values, limits, and marked failures."""
     numbers = np.array([value.number for value in values], dtype=np.float64)
     planned_values, flown_values, limit_values = (
@@ -88,13 +88,13 @@ def _rule_panel(rule: str, title: str, unit: str, place: str, values: list[Place
     known_values = np.concatenate([[0.0], planned_values, flown_values])
     known_values = known_values[np.isfinite(known_values)]
     limits = limit_values[np.isfinite(limit_values)]
-    shown_limits = limits[_visible_limits(limits, rule, float(np.abs(known_values).max()))]
+    shown_limits = limits[_find_visible_limits(limits, rule, float(np.abs(known_values).max()))]
     min_value = float(min([*known_values, *shown_limits]))
     max_value = float(max([*known_values, *shown_limits]))
     margin = _MARGIN * ((max_value - min_value) or 1.0)
     note = ""
     if len(shown_limits) < len(limits):
-        hidden_limits = limits[~_visible_limits(limits, rule, float(np.abs(known_values).max()))]
+        hidden_limits = limits[~_find_visible_limits(limits, rule, float(np.abs(known_values).max()))]
         note = (
             f"{'other ' if shown_limits.size else ''}limits from {hidden_limits.min():.0f}"
             f"{unit if unit == '°' else ' ' + unit}"
@@ -103,10 +103,11 @@ def _rule_panel(rule: str, title: str, unit: str, place: str, values: list[Place
     return Panel(title, unit, tuple(layers), span=(bottom, max_value + margin), along=place, note=note)
 
 
-def _visible_limits(limits: Floats, rule: str, max_value: float) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+def _find_visible_limits(limits: Floats, rule: str, max_value: float) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
     """Return a mask (n,), True for limits to show.
 
-    A limit of a turn or corridor far above `max_value` would flatten the other values, and is hidden.
+    A limit of a turn or corridor far above the largest value `max_value` is hidden, because it would flatten the
+    values.
     """
     max_limit = _MAX_LIMIT_RATIO * max(max_value, 1e-9) if rule in ("turn", "corridor") else math.inf
     return np.asarray(limits <= max_limit, dtype=np.bool_)

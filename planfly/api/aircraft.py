@@ -100,12 +100,12 @@ def new_aircraft(
 ) -> Aircraft:
     """Make the folder of a new aircraft.
 
-    overwrite: True replaces the aircraft's files in an existing folder; other files in it are kept.
-    Without options the folder gets copies of another aircraft's files: source is that aircraft, a name or a folder (the
-    Aerosonde if not given).  With options the folder gets a model that matches them, scaled from published aircraft of
-    its class, and a list of unknown properties; mass, span, cruise and stall are required, the others are estimated if
-    missing.
+    Without options the folder becomes a copy of another aircraft's folder.  With options it gets a model that matches
+    the stated numbers, scaled from published aircraft of the same class, and a list of unknown properties.  Then mass,
+    span, cruise and stall are required, and other missing numbers are estimated.
 
+    source: aircraft to copy, a name or a folder; None copies the Aerosonde.  It cannot be combined with options.
+    overwrite: True replaces the aircraft's files in an existing folder; other files in it are kept.
     mass: kg.
     span: wing span, m.
     area: wing area, m^2.
@@ -174,8 +174,12 @@ def describe_aircraft(
     aircraft_entry = _load_aircraft(name)
     model_sha256 = model_hash(aircraft_entry)
     # This also refuses invalid settings files.
-    kinds = (*autopilot_classes().values(), *program_classes())
-    missing_files = tuple(missing_file for kind in kinds for missing_file in kind.missing_files(aircraft_entry))
+    autopilot_kinds = (*autopilot_classes().values(), *program_classes())
+    missing_files = tuple(
+        missing_file
+        for autopilot_kind in autopilot_kinds
+        for missing_file in autopilot_kind.missing_files(aircraft_entry)
+    )
     folder = None if out is None else expand_path_pattern(out, aircraft_entry.name, 0)
     if folder is not None:
         check_output_folder(folder, overwrite)

@@ -34,22 +34,22 @@ def ground_risk(
     overwrite: bool = True,
     **options: Unpack[SampleOptions],
 ) -> GroundRiskResult:
-    """Find a mission's volumes and its intrinsic ground risk class by SORA 2.5, from many flights and by formulas.
+    """Find a mission's volumes and intrinsic ground risk class by SORA 2.5, by flights and formulas.
 
     The flights vary as in `planfly.campaign`.  From each flight, returns to launch and falls to the ground are
     simulated.
 
     target: a built-in scenario's name, a scenario's TOML file, a `Scenario`, a `Plan`, or a plan.json, .waypoints or
     .plan file.
-    population: a GeoTIFF of the population, such as GHS-POP or WorldPop; None leaves the class open.
-    population_unit: unit of its numbers, people "per-cell" or "per-km2".
+    population: a GeoTIFF of the population, such as GHS-POP or WorldPop; without it the class is undecided.
+    population_unit: unit of the population's numbers, people "per-cell" or "per-km2".
     controlled: True for a controlled ground area, where only involved people are.
     max_speed: highest speed of the aircraft, m/s; None for the highest airspeed of its model.
-    probability: fraction of the flights that the flight geography holds.
+    probability: fraction of the flights that the flight geography contains.
     glide: True to include glides after an engine failure in the ground risk buffer.
-    every: time between two returns, s.
-    out: folder for ``ground-risk.kml``, ``.geojson``, ``.png`` and ``.md``, and ``report.html``; None writes none.
-    overwrite: True replaces them.
+    every: time between the starts of two returns, s.
+    out: folder for ``ground-risk.kml``, ``.geojson``, ``.png`` and ``.md``, and ``report.html``; None writes no files.
+    overwrite: True replaces existing files.
     flights: number of flights.  spread, seed, workers, scheduler: see `planfly.campaign`.  For the other options, see
     `planfly.fly`.
     A script must call this function under ``if __name__ == "__main__":``, because workers import the script.
@@ -78,12 +78,12 @@ def ground_risk(
     )
     with stage("flying", "flying for the ground risk") as advance:
         result = find_ground_risk(base, goal, workers_used, advance)
-    command = answer_command_line("ground-risk", target, base, options, _goal_options(goal))
-    return result if out is None else _with_files(result, Path(out), command, overwrite=overwrite)
+    command = answer_command_line("ground-risk", target, base, options, _list_goal_options(goal))
+    return result if out is None else _write_files(result, Path(out), command, overwrite=overwrite)
 
 
-def _goal_options(goal: GroundRiskGoal) -> dict[str, object]:
-    """Return the command-line options that state the goal, by name."""
+def _list_goal_options(goal: GroundRiskGoal) -> dict[str, object]:
+    """Return the command-line options that reproduce a goal: value of each option, by name."""
     return {
         "population": goal.population,
         "population_unit": None if goal.population is None else goal.unit,
@@ -95,7 +95,7 @@ def _goal_options(goal: GroundRiskGoal) -> dict[str, object]:
     }
 
 
-def _with_files(result: GroundRiskResult, folder: Path, command: str, *, overwrite: bool) -> GroundRiskResult:
+def _write_files(result: GroundRiskResult, folder: Path, command: str, *, overwrite: bool) -> GroundRiskResult:
     """Write volumes, map, table and page of a result into a folder, and return the result with the files.
 
     command: command line that repeats the search; "" if there is none.

@@ -106,18 +106,18 @@ def _open_base(
     return base
 
 
-def _command_line_target(target: Plan | Scenario | str | Path, folder: Path) -> str:
-    """Return the target as written in the command line that repeats a campaign.
+def _name_command_line_target(target: Plan | Scenario | str | Path, folder: Path) -> str:
+    """Return the target of a campaign as text for the command line that repeats the campaign.
 
-    A `Plan` is named by its file in `folder`, and a `Scenario` by a file that is written there.
+    The text of a `Plan` is the path of its file in `folder`.  A `Scenario` is written to a file there.
     """
     if isinstance(target, Plan):
         return str(folder / "plan.json")
-    return _scenario_file(target, folder) if isinstance(target, Scenario) else str(target)
+    return _write_scenario_file(target, folder) if isinstance(target, Scenario) else str(target)
 
 
-def _scenario_file(scenario: Scenario, folder: Path) -> str:
-    """Write a scenario into the folder of a campaign, for the command line that repeats it; return the file's path.
+def _write_scenario_file(scenario: Scenario, folder: Path) -> str:
+    """Write a scenario into a campaign's folder, for the command line that repeats it; return the path.
 
     For a scenario made around a mission, nothing is written, and its name is returned.
     """
@@ -127,7 +127,7 @@ def _scenario_file(scenario: Scenario, folder: Path) -> str:
     return str(folder / SCENARIO_FILE)
 
 
-def _command_line_options(
+def _list_command_line_options(
     base: CampaignBase, options: MissionOptions, spread: str | Path | None, folder: Path
 ) -> dict[str, object]:
     """Return the options of the command line that repeats a campaign, by name.
@@ -137,7 +137,9 @@ def _command_line_options(
     named_scenario = options.get("scenario")
     return {"seed": base.seed, "spread": spread} | {
         **select_mission_options(options),
-        "scenario": _scenario_file(named_scenario, folder) if isinstance(named_scenario, Scenario) else named_scenario,
+        "scenario": _write_scenario_file(named_scenario, folder)
+        if isinstance(named_scenario, Scenario)
+        else named_scenario,
         "fence": fence_file_names(options),
     }
 
@@ -147,13 +149,14 @@ def answer_command_line(
     target: Plan | Scenario | str | Path,
     base: CampaignBase,
     options: SampleOptions | WindowOptions,
-    question: Mapping[str, object],
+    search_options: Mapping[str, object],
 ) -> str:
-    """Return the command line that repeats a window, a battery or a ground risk.
+    """Return the command line that repeats a search for a window, a battery or a ground risk class.
 
     Returns "" if target or scenario is a Python object, because a command line cannot name it.
 
-    question: options of the command itself, by name.
+    command: name of the command, such as "battery".
+    search_options: options of this command only, by name.
     """
     if not isinstance(target, str | Path) or isinstance(options.get("scenario"), Scenario):
         return ""
@@ -161,7 +164,7 @@ def answer_command_line(
     return command_line(
         command,
         str(target),
-        {**question, "flights": options.get("flights"), "spread": options.get("spread"), **mission},
+        {**search_options, "flights": options.get("flights"), "spread": options.get("spread"), **mission},
     )
 
 
@@ -192,9 +195,11 @@ def _read_spread(file: str | Path | None) -> Dispersions:
 def continued_goal(
     folder: Path, flights: int | None, prove: float | None, at_least: float | None, confidence: float | None
 ) -> Goal:
-    """Return the goal of a resumed campaign.
+    """Return the goal of a resumed campaign; an argument that is None keeps its earlier value.
 
-    None keeps the earlier target, number of flights, or confidence level.
+    flights: number of flights.
+    prove, at_least: target probability, see `campaign`.
+    confidence: confidence level.
     Raises PlanflyError for numbers outside their ranges, and for a folder without a campaign.
     """
     requested_goal = make_goal(flights, prove, at_least, confidence)
@@ -211,17 +216,17 @@ def _report_flight_count(goal: Goal, folder: Path) -> None:
     """Report the number of flights of a campaign that is resumed without one, and the number's source."""
     stored_count = read_stored_settings(folder / CAMPAIGN_DATABASE).get("flights")
     origin = "the number of the resumed campaign" if goal.flights == stored_count else "the default"
-    report_line(f"flies {'at most ' if goal.stops else ''}{count_text(goal.flights, 'flight')}, {origin}")
+    report_line(f"number of flights: {'at most ' if goal.stops else ''}{goal.flights:,}, {origin}")
 
 
 def _warn_of_too_few_flights(goal: Goal) -> None:
-    """Report a target that the flights of a campaign cannot reach, even if all are flyable."""
+    """Report a target probability that a campaign's flights cannot show, even if all of them are flyable."""
     estimator, best = Estimator(goal), Tally(goal.flights, 0)
     if estimator.estimate(best).answer == "undecided":
         needed_text = count_text(estimator.deciding_flights(best) or MAX_DECIDING_FLIGHTS, "flight")
         report_line(
-            f"warning: {count_text(goal.flights, 'flight')} cannot show P >= {goal.target}, even if all are flyable:"
-            f" {needed_text} without a failure are needed"
+            f"warning: {count_text(goal.flights, 'flight')} cannot show P >= {goal.target}, even if all are flyable;"
+            f" that needs {needed_text} without a failure"
         )
 
 
@@ -271,9 +276,9 @@ def campaign(
         _warn_of_too_few_flights(goal)
         base = _open_base(target, options, _read_spread(spread), directory)
         repeated = campaign_command_line(
-            _command_line_target(target, directory.folder),
+            _name_command_line_target(target, directory.folder),
             goal,
-            _command_line_options(base, options, spread, directory.folder),
+            _list_command_line_options(base, options, spread, directory.folder),
         )
         return _fly_and_summarise(base, goal, workers_used, directory, repeated, keep=out is not None)
 
@@ -317,13 +322,13 @@ def campaign_flight(
     goal = continued_goal(folder, options["flights"], options["prove"], options["at_least"], options["confidence"])
     directory = OutputDirectory(folder, CAMPAIGN_DATABASE, resume=True, overwrite=False)
     base = _open_base(target, options, _read_spread(options["spread"]), directory)
-    row = _flight_row(base, goal, folder, index)
+    row = _read_flight_row(base, goal, folder, index)
     log = folder / "flights" / f"flight-{index:06d}.mcap"
     log.parent.mkdir(exist_ok=True)
     return CampaignFlight(fly_row_again(base, row, log), log)
 
 
-def _flight_row(base: CampaignBase, goal: Goal, folder: Path, index: int) -> FlightRow:
+def _read_flight_row(base: CampaignBase, goal: Goal, folder: Path, index: int) -> FlightRow:
     """Read a flight from a campaign's table.
 
     Raises PlanflyError if the table has no flight with this index.
@@ -339,7 +344,7 @@ def _flight_row(base: CampaignBase, goal: Goal, folder: Path, index: int) -> Fli
 @requires_extra("campaigns")
 @checks_types
 def compare_campaigns(first: str | Path, second: str | Path) -> CampaignComparison:
-    """Compare two campaigns: the probability of each, their difference, rules that fail more often, and options.
+    """Compare two campaigns: their probabilities, the difference, rules that fail more often, options.
 
     If the flights of both have the same draws (the same seed, dispersions and numbers of flights), they are compared in
     pairs.
@@ -381,14 +386,14 @@ def winds(
 ) -> WindsResult:
     """Find the strongest wind from each direction in which a mission is flyable with a given probability.
 
-    Of the result, ``boundaries`` states the wind of each direction, ``judged`` whether enough flights decide it,
-    ``reasons`` why not, and ``answer`` the answer of the whole search.
+    In the result, ``boundaries`` has the strongest wind of each direction, ``judged`` is True if enough flights decide
+    it, ``reasons`` states why it is undecided, and ``answer`` is the answer of the whole search.
 
     target: a built-in scenario's name, a scenario's TOML file, a `Scenario`, a `Plan`, or a plan.json, .waypoints or
     .plan file.
-    prove: the probability.
-    directions: number of directions, 4 to 72.
-    most: maximum wind to search, m/s.
+    prove: required probability of a flyable flight.
+    directions: number of wind directions, 4 to 72.
+    most: strongest wind that is searched, m/s.
     flights: maximum number of flights for all directions together; None takes 5,000, or the earlier number of a resumed
     search.
     confidence: confidence level of each interval.
@@ -420,7 +425,9 @@ def winds(
             winds_found = find_winds(base, goal, workers_used, store, advance)
         if out is not None:
             repeated = winds_command_line(
-                _command_line_target(target, folder), goal, _command_line_options(base, options, spread, folder)
+                _name_command_line_target(target, folder),
+                goal,
+                _list_command_line_options(base, options, spread, folder),
             )
             write_winds(folder, base, winds_found, repeated)
     return winds_found
@@ -431,7 +438,7 @@ def winds(
 
 
 def open_sample(target: Plan | Scenario | str | Path, options: SampleOptions) -> CampaignBase:
-    """Open the mission of dispersed flights that are not stored; plan a path for a scenario.
+    """Open the mission of a search whose flights are not stored; for a scenario, plan a path first.
 
     Raises PlanflyError for bad input.
     """
@@ -456,19 +463,19 @@ def battery(
     overwrite: bool = True,
     **options: Unpack[BatteryOptions],
 ) -> BatteryResult:
-    """Find the smallest battery with which a mission and every return keep the reserve with a given probability.
+    """Find the smallest battery with which mission and returns keep the reserve with a probability.
 
     The flights vary as in `planfly.campaign`.  From each flight, returns to launch are simulated as in
     `planfly.returns`.
 
     target: a built-in scenario's name, a scenario's TOML file, a `Scenario`, a `Plan`, or a plan.json, .waypoints or
     .plan file.
-    probability: the probability.
-    reserve: fraction of the battery that is to be left.
+    probability: required probability that the reserve is kept.
+    reserve: fraction of the battery that must remain.
     specific_energy: energy per battery mass, Wh/kg, with which the aircraft's mass changes with the battery; None
     keeps the mass.
-    every: time between two returns, s.
-    out: folder for ``battery.png`` and ``report.html``; None writes none.  overwrite: True replaces them.
+    every: time between the starts of two returns, s.
+    out: folder for ``battery.png`` and ``report.html``; None writes no files.  overwrite: True replaces existing files.
     flights: number of flights.  confidence: confidence of the capacity's interval.
     spread, seed, workers, scheduler: see `planfly.campaign`.  For the other options, see `planfly.fly`.
     A script must call this function under ``if __name__ == "__main__":``, because workers import the script.
@@ -496,18 +503,18 @@ def battery(
         result = find_battery(base, goal, workers_used, advance)
     if out is None:
         return result
-    question = {
+    search_options = {
         "probability": probability,
         "reserve": reserve,
         "specific_energy": specific_energy,
         "every": every,
         "confidence": options["confidence"],
     }
-    command = answer_command_line("battery", target, base, options, question)
-    return _with_battery_files(result, Path(out), command, overwrite=overwrite)
+    command = answer_command_line("battery", target, base, options, search_options)
+    return _write_battery_files(result, Path(out), command, overwrite=overwrite)
 
 
-def _with_battery_files(result: BatteryResult, folder: Path, command: str, *, overwrite: bool) -> BatteryResult:
+def _write_battery_files(result: BatteryResult, folder: Path, command: str, *, overwrite: bool) -> BatteryResult:
     """Write chart and page of a result into a folder, and return the result with the files.
 
     command: command line that repeats the search; "" if there is none.

@@ -59,7 +59,7 @@ def terrain(
     if target.suffix.lower() not in (".tif", ".tiff"):
         raise PlanflyError(f"{target}: expected a name that ends with .tif", file=target)
     check_output_file(target, overwrite, Path(around) if around is not None else None)
-    area = _add_margin_to_box(_parse_box(box) if box is not None else _mission_box(Path(str(around))), margin)
+    area = _add_margin_to_box(_parse_box(box) if box is not None else _find_mission_box(Path(str(around))), margin)
     source_name = str(source)
     with stage("fetching terrain" if "://" in source_name else "cutting terrain") as advance:
         if "://" not in source_name:
@@ -69,7 +69,7 @@ def terrain(
             allowed = "expected a folder, or its http or https address without a query"
             raise ArgumentError.of_argument("source", source_name, allowed, shown=ascii(source_name))
         with tempfile.TemporaryDirectory() as fallback:
-            return cut_from_server(source_name, area, target, _cache_folder(Path(fallback)), advance, sea=sea)
+            return cut_from_server(source_name, area, target, _find_cache_folder(Path(fallback)), advance, sea=sea)
 
 
 def _parse_box(edges: Sequence[float]) -> Box:
@@ -93,7 +93,7 @@ def _parse_box(edges: Sequence[float]) -> Box:
     return Box(south, west, north, unwrapped_east)
 
 
-def _mission_box(file: Path) -> Box:
+def _find_mission_box(file: Path) -> Box:
     """Return the smallest box that contains all items, home, fences and rally points of a mission.
 
     Raises PlanflyError for a mission without positions, or with positions too far apart or too close to a pole.
@@ -111,7 +111,9 @@ def _mission_box(file: Path) -> Box:
     lons = [first_lon + (lon - first_lon + 180.0) % 360.0 - 180.0 for _, lon in positions]
     if max(abs(lat) for lat in lats) > _MAX_LATITUDE_DEG or max(lons) - min(lons) > 30.0:
         raise PlanflyError(
-            f"{file}: its positions are too far apart, or beyond {_MAX_LATITUDE_DEG:g} degrees of latitude", file=file
+            f"{file}: the positions are more than 30 degrees of longitude apart, or beyond"
+            f" {_MAX_LATITUDE_DEG:g} degrees of latitude",
+            file=file,
         )
     return Box(min(lats), min(lons), max(lats), max(lons))
 
@@ -123,7 +125,7 @@ def _add_margin_to_box(box: Box, margin: float) -> Box:
     return Box(box.south - lat_margin, box.west - lon_margin, box.north + lat_margin, box.east + lon_margin)
 
 
-def _cache_folder(fallback: Path) -> Path:
+def _find_cache_folder(fallback: Path) -> Path:
     """Return the cache folder of downloaded parts, or `fallback` if the user's cache cannot be written."""
     folder = Path(user_cache_dir("planfly")) / "terrain"
     try:

@@ -40,8 +40,7 @@ def new_scenario(
     terrain: an elevation file, a folder of tiles, or the name of a built-in terrain; None for flat ground.
     aircraft: a name, or a folder.  autopilot: see `planfly.fly`.
     overwrite: True replaces an existing scenario.
-    The area contains the straight line and a margin of a third of its length, within the coverage of the elevation
-    file.
+    The area is the straight line with a margin of a third of its length, as far as the elevation file covers it.
     Returns the file.  Raises a `planfly.PlanflyError` for bad input; then nothing is written.
 
     >>> import planfly, tempfile
@@ -55,17 +54,16 @@ def new_scenario(
     endpoints = GeoPosition(*parse_position("start", start)), GeoPosition(*parse_position("destination", destination))
     target = Path(folder)
     name = Path(absolute_path(target)).name if ".." in target.parts else target.absolute().name
-    file = _scenario_file(target, name, overwrite=overwrite)
+    file = _check_scenario_file(target, name, overwrite=overwrite)
     autopilot_name, _, version = (autopilot or DEFAULT_AUTOPILOT).partition("-")
-    raster_path = None if terrain is None else _absolute_path(terrain, is_name=terrain in EMBEDDED)
-    model_path = _absolute_path(aircraft, is_name=isinstance(aircraft, str) and not names_folder(aircraft))
+    raster_path = None if terrain is None else _make_absolute_path(terrain, is_name=terrain in EMBEDDED)
+    model_path = _make_absolute_path(aircraft, is_name=isinstance(aircraft, str) and not names_folder(aircraft))
     airspeed = find_aircraft(model_path).airspeed
     with stage(f"laying out {name}", "laying out"):
         raster = None if raster_path is None else open_raster(raster_path)
         draft = make_draft(
             name,
-            endpoints[0],
-            endpoints[1],
+            *endpoints,
             height,
             raster=raster,
             terrain=raster_path,
@@ -77,14 +75,16 @@ def new_scenario(
         # Parse the text as it will be read from the file, so that a fault is found before anything is written.
         scenario_from_spec(parse_scenario(draft_text(draft), str(file)), str(file))
     relative_draft = replace(
-        draft, terrain=raster_path and _relative_path(target, raster_path), aircraft=_relative_path(target, model_path)
+        draft,
+        terrain=raster_path and _make_relative_path(target, raster_path),
+        aircraft=_make_relative_path(target, model_path),
     )
     target.mkdir(exist_ok=True)
     write_atomically(file, draft_text(relative_draft))
     return file
 
 
-def _scenario_file(folder: Path, name: str, *, overwrite: bool) -> Path:
+def _check_scenario_file(folder: Path, name: str, *, overwrite: bool) -> Path:
     """Return the path of the new scenario file, NAME.toml in the folder.
 
     Raises PlanflyError for an invalid folder, and for an existing file without `overwrite`.
@@ -102,7 +102,7 @@ def _scenario_file(folder: Path, name: str, *, overwrite: bool) -> Path:
     return file
 
 
-def _absolute_path(path: str | Path, *, is_name: bool) -> str:
+def _make_absolute_path(path: str | Path, *, is_name: bool) -> str:
     """Return the absolute path of a file or a folder as text; a name is returned unchanged.
 
     is_name: True if `path` is the name of a built-in terrain or aircraft.
@@ -110,7 +110,7 @@ def _absolute_path(path: str | Path, *, is_name: bool) -> str:
     return str(path) if is_name else absolute_path(Path(path))
 
 
-def _relative_path(folder: Path, path: str) -> str:
+def _make_relative_path(folder: Path, path: str) -> str:
     """Return an absolute path relative to a folder; a name is returned unchanged."""
     if not Path(path).is_absolute():
         return path

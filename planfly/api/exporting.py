@@ -108,7 +108,7 @@ class _SourceContent:
     aircraft: str = ""
 
     def of_plan(self) -> "_SourceContent":
-        """Return the content of a plan in memory, whose messages do not name its temporary file."""
+        """Return the content with "the plan" as its source in messages, instead of the plan's temporary file."""
         return replace(self, mission=replace(self.mission, source="the plan"))
 
 
@@ -132,9 +132,9 @@ def export(
     fence: files of fences or zones in addition to those of the source.
     at: time of the flight, see `planfly.plan`; the files omit zones that are inactive at that time.
     scenario: scenario of a mission or plan, as for `planfly.fly`.
-    aircraft: a name, or a folder: the aircraft whose cruise speed a .plan states, and to which the parameters apply.
-    autopilot, params: the autopilot, or a parameter file of it, that a .plan is for (its firmwareType), and with whose
-    values a mission or plan is judged for a .parm; None for the autopilot of the source.
+    aircraft: name or folder of the aircraft, whose cruise speed a .plan states, and to which the parameters apply.
+    autopilot: autopilot of a .plan (its firmwareType) and of the parameters in a .parm; None for that of the source.
+    params: a file of this autopilot's parameters, which replaces the parameters of the source.
     overwrite: True replaces existing files.
     Raises a `planfly.PlanflyError` for bad input; then nothing is written.
 
@@ -147,9 +147,9 @@ def export(
     if not files:
         raise PlanflyError("export: expected at least one file", field="files")
     targets = tuple(Path(file) for file in files)
-    chosen_autopilot = _chosen_autopilot(autopilot, params)
+    chosen_autopilot = _find_chosen_autopilot(autopilot, params)
     with contextlib.ExitStack() as temporary_folders:
-        path = _source_path(source, temporary_folders)
+        path = _find_source_path(source, temporary_folders)
         for target in targets:
             if target.suffix.lower() not in (*MAP_WRITERS, *PARAMETER_SUFFIXES, *LOG_SUFFIXES):
                 _check_suffix(target)
@@ -161,7 +161,7 @@ def export(
         source_content = read_content.of_plan() if isinstance(source, Plan) else read_content
         if any(target.suffix.lower() == ".plan" for target in targets):
             source_content = _with_plan_notes(source_content, chosen_autopilot, fence)
-        contents = [_target_content(source_content, target) for target in targets]
+        contents = [_make_target_content(source_content, target) for target in targets]
     for target, (data, _) in zip(targets, contents, strict=True):
         write_atomically(target, data)
     loss = "" if source_content.log is None else loss_text(source_content.log)
@@ -175,7 +175,7 @@ def export(
     return ExportedFiles(targets, notes, tuple(description for _, description in contents), loss)
 
 
-def _chosen_autopilot(autopilot: str | None, params: str | Path | None) -> str:
+def _find_chosen_autopilot(autopilot: str | None, params: str | Path | None) -> str:
     """Return the name of the autopilot that the user names, or for which a parameter file was written.
 
     Return "" without either.  Raises ArgumentError for an unknown autopilot, and ParameterError for a file that belongs
@@ -188,14 +188,14 @@ def _chosen_autopilot(autopilot: str | None, params: str | Path | None) -> str:
         return ""
     origin = read_origin(Path(params))
     if not origin.autopilot:
-        allowed = "--autopilot names the autopilot"
+        allowed = "name the autopilot with --autopilot"
         message = f"{params}: {origin.evidence or 'not clearly the file of one autopilot'}: {allowed}"
         raise ParameterError(message, file=params, field="autopilot", value=origin.evidence, allowed=allowed)
     return origin.autopilot
 
 
 def _with_plan_notes(source: _SourceContent, autopilot: str, fence: FencePaths) -> _SourceContent:
-    """Return a source with the autopilot of a .plan, and with notes on what the .plan cannot store.
+    """Add to a source the autopilot for a .plan, and notes on content that the .plan will not have.
 
     The .plan has the autopilot that the user named, or else the source's autopilot, or else `DEFAULT_AUTOPILOT`.
 
@@ -211,7 +211,7 @@ def _with_plan_notes(source: _SourceContent, autopilot: str, fence: FencePaths) 
         )
     fence_files = [fence] if isinstance(fence, str | Path) else fence
     notes += [
-        f"{file}: its rally points ({len(rally)}) are not taken: --fence reads only the fence"
+        f"{file}: {count_text(len(rally), 'rally point')} not exported: --fence reads only the fence"
         for file in fence_files
         if not source.mission.rally
         and Path(file).suffix.lower() == ".plan"
@@ -221,7 +221,9 @@ def _with_plan_notes(source: _SourceContent, autopilot: str, fence: FencePaths) 
     return replace(source, mission=mission, notes=tuple(notes))
 
 
-def _source_path(source: FlightLog | FlownMission | Plan | str | Path, temporary_folders: contextlib.ExitStack) -> Path:
+def _find_source_path(
+    source: FlightLog | FlownMission | Plan | str | Path, temporary_folders: contextlib.ExitStack
+) -> Path:
     """Return the path of a source's file.
 
     A plan is written to a file that exists while `temporary_folders` is open.  Raises PlanflyError for a flight without
@@ -289,10 +291,9 @@ def _needs_kml(targets: tuple[Path, ...]) -> bool:
 
 
 def _with_returns(source: _SourceContent, setup: FlightSetup, track: Track | None) -> _SourceContent:
-    """Return a source with the returns and glides from a few points, for a map.
+    """Add returns and glides from a few points of the flight to a source, for a map.
 
-    The points are on the flight, or on the planned path if `track` is None.  The source is unchanged if they cannot be
-    judged.
+    If `track` is None, they start on the planned path.  The source is unchanged if returns cannot be judged.
     """
     with stage("flying returns for the map"):
         drawn_returns = return_summary(setup, track).data_for_pictures()
@@ -358,17 +359,17 @@ def _read_mission(path: Path, options: MissionOptions, *, needs_world: bool, nee
 
 
 def _with_zones(source: _SourceContent, scenario: Scenario) -> _SourceContent:
-    """Return a source with the zones of its scenario added to the fences of its mission."""
+    """Add a scenario's zones to the fences of a source's mission, and note zones that a fence lacks."""
     fence_items, notes = zone_fences(scenario.zones, scenario.origin)
     mission = replace(source.mission, fences=number_items([*source.mission.fences, *fence_items]))
     return replace(source, mission=mission, fence_notes=tuple(notes))
 
 
-def _target_content(source: _SourceContent, target: Path) -> tuple[str | bytes, str]:
+def _make_target_content(source: _SourceContent, target: Path) -> tuple[str | bytes, str]:
     """Return the content of a target file, and a description of the content, such as "23 items"."""
     suffix, mission = target.suffix.lower(), source.mission
     if suffix in LOG_SUFFIXES and source.log is not None:
-        return _flight_content(source.log, suffix)
+        return _encode_flight(source.log, suffix)
     if suffix in MAP_WRITERS:
         descriptions = [*source.lines, *([count_text(len(source.zones), "zone")] if source.zones else [])]
         lines, zones = list(source.lines.values()), source.zones
@@ -377,7 +378,7 @@ def _target_content(source: _SourceContent, target: Path) -> tuple[str | bytes, 
             descriptions.append("returns")
         return MAP_WRITERS[suffix](source.name, lines, zones), " and ".join(descriptions)
     if suffix in PARAMETER_SUFFIXES and source.autopilot is not None:
-        return judging_parameters_text(mission, source.autopilot, has_own_parameters=source.has_own_parameters)
+        return format_judging_parameters(mission, source.autopilot, has_own_parameters=source.has_own_parameters)
     kind = mission_kind(target)
     if kind in _CONTENT_NAMES:
         count = len(mission.fences if kind == "fence" else mission.rally)
@@ -390,26 +391,26 @@ def _target_content(source: _SourceContent, target: Path) -> tuple[str | bytes, 
     if kind == "plan" and (mission.fences or mission.rally):
         extra = f", {count_text(len(mission.fences), 'fence item')}, {count_text(len(mission.rally), 'rally point')}"
     if kind == "plan":
-        airspeed, origin = _cruise_speed(source)
+        airspeed, origin = _find_cruise_speed(source)
         mission, extra = replace(mission, cruise_speed=airspeed), f"{extra}, cruiseSpeed {airspeed:.0f} m/s: {origin}"
     return mission_text(mission, kind), f"{count_text(len(mission.items), 'item')}{extra}"
 
 
-def _cruise_speed(source: _SourceContent) -> tuple[float, str]:
-    """Return the cruiseSpeed of a .plan, m/s, and its source.
+def _find_cruise_speed(source: _SourceContent) -> tuple[float, str]:
+    """Return the cruiseSpeed of a .plan, m/s, and a text on where it comes from.
 
     It is the mission's cruise speed, or else the airspeed at which planfly flies the mission.  Without a scenario or a
     plan, this is the cruise airspeed of the default aircraft.
     """
     if (mission_speed := stated_cruise_speed(source.mission)) is not None:
-        return mission_speed, "the mission's"
+        return mission_speed, "from the mission"
     if source.airspeed is not None:
         return source.airspeed, f"from {source.aircraft}"
     aircraft = load_aircraft(FlightTable().aircraft)
     return aircraft.airspeed, f"from the default aircraft {aircraft.name}; name yours with --aircraft"
 
 
-def judging_parameters_text(
+def format_judging_parameters(
     mission: Mission, autopilot: Autopilot, *, has_own_parameters: bool = True
 ) -> tuple[str, str]:
     """Return a parameter file for take-off, landing and returns, and a description of its content.
@@ -428,17 +429,17 @@ def judging_parameters_text(
     omitted = ""
     if values.get("RTL_AUTOLAND") == 0.0 and any(item.command == Command.DO_LAND_START for item in mission.items):
         del values["RTL_AUTOLAND"]
-        omitted = ", without RTL_AUTOLAND 0, because it does not arm with that value"
+        omitted = ", without RTL_AUTOLAND 0, because the autopilot does not arm with that value"
     title = f"{autopilot.title}: take-off, landing and returns "
     title += (
         "with which planfly judges the mission"
         if has_own_parameters
-        else "by planfly's defaults for this mission; a parameter file of your own wins (export ... --params FILE)"
+        else "by planfly's defaults for this mission; name your own parameter file with export ... --params FILE"
     )
     return parameters_text(values, title), f"{count_text(len(values), 'parameter')} of {autopilot.title}{omitted}"
 
 
-def _flight_content(log: FlightLog, suffix: str) -> tuple[str | bytes, str]:
+def _encode_flight(log: FlightLog, suffix: str) -> tuple[str | bytes, str]:
     """Return a flight in the log format with this suffix, and a description of the content."""
     description = f"{count_text(len(log.track), 'row')}, {log.end_time:.0f} s"
     if suffix == ".tlog":

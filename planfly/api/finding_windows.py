@@ -49,16 +49,16 @@ def window(
 ) -> WindowResult:
     """Find the times of take-off at which a mission is flyable in a weather forecast.
 
-    At each time, a campaign of flights is flown, which vary as in `planfly.campaign`.
+    For each time a small campaign is flown, whose flights vary as in `planfly.campaign`.
 
     target: a built-in scenario's name, a scenario's TOML file, a `Plan`, or a plan.json, .waypoints or .plan file.
     forecast: file of the forecast; None for the forecast of the scenario.
-    at: asked time of take-off, in ISO 8601 with its offset from UTC; None asks about any.
-    earliest, latest: first and last time of take-off; None for the asked time, and 24 hours later or the last time from
-    which the forecast covers the flight.
+    at: intended time of take-off, in ISO 8601 with its offset from UTC; None if there is no intended time.
+    earliest: first time of take-off; None for the intended time.
+    latest: last time of take-off; None for 24 hours later, or the last time from which the forecast covers the flight.
     every: time between two departures, such as "30min" or "1h".
-    probability: probability of a flyable flight at which a departure is open.
-    out: folder for ``window.png`` and ``report.html``; None writes none.  overwrite: True replaces them.
+    probability: lowest probability of a flyable flight at which a departure is open.
+    out: folder for ``window.png`` and ``report.html``; None writes no files.  overwrite: True replaces existing files.
     flights: number of flights of each departure.
     spread, seed, workers, scheduler: see `planfly.campaign`.  For the other options, see `planfly.fly`.
     A script must call this function under ``if __name__ == "__main__":``, because workers import the script.
@@ -92,15 +92,16 @@ def window(
     goal = WindowGoal(departure_times(first, end, step, departure), departure, probability, options["flights"], zone)
     with stage("flying", f"flying {len(goal.departures)} departures") as advance:
         result = find_window(base, goal, workers, advance)
-    question = {"from": earliest, "to": latest, "every": every, "probability": probability}
-    command = answer_command_line("window", target, base, options, question)
-    return result if out is None else _with_files(result, Path(out), command, overwrite=overwrite)
+    search_options = {"from": earliest, "to": latest, "every": every, "probability": probability}
+    command = answer_command_line("window", target, base, options, search_options)
+    return result if out is None else _write_files(result, Path(out), command, overwrite=overwrite)
 
 
 def _open_base(target: Plan | str | Path, options: WindowOptions, departures: Sequence[datetime]) -> CampaignBase:
-    """Return the base of the flights at the first departure that the forecast covers.
+    """Open the mission at the first of several departures that the forecast covers.
 
-    Raises ArgumentError without a forecast, and the ForecastError of the first departure if none is covered.
+    Raises ArgumentError if no forecast is named.  If the forecast covers no departure, raises the ForecastError of the
+    first departure.
     """
     errors: list[ForecastError] = []
     for departure in departures[:MAX_DEPARTURES]:
@@ -119,7 +120,7 @@ def _open_base(target: Plan | str | Path, options: WindowOptions, departures: Se
     raise errors[0]
 
 
-def _with_files(result: WindowResult, folder: Path, command: str, *, overwrite: bool) -> WindowResult:
+def _write_files(result: WindowResult, folder: Path, command: str, *, overwrite: bool) -> WindowResult:
     """Write chart and page of a result into a folder, and return the result with the files.
 
     command: command line that repeats the search; "" if there is none.

@@ -51,7 +51,7 @@ def plan_front(
     stop: Callable[[], bool] | None = None,
     **options: Unpack[FlightOptions],
 ) -> Front:
-    """Plan a Pareto front: a set of plans of which none is better than another in every criterion.
+    """Plan a Pareto front: safe plans, none of which is better than another in every criterion.
 
     The criteria are length, exposure to radars, minimum height above ground, and energy.  Time replaces energy if the
     scenario's ``[planner] objective`` is "time" or the power of the aircraft is unknown.  Each plan has its own
@@ -105,7 +105,7 @@ def _write_front(front: Front, world: Scenario, folder: Path) -> None:
             f"{front.fourth}_{'s' if front.fourth == 'time' else 'wh'}",
         ],
         "asked": front.asked,
-        "default": {key: value for key, value in _table_row(0, front.default).items() if key != "plan"},
+        "default": {key: value for key, value in _make_table_row(0, front.default).items() if key != "plan"},
         "plans": [row | {"file": f"plan-{row['plan']}.json"} for row in rows],
     }
     write_atomically(folder / "front.json", json.dumps(data, indent=1, allow_nan=False) + "\n")
@@ -121,10 +121,10 @@ def _write_front(front: Front, world: Scenario, folder: Path) -> None:
 
 def table_rows(front: Front) -> list[dict[str, Any]]:
     """Return the rows of the table of a front, with the keys `COLUMNS`; an unknown energy is None."""
-    return [_table_row(number, front_plan) for number, front_plan in enumerate(front.plans, 1)]
+    return [_make_table_row(number, front_plan) for number, front_plan in enumerate(front.plans, 1)]
 
 
-def _table_row(number: int, front_plan: FrontPlan) -> dict[str, Any]:
+def _make_table_row(number: int, front_plan: FrontPlan) -> dict[str, Any]:
     """Return a row of the table of a front, keyed by `COLUMNS`.
 
     number: number of the plan, from 1.

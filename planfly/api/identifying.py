@@ -16,7 +16,7 @@ from logs.importers.motion_log import read_motion
 from planfly.arguments import check_arguments
 from planfly.identification.base_numbers import base_model, scale_base_model
 from planfly.identification.checks import check_battery, check_commands, check_estimate, check_power
-from planfly.identification.folder import Identified, folder_files, make_identification
+from planfly.identification.folder import Identified, make_folder_files, make_identification
 from planfly.identification.model_text import check_base
 from planfly.identification.propulsion_check import PowerConflict
 from planfly.identification.records import (
@@ -25,10 +25,10 @@ from planfly.identification.records import (
     MIN_CHECK_SECONDS,
     MIN_HZ,
     MIN_SECONDS,
+    describe_recording_setting,
+    find_slowest_log_rate,
     flight_records,
     log_outputs,
-    recording_setting,
-    slowest_log_rate,
 )
 from planfly.identification.servos import ServoOutput, read_servos
 from planfly.identification.wide_quantities import WideQuantity, wide_quantities
@@ -106,10 +106,10 @@ def identify_aircraft(
     until: float | None = None,
     overwrite: bool = False,
 ) -> IdentifiedAircraft:
-    """Make the folder of an aircraft from flight logs of ArduPlane or PX4, with a list of uncertain properties.
+    """Make the folder of an aircraft from flight logs of ArduPlane or PX4.
 
     logs: `.BIN` or `.ulg` of one aircraft with one mass, with inertial sensors and servo outputs.
-    folder: the folder to make.  overwrite: True replaces the folder of an aircraft.
+    folder: the folder to make, with a list of uncertain properties.  overwrite: True replaces an aircraft's folder.
     mass: mass in flight, kg.  span: wing span, m.  area: wing area, m^2; None takes the ratio of area to squared span
     from the base.
     battery: volts and capacity, "44.4V,888Wh"; None takes the battery of the base.
@@ -134,19 +134,19 @@ def identify_aircraft(
         motion_logs = [read_motion(path) for path in paths]
         check_motion = None if check is None else read_motion(Path(check))
         _check_distinct([*motion_logs, *([] if check_motion is None else [check_motion])])
-        log_parts = [(log, *records_and_outputs(log, prior, until=until)) for log in motion_logs]
-        checked = [] if check_motion is None else records_and_outputs(check_motion, prior, MIN_CHECK_SECONDS)[0]
+        log_parts = [(log, *read_records_and_outputs(log, prior, until=until)) for log in motion_logs]
+        checked = [] if check_motion is None else read_records_and_outputs(check_motion, prior, MIN_CHECK_SECONDS)[0]
     records = [record for _, stretches, _ in log_parts for record in stretches]
     check_battery(records, volts)
     check_commands(records)
     log, _, outputs = log_parts[-1]
     with stage("estimating"):
-        has_fast_rows = all(slowest_log_rate(motion_log) >= MIN_HZ for motion_log, _, _ in log_parts)
+        has_fast_rows = all(find_slowest_log_rate(motion_log) >= MIN_HZ for motion_log, _, _ in log_parts)
         estimate = estimate_model(records, base_numbers, dynamics=has_fast_rows)
-        check_estimate(estimate, base_numbers, _unmixed_outputs(log, prior), log.source)
+        check_estimate(estimate, base_numbers, _find_unmixed_outputs(log, prior), log.source)
         check_power(estimate, records, base_numbers)
         identified = make_identification(prior, base_numbers, estimate, motion_logs, outputs, until)
-        files = folder_files(identified, target.name, (volts, energy))
+        files = make_folder_files(identified, target.name, (volts, energy))
     with stage("predicting"):
         predicted = score_predictions(estimate, checked or records, base_numbers, prior.name)
     with stage("drawing", "drawing an identification"):
@@ -158,8 +158,8 @@ def identify_aircraft(
 def _make_result(
     aircraft: Aircraft, identified: Identified, predicted: PredictedLog, records: Sequence[FlightRecord]
 ) -> IdentifiedAircraft:
-    """Return the result of an identification, with the performance and the gaps in the logs."""
-    climb, sink, power = _performance_intervals(identified)
+    """Return the result of an identification, with the performance and the deficiencies of the logs."""
+    climb, sink, power = _compute_performance_intervals(identified)
     return IdentifiedAircraft(
         aircraft=aircraft,
         estimate=identified.estimate,
@@ -167,8 +167,8 @@ def _make_result(
         sink=sink,
         power=power,
         predicted=predicted,
-        without_current=without_current(records),
-        slow=slow_logs(identified.logs),
+        without_current=find_logs_without_current(records),
+        slow=find_slow_logs(identified.logs),
         wide=_find_wide_numbers(identified),
         conflict=identified.power_conflict(),
     )
@@ -177,7 +177,8 @@ def _make_result(
 def _find_battery(prior: Aircraft, battery: str | None) -> tuple[float, float]:
     """Return voltage (V) and energy (J) of the battery.
 
-    battery: volts and capacity, such as "44.4V,888Wh"; None takes the battery of the base.
+    prior: base aircraft, whose battery is used if `battery` is None.
+    battery: volts and capacity, such as "44.4V,888Wh".
     """
     if battery is None:
         return prior.battery_voltage, prior.battery_energy
@@ -232,11 +233,13 @@ def _check_distinct(logs: Sequence[MotionLog]) -> None:
             if log.sha256 == earlier_log.sha256 and overlap > 0.0:
                 allowed = "name each log only once, and use another log to check the result"
                 raise LogError(
-                    f"{log.source}: the same bytes as {earlier_log.source}: {allowed}", file=log.source, allowed=allowed
+                    f"{log.source}: has the same bytes as {earlier_log.source}: {allowed}",
+                    file=log.source,
+                    allowed=allowed,
                 )
 
 
-def records_and_outputs(
+def read_records_and_outputs(
     log: MotionLog, prior: Aircraft, min_seconds: float = MIN_SECONDS, until: float | None = None
 ) -> tuple[list[FlightRecord], dict[str, ServoOutput]]:
     """Return the flight records of a log, and the servo outputs with which they were read.
@@ -256,13 +259,13 @@ def records_and_outputs(
     if LEFT in outputs:
         return flight_records(log, prior, outputs, min_seconds, end), dict(base_outputs)
     is_same = base_outputs.keys() == outputs.keys() and all(
-        _agree(base_outputs[name], output) for name, output in outputs.items()
+        _is_same_output(base_outputs[name], output) for name, output in outputs.items()
     )
     used_outputs = dict(base_outputs) if is_same else outputs
     return flight_records(log, prior, used_outputs if is_same else None, min_seconds, end), used_outputs
 
 
-def _unmixed_outputs(log: MotionLog, prior: Aircraft) -> dict[str, int]:
+def _find_unmixed_outputs(log: MotionLog, prior: Aircraft) -> dict[str, int]:
     """Return the output number of each control that has its own servo output in the log.
 
     Logs of PX4 and tables of columns have none: they contain the controls themselves, not servo outputs.
@@ -272,7 +275,7 @@ def _unmixed_outputs(log: MotionLog, prior: Aircraft) -> dict[str, int]:
     return {name: output.output for name, output in log_outputs(log, prior).items()}
 
 
-def _agree(first: ServoOutput, second: ServoOutput) -> bool:
+def _is_same_output(first: ServoOutput, second: ServoOutput) -> bool:
     """Return True if two servo outputs have the same number, pulse range and direction."""
     (first_low, *_, first_high), (second_low, *_, second_high) = first.value, second.value
     has_same_range = (first.pulse[0], first.pulse[-1]) == (second.pulse[0], second.pulse[-1])
@@ -293,7 +296,7 @@ def _report_page(identified: Identified, predicted: PredictedLog, check: str | P
         (title, unit, *interval)
         for (title, unit), interval in zip(
             (("climb at full throttle", "°"), ("sink at idle", "°"), ("power in level flight", "W")),
-            _performance_intervals(identified),
+            _compute_performance_intervals(identified),
             strict=True,
         )
     )
@@ -308,8 +311,8 @@ def _report_page(identified: Identified, predicted: PredictedLog, check: str | P
 
 
 def _find_wide_numbers(identified: Identified) -> tuple[WideQuantity, ...]:
-    """Return sink rate and power, each if the logs determine it only within a wide interval."""
-    _, sink, power = _performance_intervals(identified)
+    """Return those of the sink angle and the power that the logs determine only within a wide interval."""
+    _, sink, power = _compute_performance_intervals(identified)
     return wide_quantities(sink, power, with_current=identified.estimate.with_current)
 
 
@@ -317,30 +320,30 @@ def _find_wide_numbers(identified: Identified) -> tuple[WideQuantity, ...]:
 Interval = tuple[float, float, float]
 
 
-def _performance_intervals(identified: Identified) -> tuple[Interval, Interval, Interval]:
+def _compute_performance_intervals(identified: Identified) -> tuple[Interval, Interval, Interval]:
     """Return the intervals of climb angle (deg), sink angle (deg) and power (W).
 
     Each is lower end, estimate and upper end (95 %).
     """
     best, samples = identified.performance()
 
-    def interval(value: Floats, sample_values: Floats, factor: float = 1.0) -> Interval:
-        """Return the 2.5 % quantile of the samples, the estimate and the 97.5 % quantile, times a factor."""
+    def make_interval(value: Floats, sample_values: Floats, factor: float = 1.0) -> Interval:
+        """Return the samples' 2.5 % quantile, the estimate and the 97.5 % quantile, times a factor."""
         lower, upper = np.percentile(sample_values, [2.5, 97.5])
         return factor * float(lower), factor * float(value[0]), factor * float(upper)
 
     degrees = math.degrees(1.0)
-    lower_power, power, upper_power = interval(best.power, samples.power)
+    lower_power, power, upper_power = make_interval(best.power, samples.power)
     if (conflict := identified.power_conflict()) is not None:
         upper_power = max(upper_power, conflict.largest_power)
     return (
-        interval(best.climb, samples.climb, degrees),
-        interval(best.sink, samples.sink, degrees),
+        make_interval(best.climb, samples.climb, degrees),
+        make_interval(best.sink, samples.sink, degrees),
         (lower_power, power, upper_power),
     )
 
 
-def without_current(records: Sequence[FlightRecord]) -> tuple[str, ...]:
+def find_logs_without_current(records: Sequence[FlightRecord]) -> tuple[str, ...]:
     """Return the names of the logs without battery current, if other logs have it.
 
     The result is empty if no log has battery current.
@@ -349,7 +352,7 @@ def without_current(records: Sequence[FlightRecord]) -> tuple[str, ...]:
     return tuple(lacking) if any(record.has_current for record in records) else ()
 
 
-def slow_logs(logs: Sequence[MotionLog]) -> tuple[SlowLog, ...]:
+def find_slow_logs(logs: Sequence[MotionLog]) -> tuple[SlowLog, ...]:
     """Return the logs whose sensors or servo outputs have fewer than `AMPLE_HZ` rows per second."""
-    rates = [(log, slowest_log_rate(log)) for log in logs]
-    return tuple(SlowLog(log.source, rate, recording_setting(log)) for log, rate in rates if rate < AMPLE_HZ)
+    rates = [(log, find_slowest_log_rate(log)) for log in logs]
+    return tuple(SlowLog(log.source, rate, describe_recording_setting(log)) for log, rate in rates if rate < AMPLE_HZ)

@@ -12,7 +12,7 @@ from logs.recording.recorder import Recorder
 from logs.recording.recover import recover_log
 from logs.verdict.imported.model_comparison import Reflight
 from logs.verdict.judge_flight import judge_flight
-from logs.views.report.text import not_reflown_lines, refly_lines
+from logs.views.report.text import list_not_reflown, refly_lines
 from planfly.arguments import check_arguments
 from planfly.flight_options import LogOptions
 from planfly.kernel_units.unit_kernels import FLYING
@@ -92,8 +92,8 @@ class ColumnGuesses:
     """Result of `planfly.guess_columns`.
 
     table: the table that was written.
-    guesses: number of its lines that are guesses, to be checked.
-    missing: quantities that were not found, in lines.
+    guesses: number of lines in the table that are guesses, to be checked.
+    missing: lines that list the quantities that were not found.
     """
 
     table: Path
@@ -166,7 +166,7 @@ def refly(
     check_arguments(turbulence=turbulence)
     flight_log = log if isinstance(log, FlightLog) else read_log(log)
     if flight_log.setup.imported_log is None:
-        message = f"{flight_log.source}: flown by planfly itself; refly expects a log written by `planfly import`"
+        message = f"{flight_log.source}: the flight was flown by planfly itself; expected a log by `planfly import`"
         raise LogError(message, file=flight_log.source)
     if out is not None:
         check_output_folder(Path(out), overwrite)
@@ -176,7 +176,7 @@ def refly(
     lines: list[str] = []
     for number, reflight in enumerate(reflights, 1):
         lines += [*([] if number == 1 else [""]), *refly_lines(reflight)]
-    lines += not_reflown_lines(reflights, flight_log.setup.imported_log.stretches, MAX_REFLOWN_PARTS)
+    lines += list_not_reflown(reflights, flight_log.setup.imported_log.stretches, MAX_REFLOWN_PARTS)
     files: list[Path] = []
     if out is not None:
         folder = clean_folder(out, REFLY_FILES, overwrite=True)
@@ -191,11 +191,9 @@ def refly(
 
 
 def _draw_charts(folder: Path, reflight: Reflight, ending: str) -> list[Path]:
-    """Draw the charts that compare a logged with a simulated flight, and return the files.
+    """Draw the charts that compare a logged with a simulated flight as PNG files, and return the files.
 
-    The files are PNG files in the folder.
-
-    ending: added to the stem of each file name.
+    ending: text added to the stem of each file name.
     """
     # Imported here: only pictures need matplotlib.
     from logs.views.compare import refly_charts
@@ -212,7 +210,7 @@ def _draw_charts(folder: Path, reflight: Reflight, ending: str) -> list[Path]:
 def _record_simulation(folder: Path, reflight: Reflight, log: FlightLog, ending: str) -> Path:
     """Write the simulated flight as a flight log, for `compare` and `replay`, and return the file.
 
-    ending: added to the stem of the file name.
+    ending: text added to the stem of the file name.
     """
     path = folder / f"simulated{ending}.mcap"
     verdict = judge_flight(reflight.setup, reflight.simulated, reflight.ended)

@@ -136,13 +136,15 @@ def link(
 
     what: a `Plan`, or the path of a plan.json, .waypoints or .plan; or a flight, which is a result of `planfly.fly`, a
     flight log or its path, or an autopilot's log.
-    out: folder for pictures of the link over time and on the map, and for the map's coverage as a GeoTIFF; None writes
-    none.  overwrite: True replaces them.
-    options: see `planfly.judge`; of the link, each replaces an entry of the scenario's [link]:
-    frequency, MHz; power of the transmitter and sensitivity of the receiver, dBm; station, latitude and longitude of
-    its antenna, by default the mission's home; antenna, its height above ground, m; station_gain and aircraft_gain,
-    dBi; cable_loss and fade_margin, dB; max_outage, the longest accepted time below the fade margin, s; and use,
-    "telemetry" or "control" (the remote control).
+    out: folder for pictures of the link over time and on the map, and for the coverage as a GeoTIFF; None writes no
+    files.  overwrite: True replaces existing files.
+    options: see `planfly.judge`.  The following options replace entries of the scenario's [link]:
+    frequency: MHz.  power, sensitivity: power of the transmitter and sensitivity of the receiver, dBm.
+    station: latitude and longitude of the station's antenna, degrees; the mission's home by default.
+    antenna: height of the station's antenna above ground, m.
+    station_gain, aircraft_gain: dBi.  cable_loss, fade_margin: dB.
+    max_outage: longest accepted time below the fade margin, s.
+    use: "telemetry" or "control" (the remote control).
     Raises a `planfly.PlanflyError` for bad input, and for a scenario without [link] if frequency, power or sensitivity
     is missing.
 
@@ -169,21 +171,21 @@ def link(
     scenario = with_link(judged_flight.setup.scenario, **entries, lat_deg=lat, lon_deg=lon)
     setup = judged_flight.setup.in_scenario(with_ground_at_station(scenario, judged_flight.setup.mission))
     result = _judge_link(setup, judged_flight.track)
-    return result if out is None else _with_pictures(result, Path(out), overwrite=overwrite)
+    return result if out is None else _write_pictures(result, Path(out), overwrite=overwrite)
 
 
-def _with_pictures(result: LinkResult, folder: Path, *, overwrite: bool) -> LinkResult:
+def _write_pictures(result: LinkResult, folder: Path, *, overwrite: bool) -> LinkResult:
     """Write the pictures and the coverage of a link into a folder, and return the result with their files."""
     if result.along is None or result.antenna is None:
         return result
     # Imported here: only pictures need matplotlib.
     from logs.views.exports.coverage_file import coverage_geotiff
     from logs.views.figures import View, draw_pictures
-    from logs.views.link import draw_link, link_chart, link_map
+    from logs.views.link import compute_link, link_chart, link_map
 
     setup = result.setup
     with stage("drawing", "drawing a link"):
-        drawn = draw_link(setup, result.along, result.antenna, is_flown=True)
+        drawn = compute_link(setup, result.along, result.antenna, is_flown=True)
         if drawn is None:
             return result
         views: dict[str, View] = {"link": link_chart(setup, drawn), "link-map": link_map(setup, drawn)}

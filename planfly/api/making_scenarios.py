@@ -29,21 +29,21 @@ def make_scenario(
     threats: GivenThreats | None = None,
     **tables: Any,
 ) -> Scenario:
-    """Return a scenario with other threats and other values.
+    """Make a scenario from another scenario, with other threats and other values.
 
-    It is a scenario for `planfly.plan`, for `scenario` of `planfly.fly` and other functions, and a target of
-    `planfly.campaign`; its method ``to_toml`` writes it to a file.
+    The result is a scenario for `planfly.plan`, `planfly.fly` and `planfly.campaign`.  Its method ``to_toml`` writes it
+    to a file.
 
     base: a built-in scenario's name, a TOML file's path, or a `Scenario`.
-    threats: threats that replace the base's threats; None keeps these.  A pandas data frame or a mapping of columns,
-    named as the keys of [[threats]]; a list of mappings with these keys; or an array (n, 4) of east, north, kill radius
-    and detection radius, m.  A radius that is 0 or None means no such zone; a scale that is None is a quarter of the
-    kill radius and a third of the detection radius.  NaN is refused.
-    tables: values of other tables, as mappings with the keys of a scenario file, whose lists may be arrays, and its
-    name and description; other keys of a table stay, except for a position, and a table of another kind or file, which
-    are replaced as a whole.
-    Another elevation file replaces the base's origin, too, unless an origin is given: the middle of its
-    latitudes and longitudes becomes the origin.
+    threats: threats that replace the base's threats; None keeps the base's threats.  They are a pandas data frame or a
+    mapping of columns, named as the keys of [[threats]]; a list of mappings with these keys; or an array (n, 4) of
+    east, north, kill radius and detection radius, m.  A radius that is 0 or None means no such zone.  A scale that is
+    None is a quarter of the kill radius, or a third of the detection radius.  NaN is refused.
+    tables: values of other tables, as mappings with the keys of a scenario file, whose lists may be arrays; also name
+    and description.  Keys of a table that are not named keep their values.  A position, and a table of another kind or
+    file, are replaced as a whole.
+    With another elevation file, the center of its latitudes and longitudes becomes the origin, unless an origin is
+    named.
     Raises a `planfly.PlanflyError` for values that a scenario file must not have.
 
     >>> import planfly
@@ -55,7 +55,7 @@ def make_scenario(
     _check_terrain(tables.get("terrain"))
     base_scenario = load_scenario_with_options(base, {})
     spec = base_scenario.to_json()
-    for name, values in _plain_values(tables).items():
+    for name, values in _convert_to_plain_values(tables).items():
         is_merged = isinstance(values, Mapping) and isinstance(spec.get(name), dict) and name not in _POSITIONS
         spec[name] = _change_table(spec[name], values) if is_merged else values
     terrain_table, base_table = spec["terrain"], base_scenario.to_json()["terrain"]
@@ -75,26 +75,26 @@ def make_scenario(
 
 
 def _check_terrain(table: Any) -> None:
-    """Raise ArgumentError for an array in place of [terrain] or of its file."""
+    """Raise ArgumentError if [terrain] or its file is an array, and say how to write a file from it."""
     for name, value in (
         ("terrain", table),
         ("terrain.path", table.get("path") if isinstance(table, Mapping) else None),
     ):
         if isinstance(value, np.ndarray):
             allowed = (
-                'expected {"kind": "dem", "path": FILE}; np.savez("hills.npz", elevation=heights, xmin=, xmax=, ymin=,'
-                " ymax=) writes such a file of an array: rows from north to south, m, and its edges in degrees"
+                'expected {"kind": "dem", "path": FILE}; an array of heights (m, rows from north to south) with edges'
+                ' (degrees) is written to FILE by np.savez("hills.npz", elevation=heights, xmin=, xmax=, ymin=, ymax=)'
                 " (docs/your-dem.md)"
             )
             raise ArgumentError.of_argument(name, value, allowed, shown=f"array of shape {value.shape}")
 
 
-def _plain_values(values: Any) -> Any:
+def _convert_to_plain_values(values: Any) -> Any:
     """Convert numpy arrays and numbers in tables to lists and numbers of Python."""
     if isinstance(values, Mapping):
-        return {key: _plain_values(value) for key, value in values.items()}
+        return {key: _convert_to_plain_values(value) for key, value in values.items()}
     if isinstance(values, list | tuple):
-        return [_plain_values(value) for value in values]
+        return [_convert_to_plain_values(value) for value in values]
     return values.tolist() if isinstance(values, np.ndarray | np.generic) else values
 
 

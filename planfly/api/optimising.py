@@ -71,6 +71,7 @@ class Optimiser:
         rng: np.random.Generator,
         initial: Floats | None,
     ) -> None:
+        """Start a search; see `optimise` for the arguments."""
         self._scores: Floats = np.empty((0, 0))
         self._points: Floats = np.empty((0, lower.size))
         self._levels: tuple[Level, ...] = ()
@@ -107,7 +108,9 @@ class Optimiser:
         number of points that `ask` returned, or if the number of columns differs from the previous call.
         """
         if not self._is_asked:
-            raise ArgumentError.of_argument("values", values, "call ask() first, which returns their points", shown="")
+            raise ArgumentError.of_argument(
+                "values", values, "call ask() first; it returns the points to evaluate", shown=""
+            )
         points = self._search.ask()
         objective_values = _parse_columns("values", values, len(points))
         violation_values = (
@@ -123,7 +126,7 @@ class Optimiser:
             raise ArgumentError.of_argument("values, violations", values, allowed, shown="")
         if not self._levels:
             self._violation_count = violation_values.shape[1]
-            self._levels = _priority_levels(violation_values.shape[1], objective_values.shape[1])
+            self._levels = _make_priority_levels(violation_values.shape[1], objective_values.shape[1])
             self._scores = np.empty((0, scores.shape[1]))
         self.evaluations += len(points)
         self._update_front(points, scores)
@@ -163,8 +166,8 @@ class Optimiser:
 
         objective: maps points, (n, d), to values, (n,).
         generations: number of generations.
-        evaluations: total number of evaluations at which to stop, instead of `generations`; of the last generation only
-        the first points are evaluated, so that the number is exact.
+        evaluations: total number of evaluations at which to stop, instead of `generations`.  The last generation is
+        evaluated only in part, so that the number is exact.
 
         Raises ArgumentError for numbers below 1.
         """
@@ -196,7 +199,7 @@ def optimise(
     seed: int | np.random.Generator = 1,
     initial: ArrayLike | None = None,
 ) -> Optimiser:
-    """Return an ask/tell optimiser that uses one of the planner's algorithms, for any function within bounds.
+    """Return an ask/tell optimiser for any function within bounds, with an algorithm of the planner.
 
     lower, upper: bounds of the box, (d,).
     model: "umda", the paper's univariate Gaussians; "emna", one Gaussian with full covariance; "multistart", Gaussians
@@ -208,7 +211,7 @@ def optimise(
     initial: first points in the box, (population, d); None draws uniform points.
     Raises a `planfly.PlanflyError`, which is also a ValueError, for invalid bounds or another invalid argument.
 
-    Minimum of a bowl at (1, 2); and, if a line separates it from the feasible side, a minimum of 0.5 at (0.5, 1.5):
+    Find the minimum of a bowl, 0 at (1, 2).  A constraint that excludes this point makes it 0.5 at (0.5, 1.5):
 
     >>> import planfly
     >>> search = planfly.optimise([-5, -5], [5, 5], seed=1)
@@ -224,7 +227,7 @@ def optimise(
     >>> search.best.feasible, round(search.best.value, 1)
     (True, 0.5)
 
-    Eight waypoints through a wall with gaps 0.02 wide at 0.2 to each side: length 1.08, or 2.3 around the wall:
+    Find a path past a wall with two gaps, each 0.02 wide.  Its length is 1.08 through a gap, and 2.3 around the wall:
 
     >>> def length(across):
     ...     wall = abs(across[:, 3] + across[:, 4]) / 2
@@ -238,7 +241,7 @@ def optimise(
     lower_bounds, upper_bounds = _parse_numbers("lower", lower), _parse_numbers("upper", upper)
     if lower_bounds.ndim != 1 or lower_bounds.shape != upper_bounds.shape or not lower_bounds.size:
         shapes = f"of shapes {lower_bounds.shape} and {upper_bounds.shape}"
-        raise ArgumentError.of_argument("lower, upper", lower, "expected two of shape (d,)", shown=shapes)
+        raise ArgumentError.of_argument("lower, upper", lower, "expected two arrays of shape (d,)", shown=shapes)
     with np.errstate(over="ignore", invalid="ignore"):
         widths = upper_bounds - lower_bounds
     if not (np.isfinite(widths) & (widths > 0.0)).all():
@@ -253,7 +256,10 @@ def optimise(
 
 
 def _parse_initial(initial: ArrayLike, population: int, lower: Floats, upper: Floats) -> Floats:
-    """Return first points as an array (population, d).  Raises ArgumentError for another shape or outside the box."""
+    """Return the first points as an array (population, d).
+
+    Raises ArgumentError for another shape, and for points outside the box.
+    """
     points, expected_shape = _parse_numbers("initial", initial), (population, lower.size)
     if points.shape != expected_shape or not np.isfinite(points).all():
         allowed = f"expected finite numbers of shape {expected_shape}"
@@ -277,7 +283,7 @@ def _parse_numbers(name: str, numbers: ArrayLike) -> Floats:
         raise ArgumentError.of_argument(name, type(numbers).__name__, "expected an array of numbers") from None
 
 
-def _priority_levels(violations: int, objectives: int) -> tuple[Level, ...]:
+def _make_priority_levels(violations: int, objectives: int) -> tuple[Level, ...]:
     """Return the priority levels by which scores are ranked: constraints with the goal 0, then objectives.
 
     violations, objectives: numbers of constraints and of objectives.

@@ -49,15 +49,15 @@ def plan(
     """Plan a path across a scenario's terrain and around its threats, within the limits of its aircraft.
 
     scenario: a built-in scenario's name (`planfly.scenarios()` lists them), a TOML file's path, or a `Scenario`.
-    waypoints: a path of your own, (w, 3): east and north of the scenario's origin and altitude AMSL, m, from the
-    scenario's start to its destination.  Nothing is searched: the path is scored and certified as it stands.  Margins
-    of the planner that it does not meet make the plan "not feasible" and are named by the verdict, which judges only
-    the flight; `Plan.margins` has them as numbers, also for a path that leaves the terrain.
+    waypoints: your own path instead of a search, (w, 3): east and north of the scenario's origin and altitude AMSL, m,
+    from the scenario's start to its destination.  The path is scored and certified without changes.  If it misses a
+    margin of the planner, the plan is "not feasible"; the verdict names the margin, but judges only the flight.
+    `Plan.margins` has all margins as numbers, also for a path that leaves the terrain.
     out: file for the plan.json, in which {name} and {seed} stand for the scenario's name and the seed.
     overwrite: True replaces an existing file.
 
-    seed: seed of the search; None takes the seed of the scenario, or 1.  The default algorithm seldom draws: most of
-    its plans are the same for every seed.
+    seed: seed of the search; None takes the seed of the scenario, or 1.  The default algorithm seldom uses random
+    numbers: most of its plans are the same for every seed.
     algorithm: a name of ``planfly plan --help``; None for the default.
     budget: maximum number of evaluations.
     seconds: time limit, after which the best path found is returned.
@@ -81,21 +81,24 @@ def plan(
     world = _with_budget(load_scenario_with_options(scenario, options), options["budget"])
     if waypoints is None:
         return _search_and_write(world, scenario, None, options, out, overwrite)
-    path, target = _check_waypoints(world, waypoints, options), _plan_target(world, scenario, options, out, overwrite)
+    path, target = (
+        _check_waypoints(world, waypoints, options),
+        _find_plan_target(world, scenario, options, out, overwrite),
+    )
     return _write_plan(make_given_plan(world, load_uav(world), choose_seed(world, options["seed"]), path), target)
 
 
-# Options of a search, which a path of one's own does not have.
+# Options that apply only to a search, not to waypoints that the user names.
 _SEARCH_OPTIONS = ("algorithm", "budget", "seconds", "stop")
-# Tolerance within which a path of one's own begins at the scenario's start and ends at its destination, m.
+# Largest distance of the user's first and last waypoint from the scenario's start and destination, m.
 _END_TOLERANCE_M = 1.0
 
 
 def _check_waypoints(scenario: Scenario, waypoints: ArrayLike, options: PlanOptions) -> Floats:
     """Return the user's waypoints as an array (w, 3), m.
 
-    Raises ArgumentError for another shape, for a value that is not finite or outside the map, naming its row and
-    column, for ends that are not those of the scenario, and for an option of a search.
+    Raises ArgumentError for another shape, for a value that is not finite or outside the map, for a path that does not
+    lead from the scenario's start to its destination, and for an option of a search.
     """
     for name, value in options.items():
         if name in _SEARCH_OPTIONS and value is not None:
@@ -103,7 +106,7 @@ def _check_waypoints(scenario: Scenario, waypoints: ArrayLike, options: PlanOpti
                 name, value, "cannot be combined with waypoints, because nothing is then searched"
             )
     expected = "expected an array (w, 3) of at least 2 rows: east, north and altitude AMSL, m"
-    coordinates = _coordinate_columns(waypoints)
+    coordinates = _select_coordinate_columns(waypoints)
     try:
         path = np.array(coordinates, dtype=np.float64)
     except (TypeError, ValueError):
@@ -127,10 +130,10 @@ def _check_waypoints(scenario: Scenario, waypoints: ArrayLike, options: PlanOpti
 _COLUMN_NAMES = (("east_m", "north_m", "amsl_m"), ("east", "north", "amsl"), ("east_m", "north_m", "up_amsl_m"))
 
 
-def _coordinate_columns(waypoints: Any) -> Any:
-    """Return the coordinates of a data frame in the order of waypoints; anything else, also without names, unchanged.
+def _select_coordinate_columns(waypoints: Any) -> Any:
+    """Return the columns east, north and altitude of a data frame of waypoints, in this order.
 
-    Raises ArgumentError for columns of other names, whose order is not known.
+    Anything without named columns is returned unchanged.  Raises ArgumentError for other names, whose order is unknown.
     """
     names = list(getattr(waypoints, "columns", ()))
     if not any(isinstance(name, str) for name in names):
@@ -179,7 +182,7 @@ def replan(
 
 
 def _with_budget(scenario: Scenario, budget: int | None) -> Scenario:
-    """Return a scenario with another budget of evaluations; None keeps the scenario."""
+    """Return a scenario with another maximum number of evaluations; None returns the scenario unchanged."""
     return scenario if budget is None else with_planner(scenario, "budget", budget=budget)
 
 
@@ -202,7 +205,7 @@ def _search_and_write(
     source: the scenario as the caller named it; its file must not be overwritten.
     flown_plan_and_leg: the plan being flown and the leg to plan from; None for a new plan.
     """
-    seed, target = choose_seed(world, options["seed"]), _plan_target(world, source, options, out, overwrite)
+    seed, target = choose_seed(world, options["seed"]), _find_plan_target(world, source, options, out, overwrite)
     uav, should_stop = load_uav(world), stop_condition(options["seconds"], options["stop"])
     with stage(f"planning {world.name}", "planning") as advance:
         plan = make_plan(
@@ -217,7 +220,7 @@ def _search_and_write(
     return _write_plan(plan, target)
 
 
-def _plan_target(
+def _find_plan_target(
     world: Scenario, source: Scenario | str | Path, options: PlanOptions, out: str | Path | None, overwrite: bool
 ) -> Path | None:
     """Return the file for a plan of a scenario; None to write no file."""
@@ -243,23 +246,23 @@ def stop_condition(seconds: float | None, stop: Callable[[], bool] | None) -> St
     "".  The time in which kernels are compiled does not count.
     """
 
-    def working_time() -> float:
+    def measure_working_time() -> float:
         """Return the time of the process without the compilation of kernels, s."""
         return time.monotonic() - COMPILE_TIMER.seconds
 
-    start = working_time()
+    start = measure_working_time()
 
     def should_stop() -> str:
         """Return the reason to stop the search now; "" to continue."""
         if stop is not None and stop():
             return "interrupted"
-        return "budget" if seconds is not None and working_time() - start >= seconds else ""
+        return "budget" if seconds is not None and measure_working_time() - start >= seconds else ""
 
     return should_stop
 
 
 def conditions_of_plan(plan: Plan) -> Conditions:
-    """Return the aircraft, speed, weather, autopilot and terrain that a plan was made for."""
+    """Return the conditions for which a plan was made: aircraft, airspeed, weather, autopilot and terrain."""
     aircraft, _ = find_aircraft_and_energy(plan.scenario)
     autopilot = load_autopilot(plan.scenario, aircraft)
     return plan_conditions(plan.scenario, aircraft.name, cruise_airspeed(plan.scenario, aircraft, autopilot), autopilot)
@@ -268,8 +271,8 @@ def conditions_of_plan(plan: Plan) -> Conditions:
 def failures_to_expect(plan: Plan) -> tuple[str, ...]:
     """Return the known causes that are expected to make more than 5 % of dispersed flights fail.
 
-    Each cause is one line with a remedy.  The result is empty for a plan that is not safe.  The landing on a
-    steep final is flown 40 times, which takes up to half a minute.
+    Each cause is one line with a remedy.  The result is empty for a plan that is not safe.  For a plan with a steep
+    final approach, the landing is flown 40 times, which takes up to half a minute.
     """
     from planfly.campaigns.landing_trial import steep_landing_failures
 

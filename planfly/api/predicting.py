@@ -17,7 +17,7 @@ from logs.importers.motion import MotionLog
 from logs.importers.motion_log import read_motion
 from logs.recording.reader import read_log
 from logs.verdict.imported.model_comparison import Reflight
-from planfly.api.identifying import records_and_outputs
+from planfly.api.identifying import read_records_and_outputs
 from planfly.api.imported import read_imported
 from planfly.arguments import check_arguments
 from planfly.campaigns.campaign_base import TURBULENCE_LEVELS, with_aircraft_draws
@@ -99,14 +99,16 @@ def predict(
     overwrite: bool = False,
     **options: Unpack[LogOptions],
 ) -> Predicted:
-    """Predict a logged flight with a model that has not seen it, as bands of 95 %, and count how often it is inside.
+    """Predict a logged flight as bands of 95 % with a model that has not seen it.
+
+    The result states which fraction of the flight lies inside each band.
 
     log: a log as `import_log` and `identify_aircraft` read it, or a flight log that `import_log` wrote.
     out: a folder for a page and a picture; None writes no files.  overwrite: True replaces results in the folder.
     by: "controls" follows the logged controls over windows of 2 s; "mission" flies the logged mission with the
     autopilot's model in the logged wind; None for the controls if the log has them.
-    start: start of the judged part, s of the log, with ``by="controls"``; the rows before it calibrate the bands.  None
-    for the end of the part from which the aircraft was identified, or the middle of a log that was not used.
+    start: start of the judged part, s of the log, only with ``by="controls"``; the rows before it calibrate the bands.
+    None takes the end of the part from which the aircraft was identified, or the middle of a log that was not used.
     aircraft: name or folder of the aircraft, which is required.  The other options are those of `import_log`.
     Raises a `planfly.PlanflyError` for bad input; then nothing is written.
     """
@@ -171,18 +173,18 @@ def _read_motion(path: Path, *, required: bool) -> MotionLog | None:
 def _predict_by_controls(motion: MotionLog, aircraft: Aircraft, start: float | None) -> Predicted:
     """Predict a flight from its logged controls, over windows of 2 s.
 
-    start: start of the judged part, s of the log; None for the default of `_judged_start`.
+    start: start of the judged part, s of the log; None for the default of `_choose_judged_start`.
     Raises LogError if there is too little usable flight before or after the start.
     """
     with stage("reading a log"):
-        records, _ = records_and_outputs(motion, aircraft, MIN_CHECK_SECONDS)
-    start = _judged_start(motion, aircraft, records, start)
+        records, _ = read_records_and_outputs(motion, aircraft, MIN_CHECK_SECONDS)
+    start = _choose_judged_start(motion, aircraft, records, start)
     earlier = [part for record in records if len((part := record.part_between(-math.inf, start)).time) > 1]
     judged_records = [part for record in records if len((part := record.part_between(start, math.inf)).time) > 1]
     for parts, side in ((earlier, "before"), (judged_records, "from")):
         seconds = sum(part.seconds for part in parts)
         if seconds < MIN_CHECK_SECONDS:
-            allowed = f"at least {MIN_CHECK_SECONDS:g} s of usable flight are needed before and after it"
+            allowed = f"at least {MIN_CHECK_SECONDS:g} s of usable flight are needed before and after this time"
             message = f"{motion.source}: {seconds:.1f} s of usable flight {side} {start:.1f} s: {allowed}"
             raise LogError(message, file=motion.source, field="start", value=start, allowed=allowed)
     with stage("predicting") as advance:
@@ -190,7 +192,7 @@ def _predict_by_controls(motion: MotionLog, aircraft: Aircraft, start: float | N
         clocks = estimate_clocks(earlier, central)[-1]
         prediction = BlindPrediction(earlier, judged_records, clocks, central)
         models = []
-        for number, draw in enumerate(drawn_flights(aircraft), 1):
+        for number, draw in enumerate(draw_flight_variations(aircraft), 1):
             models.append(varied_model(aircraft, draw.variation))
             advance(number, DRAWS, f"aircraft {number} of {DRAWS}")
         bands = prediction.bands(models)
@@ -198,14 +200,16 @@ def _predict_by_controls(motion: MotionLog, aircraft: Aircraft, start: float | N
     end = float(judged_records[-1].time[-1])
     heading = (
         f"{motion.source} by the logged controls: {count_text(count, 'window')} of 2 s from {start:.1f} s to"
-        f" {end:.1f} s, {DRAWS} flights each; their errors are drawn from"
+        f" {end:.1f} s, {DRAWS} flights each; the model's errors are drawn from"
         f" {count_text(before, 'window')} before {start:.1f} s"
     )
-    lines = (heading, *_band_lines(bands))
+    lines = (heading, *_format_band_lines(bands))
     return Predicted("controls", bands, DRAWS, count, start, end, motion.source, aircraft.name, heading, lines)
 
 
-def _judged_start(motion: MotionLog, aircraft: Aircraft, records: Sequence[FlightRecord], start: float | None) -> float:
+def _choose_judged_start(
+    motion: MotionLog, aircraft: Aircraft, records: Sequence[FlightRecord], start: float | None
+) -> float:
     """Return the start of the judged part, s of the log.
 
     The default is the end of the part from which the aircraft was identified, or the middle of a log that was not used
@@ -213,7 +217,7 @@ def _judged_start(motion: MotionLog, aircraft: Aircraft, records: Sequence[Fligh
     start within the part from which it was identified.
     """
     first_time, last_time = motion.inertial.time[[0, -1]].tolist()
-    used = _used_until(aircraft, motion.sha256, first_time)
+    used = _find_used_end(aircraft, motion.sha256, first_time)
     if used is None:
         return float(np.median(np.concatenate([record.time for record in records]))) if start is None else start
     if used >= last_time:
@@ -221,14 +225,12 @@ def _judged_start(motion: MotionLog, aircraft: Aircraft, records: Sequence[Fligh
         message = f"{motion.source}: {aircraft.name} was identified from the whole log: {allowed}"
         raise LogError(message, file=motion.source, field="aircraft", value=aircraft.name, allowed=allowed)
     if start is not None and start < used:
-        allowed = (
-            f"expected at least {used:g} s: the rows before were used to identify {aircraft.name}, and test nothing"
-        )
+        allowed = f"expected at least {used:g} s, because {aircraft.name} was identified from the rows before this time"
         raise PlanflyError.of_argument("start", start, allowed)
     return used if start is None else start
 
 
-def _used_until(aircraft: Aircraft, sha256: str, start: float) -> float | None:
+def _find_used_end(aircraft: Aircraft, sha256: str, start: float) -> float | None:
     """Return the time up to which a log was used to identify an aircraft, s; infinity for the whole log.
 
     Returns None if no part of the log was used.  Logs are recognised by the hash of their data.
@@ -244,7 +246,7 @@ def _used_until(aircraft: Aircraft, sha256: str, start: float) -> float | None:
     return max(ends, default=None)
 
 
-def drawn_flights(aircraft: Aircraft, count: int = DRAWS) -> list[DrawnFlight]:
+def draw_flight_variations(aircraft: Aircraft, count: int = DRAWS) -> list[DrawnFlight]:
     """Draw variations of aircraft, wind, turbulence and position for flights that predict a logged flight.
 
     The quantities are drawn as in a campaign with planfly's own dispersions, with two differences: the wind varies by
@@ -282,21 +284,21 @@ def _predict_by_mission(path: Path, aircraft: Aircraft, options: LogOptions) -> 
         log = read_log(path)
         setup, track = log.setup, log.track
         if setup.imported_log is None:
-            message = f"{path}: flown by planfly itself: expected a log that `planfly import` wrote"
+            message = f"{path}: the flight was flown by planfly itself: expected a log that `planfly import` wrote"
             raise LogError(message, file=path)
     else:
         flight = read_imported(path, **options)
         setup, track = flight.setup, flight.track
     name = str(aircraft.folder) if not aircraft.is_embedded else aircraft.name
     with stage("flying by draws") as advance:
-        flights = fly_draws(setup, track, name, drawn_flights(aircraft), advance)
-    bands = _profile_bands(flights)
+        flights = fly_draws(setup, track, name, draw_flight_variations(aircraft), advance)
+    bands = _compute_profile_bands(flights)
     stretch = flights[0].stretch
     heading = (
         f"{path} by its mission: {stretch.mode} from {stretch.start:.1f} s to {stretch.end:.1f} s, {len(flights)} of"
         f" {DRAWS} flights with other aircraft, wind and turbulence; no band is fitted to the log"
     )
-    lines = (heading, *_band_lines(bands))
+    lines = (heading, *_format_band_lines(bands))
     ends = tuple(flights[0].ends.tolist())
     return Predicted(
         "mission",
@@ -313,7 +315,7 @@ def _predict_by_mission(path: Path, aircraft: Aircraft, options: LogOptions) -> 
     )
 
 
-def _profile_bands(flights: Sequence[Reflight]) -> tuple[Band, ...]:
+def _compute_profile_bands(flights: Sequence[Reflight]) -> tuple[Band, ...]:
     """Return the band of each quantity of simulated flights, over the distance along the legs."""
     flown_profile, bands = flights[0].flown, []
     for field, (name, unit, factor) in _PROFILE_QUANTITIES.items():
@@ -322,8 +324,8 @@ def _profile_bands(flights: Sequence[Reflight]) -> tuple[Band, ...]:
     return tuple(bands)
 
 
-def _band_lines(bands: Sequence[Band]) -> list[str]:
-    """Return a line for each band: the fraction of the flight inside, and the width of the band."""
+def _format_band_lines(bands: Sequence[Band]) -> list[str]:
+    """Return a line for each band: the fraction of the flight inside the band, and the band's width."""
     lines = []
     for band in bands:
         if math.isnan(band.inside):

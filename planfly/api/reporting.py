@@ -80,7 +80,7 @@ def figures(source: Source) -> "dict[str, Figure]":
     # Imported here: only pictures need matplotlib.
     from logs.views.figures import draw_figures
 
-    content = _report_content(source)
+    content = _read_report_content(source)
     return draw_figures(content.setup, content.track, content.verdict)
 
 
@@ -94,7 +94,7 @@ def report(
     overwrite: bool = False,
     command: str = "planfly.report",
 ) -> WrittenReport:
-    """Write ``report.html``, ``map.png`` and ``profile.png`` into a folder, which is made if it is missing.
+    """Write ``report.html``, ``map.png`` and ``profile.png`` into a folder, made if missing.
 
     source: see `planfly.figures`.
     out: the folder.
@@ -113,7 +113,7 @@ def report(
     from logs.recording.setup_attachments import package_versions
     from logs.views.report.page import write_report
 
-    content = _report_content(source)
+    content = _read_report_content(source)
     folder = clean_folder(out, LOG_FIGURES, overwrite=overwrite)
     with stage("drawing", "drawing a report"):
         files = write_report(
@@ -181,8 +181,8 @@ def compare(
     return comparison
 
 
-def _report_content(source: Source) -> _ReportContent:
-    """Return the flight or plan that a report shows, with its setup and verdict.
+def _read_report_content(source: Source) -> _ReportContent:
+    """Return the setup, track and verdict of a flight or plan, for a report.
 
     A plan is judged by its geometry, a log by its rows.
     """

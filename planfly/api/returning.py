@@ -130,12 +130,12 @@ class ReturnsResult:
 
     @property
     def no_return_line(self) -> str:
-        """Text on the point after which the battery is too low for a return."""
+        """Line on the point of the flight after which the battery is too low for a return."""
         return point_of_no_return_text(self.returns)
 
     @property
     def glide_headline(self) -> str:
-        """One line on the reach of the aircraft without its engine."""
+        """One line on the places that the aircraft can reach after an engine failure."""
         return glides_headline(self.glides)
 
     @property
@@ -170,14 +170,14 @@ class ReturnsResult:
             notes.append(unknown_text)
         if self.returns.lands:
             notes.append(
-                "a return to a landing sequence has to keep the required height above ground up to the sequence's first"
-                " item, and only off the ground on the approach after it; the landing is not judged"
+                "a return to a landing sequence must keep the required height above ground up to the sequence's first"
+                " item; on the approach after that item it must only stay off the ground, and the landing is not judged"
             )
         parameters = self.setup.autopilot.parameters
         if parameters is None or not parameters.source:
             notes.append(
                 "no parameter file was given: the settings above are defaults, not the settings of your aircraft; "
-                "--params names its parameter file"
+                "name its parameter file with --params"
             )
         if self.setup.scenario.terrain is None:
             notes.append("no terrain was given; name an elevation file with --terrain")
@@ -215,7 +215,7 @@ def returns(
 
     what: a `Plan`, or the path of a plan.json, .waypoints or .plan, which is flown first; or a flight, which is a
     result of `planfly.fly`, a flight log or its path, or an autopilot's log.
-    every: time between two returns, s.
+    every: time between the starts of two returns, s.
     suggest: True looks for remedies that make all returns safe.
     sitl: the ArduPlane program, which then also flies the worst returns, spaced far apart.
     points: number of returns that the program flies.
@@ -309,7 +309,9 @@ def _judge_mission(setup: FlightSetup, request: _ReturnsRequest) -> ReturnsResul
 def _judge_flight(setup: FlightSetup, track: Track, request: _ReturnsRequest, end_reason: str) -> ReturnsResult:
     """Simulate and judge returns and glides from points of a flight.
 
-    The request states whether remedies are sought too, and the folder into which files are written, if any.
+    If the request says so, remedies are suggested and files are written into its folder.
+
+    end_reason: reason why the flight ended, for the log of the returns.
     """
     world = make_return_world(setup)
     if request.program is not None:

@@ -14,7 +14,7 @@ from flight.simulation.setup import EngineChoice
 from logs.recording.setup_attachments import package_versions
 from logs.verdict.judge_flight import judge_plan_only
 from logs.verdict.verdict import Verdict, verdict_json
-from planfly.api.exporting import judging_parameters_text
+from planfly.api.exporting import format_judging_parameters
 from planfly.api.flying import check_program
 from planfly.arguments import check_arguments
 from planfly.flight_options import RunOptions, load_scenario_with_options, option_defaults
@@ -80,7 +80,7 @@ class RunResult:
     seed: seed of planner and turbulence.
     folder: the folder of the files; the files of earlier rounds are in its subfolders round-0, round-1, ...
     rounds: one or more rounds; the verdict on the last round is the answer.
-    ended: reason why no further round followed.
+    ended: reason why the last round was the last.
     """
 
     scenario: str
@@ -207,10 +207,11 @@ def run_command_line(scenario: str, seed: int, options: Mapping[str, Any]) -> st
 def _fly_rounds(
     task: _RunTask, refine: int, locks: contextlib.ExitStack, on_round: Callable[[Round], None] | None
 ) -> RunResult:
-    """Plan and fly rounds until one is flyable or none is left.
+    """Plan and fly rounds until a flight is flyable, or the maximum number of rounds is reached.
 
-    After a failure, the limits of the next round are tightened.
+    After a failed flight, the next round is planned within tighter limits.
 
+    refine: maximum number of additional rounds.
     locks: exit stack that holds the lock of the folder from the first plan on.
     """
     scenario, uav, folder = task.scenario, task.uav, task.folder
@@ -265,7 +266,7 @@ def _record_round(task: _RunTask, plan: Plan, number: int) -> Round:
     for target in (folder / "mission.waypoints", folder / "mission.plan", *rally):
         write_atomically(target, mission_text(written, mission_kind(target)))
     if plan.procedures is not None and uav.autopilot.parameters is not None:
-        write_atomically(folder / "mission.parm", judging_parameters_text(mission, uav.autopilot)[0])
+        write_atomically(folder / "mission.parm", format_judging_parameters(mission, uav.autopilot)[0])
     if not plan.feasible:
         verdict = judge_plan_only(plan, planning_conditions(task.scenario, uav))
         write_atomically(folder / "verdict.json", verdict_json(verdict))

@@ -103,7 +103,7 @@ class SurveyResult:
 
     @property
     def lost(self) -> bool:
-        """True if too much of a line is lost, or photos overlap less than required; False for unknown lines."""
+        """True if too much of a line is lost, or photos overlap less than required; unknown lines are ignored."""
         lines = [line for lines in self.lines for line in lines if not is_line_unknown(line)]
         return not all(map(is_line_usable, lines)) or any(overlap_faults(overlap) for overlap in self.overlaps)
 
@@ -144,7 +144,7 @@ class SurveyResult:
 
     @property
     def no_remedy_lines(self) -> tuple[str, ...]:
-        """Lines for a survey without a remedy, with the closest trial, and the reason to keep the layout."""
+        """Lines for a survey without a remedy: the changes that were tried, and the trial closest to success."""
         if self.unknown_lines:
             terrain = self.setup.scenario.terrain
             source = "the terrain data" if terrain is None else terrain.source
@@ -153,15 +153,15 @@ class SurveyResult:
                 " be judged; an elevation file of the whole survey is needed (--terrain)",
             )
         texts = [
-            "nothing was found that would help: no distance between photos, turn-around, gates, order, course,"
-            " parameter or airspeed alone, and no longer turn-arounds combined with gates, a parameter or a lower"
+            "no remedy was found: no other distance between photos, turn-around, gates, order, course, parameter or"
+            " airspeed alone makes all lines usable, nor do longer turn-arounds with gates, a parameter or a lower"
             " airspeed"
         ]
         texts += [usable_segments_text(*pair) for pair in zip(self.surveys, self.lines, strict=True)]
         if self.kept:
             texts.append(f"no other layout was tried: {self.kept}")
         if self.nearest is not None:
-            texts.append(f"nearest: {near_miss_text(self.nearest)}")
+            texts.append(f"closest to success: {near_miss_text(self.nearest)}")
         return tuple(texts)
 
     def __repr__(self) -> str:
@@ -197,7 +197,7 @@ def survey(
     Raises a `planfly.PlanflyError` for bad input, and for a mission without a survey.
     """
     check_arguments(seed=options["seed"])
-    own_camera = _parse_camera(camera)
+    user_camera = _parse_camera(camera)
     fixed_options: dict[str, Any] = {**options, "fence": options["fence"] or None, "suggest": suggest or None}
     if out is not None:
         check_output_folder(Path(out), overwrite)
@@ -209,16 +209,16 @@ def survey(
         source = what.setup.imported_log
         if source is not None and "attitude" not in source.holds:
             raise LogError(f"{source.file}: no attitude, so the bank at the photos is unknown", file=source.file)
-        setup = _with_camera(what.setup.in_scenario(_with_parallel_lines_as_survey(what.setup.scenario)), own_camera)
+        setup = _with_camera(what.setup.in_scenario(_with_parallel_lines_as_survey(what.setup.scenario)), user_camera)
         return _write_results(_judge_flown_survey(setup, what.track, what.ended or ""), out, overwrite)
 
     planned_setup = open_flight(what, options)
-    setup = _with_camera(planned_setup.in_scenario(_with_parallel_lines_as_survey(planned_setup.scenario)), own_camera)
+    setup = _with_camera(planned_setup.in_scenario(_with_parallel_lines_as_survey(planned_setup.scenario)), user_camera)
     return _write_results(_fly_survey(setup, suggest), out, overwrite)
 
 
 def _parse_camera(numbers: tuple[float, ...] | None) -> Camera | None:
-    """Return the camera with the given numbers, or None without numbers.
+    """Convert the numbers of a camera, see `survey`, to a `Camera`; return None for None.
 
     Raises ArgumentError for invalid numbers.
     """
@@ -302,15 +302,15 @@ def _write_results(result: SurveyResult, out: str | Path | None, overwrite: bool
             files.append(path)
         if remedy.kind == "parameter":
             path = folder / "parameter.param"
-            write_atomically(path, _remedy_parameter_file(result.setup, remedy))
+            write_atomically(path, _format_remedy_parameters(result.setup, remedy))
             files.append(path)
     return replace(result, files=tuple(files))
 
 
-def _remedy_parameter_file(setup: FlightSetup, remedy: SurveyRemedy) -> str:
-    """Return the user's parameter file with the remedy's parameter set, as text.
+def _format_remedy_parameters(setup: FlightSetup, remedy: SurveyRemedy) -> str:
+    """Return the text of the user's parameter file with the value of the remedy's parameter.
 
-    Without a parameter file, return a new file with only that parameter.
+    If the scenario names no parameter file, the text contains only this parameter.
     """
     params_path, parameter_set = setup.scenario.flight.params, setup.autopilot.parameters
     if params_path is not None and isinstance(parameter_set, ParameterSet):
@@ -325,7 +325,7 @@ def _remedy_parameter_file(setup: FlightSetup, remedy: SurveyRemedy) -> str:
 
 
 def _with_parallel_lines_as_survey(scenario: Scenario) -> Scenario:
-    """Return a scenario that makes the verdict judge all parallel lines as survey lines."""
+    """Return a scenario whose limits make the verdict judge all parallel lines as survey lines."""
     limits = scenario.limits.model_copy(update={"surveys": "lines"})
     return replace(scenario, limits=limits, spec=scenario.spec.model_copy(update={"limits": limits}))
 

@@ -72,9 +72,10 @@ def varied_model(aircraft: Aircraft, variation: Variation) -> BaseModel:
 
 
 class _Probe:
-    """Coefficients of a model's forces and moments at given flow angles, rates and surface deflections."""
+    """JSBSim model of an aircraft, evaluated at chosen flow angles, angular rates and surface deflections."""
 
     def __init__(self, aircraft: Aircraft, variation: Variation | None = None) -> None:
+        """Trim an aircraft for level flight at cruise.  Raises FlightError if there is no such trim."""
         self._aircraft = aircraft
         self._fdm = fdm = Fdm(aircraft, variation=variation)
         read = fdm.properties.getter
@@ -136,25 +137,25 @@ class _Probe:
         )
 
     def coefficients(self) -> Coefficients:
-        """Return the aerodynamic coefficients, by central differences at closed throttle.
+        """Return the aerodynamic coefficients from central differences about zero angle of attack.
 
-        The differences are about zero angle of attack.  The propeller may windmill.
+        The throttle is closed, and the propeller may windmill.
         """
-        at_zero = self._coefficients_at(0.0)
+        at_zero = self._evaluate_coefficients(0.0)
         # Fit drag over lift on the straight part of the lift curve.
         angles = np.radians([-2.0, 0.0, 2.0, 4.0, 6.0])
-        table = np.array([self._coefficients_at(angle)[:2] for angle in angles])
+        table = np.array([self._evaluate_coefficients(angle)[:2] for angle in angles])
         induced, linear, constant = np.polyfit(table[:, 1], table[:, 0], 2)
         min_drag_lift = -0.5 * linear / induced
-        alpha = self._derivative(self._coefficients_at, _ANGLE_STEP_RAD)
-        beta = self._derivative(lambda step: self._coefficients_at(0.0, beta=step), _ANGLE_STEP_RAD)
+        alpha = self._differentiate(self._evaluate_coefficients, _ANGLE_STEP_RAD)
+        beta = self._differentiate(lambda step: self._evaluate_coefficients(0.0, beta=step), _ANGLE_STEP_RAD)
         elevator, aileron, rudder = (
-            self._derivative(partial(self._with_deflection, k), _SURFACE_STEP_RAD) for k in range(3)
+            self._differentiate(partial(self._with_deflection, k), _SURFACE_STEP_RAD) for k in range(3)
         )
         half_span_time = self._span / (2.0 * self._airspeed)
         half_chord_time = self.chord / (2.0 * self._airspeed)
         roll, pitch, yaw = (
-            self._derivative(partial(self._with_rate, k), _RATE_STEP_RAD_S) / size
+            self._differentiate(partial(self._with_rate, k), _RATE_STEP_RAD_S) / size
             for k, size in enumerate((half_span_time, half_chord_time, half_span_time))
         )
         return Coefficients(
@@ -189,17 +190,17 @@ class _Probe:
 
     def _with_deflection(self, surface: int, deflection: float) -> Floats:
         """Return the coefficients (6,) at zero angle of attack with one surface deflected, rad."""
-        return self._coefficients_at(0.0, surfaces=deflection * np.eye(3)[surface])
+        return self._evaluate_coefficients(0.0, surfaces=deflection * np.eye(3)[surface])
 
     def _with_rate(self, axis: int, rate: float) -> Floats:
         """Return the coefficients (6,) at zero angle of attack with an angular rate (rad/s) about one axis."""
-        return self._coefficients_at(0.0, rates=rate * np.eye(3)[axis])
+        return self._evaluate_coefficients(0.0, rates=rate * np.eye(3)[axis])
 
-    def _derivative(self, function: Callable[[float], Floats], step: float) -> Floats:
-        """Return the derivative (6,) of a function at 0 by a central difference."""
+    def _differentiate(self, function: Callable[[float], Floats], step: float) -> Floats:
+        """Return the derivative (6,) of a function of one number at 0, by a central difference."""
         return np.asarray((function(step) - function(-step)) / (2.0 * step))
 
-    def _coefficients_at(
+    def _evaluate_coefficients(
         self, alpha: float, beta: float = 0.0, rates: Floats | None = None, surfaces: Floats | None = None
     ) -> Floats:
         """Return (6,): coefficients of drag, lift, side force, roll, pitch and yaw moment, at closed throttle.
@@ -248,7 +249,7 @@ def _parse_model(aircraft: Aircraft) -> ElementTree.Element | None:
 
 
 def read_motor(aircraft: Aircraft) -> Motor | None:
-    """Return the motor or propeller disc with the constants of a model.
+    """Read the constants of the electric motor or the propeller disc from an aircraft's JSBSim model.
 
     Returns None for a motor model of another form.
     """
@@ -262,7 +263,7 @@ def read_motor(aircraft: Aircraft) -> Motor | None:
         return None
 
 
-def _function_values(function: ElementTree.Element) -> list[float]:
+def _read_function_values(function: ElementTree.Element) -> list[float]:
     """Return the numbers in a JSBSim function, in the order of the file; NaN for an empty element."""
     return [float(value.text or "nan") for value in function.iter("v")]
 
@@ -275,10 +276,10 @@ def _read_propeller_disc(functions: dict[str, ElementTree.Element], volts: float
     exit_function, thrust_function, power = (
         functions[f"motor/{name}"] for name in ("exit-mps", "thrust-n", "battery-power-w")
     )
-    (exit_speed,) = _function_values(exit_function)
-    (area,) = (value for value in _function_values(thrust_function) if value != 0.0)
+    (exit_speed,) = _read_function_values(exit_function)
+    (area,) = (value for value in _read_function_values(thrust_function) if value != 0.0)
     # The factor is half the power given to the air, divided by the efficiency.
-    (half_factor,) = _function_values(power)
+    (half_factor,) = _read_function_values(power)
     is_ducted = any(
         (property_element.text or "").strip() == "motor/airspeed-mps" for property_element in exit_function.iter("p")
     )
@@ -291,27 +292,28 @@ def _read_electric_motor(functions: dict[str, ElementTree.Element], volts: float
     Raises KeyError, ValueError, IndexError or StopIteration for functions of another form.
     """
 
-    def numbers(name: str) -> list[float]:
+    def read_numbers(name: str) -> list[float]:
         """Return the numbers in the JSBSim function with this name."""
-        return _function_values(functions[name])
+        return _read_function_values(functions[name])
 
-    (q2,), (q1,), (q0,) = (numbers(f"motor/q{k}") for k in (2, 1, 0))
-    (damping,) = numbers("motor/b")
-    speed_constants = numbers("motor/driven-rad_sec")
+    # Propeller torque: q2 times speed squared, q1 times speed times airspeed, and q0 times airspeed squared.
+    (q2,), (q1,), (q0,) = (read_numbers(f"motor/q{k}") for k in (2, 1, 0))
+    (damping,) = read_numbers("motor/b")
+    speed_constants = read_numbers("motor/driven-rad_sec")
     torque_per_volt = -next(value for value in speed_constants if value < 0.0)
     # The no-load torque is in this function or in a separate function.
     loss_function = functions.get("motor/loss-n_m")
     no_load_torque = (
-        numbers("motor/loss-n_m")[0]
+        read_numbers("motor/loss-n_m")[0]
         if loss_function is not None
         else next(value for value in speed_constants if 0.0 < value < 2.0)
     )
     # A data sheet's model has the ratio of battery power to these formulas, and the power of the avionics.
-    power_numbers = numbers("motor/battery-power-w")
+    power_numbers = read_numbers("motor/battery-power-w")
     power_ratio, avionics = power_numbers if len(power_numbers) == 2 else (1.0, 0.0)
     back_voltage = damping / torque_per_volt
     thrust_name = "motor/pull-n" if "motor/pull-n" in functions else "motor/thrust-n"
-    thrust = numbers(thrust_name)
+    thrust = read_numbers(thrust_name)
     return ElectricMotor(
         torque=(q2, q1, q0),
         thrust=(thrust[0], thrust[1], thrust[2]),
@@ -319,7 +321,7 @@ def _read_electric_motor(functions: dict[str, ElementTree.Element], volts: float
         resistance=back_voltage / torque_per_volt,
         idle_current=no_load_torque / back_voltage,
         voltage=volts,
-        windmill=numbers("motor/thrust-n")[1] if thrust_name == "motor/pull-n" else 1.0,
+        windmill=read_numbers("motor/thrust-n")[1] if thrust_name == "motor/pull-n" else 1.0,
         power_ratio=power_ratio,
         avionics=avionics,
     )

@@ -44,7 +44,9 @@ def check_battery(records: Sequence[FlightRecord], volts: float) -> None:
     for record in records:
         measured = float(np.median(record.voltage))
         if np.isfinite(measured) and not min_value <= measured <= max_value:
-            allowed = f"a battery of {volts:g} V has {min_value:.3g}..{max_value:.3g} V; state yours, or check the log"
+            allowed = (
+                f"a battery of {volts:g} V has {min_value:.3g}..{max_value:.3g} V; state `battery`, or check the log"
+            )
             raise LogError.at(record.source, "voltage", measured, allowed, shown=f"{measured:.3g} V in flight")
 
 
@@ -65,14 +67,15 @@ def check_commands(records: Sequence[FlightRecord]) -> None:
         for name, surface_range in zip(("elevator", "aileron"), ranges.tolist(), strict=False):
             if surface_range < _MIN_SURFACE_RANGE_RAD and max_bank > _TURN_BANK_RAD:
                 shown = f"moves by {math.degrees(surface_range):.2g} deg in all"
-                reason = f"the aircraft banks to {math.degrees(max_bank):.0f} deg: check its unit (radians?) and scale"
+                bank_text = f"although the aircraft banks to {math.degrees(max_bank):.0f} deg"
+                reason = f"{bank_text}: check unit (radians?) and scale of the {name}"
                 raise LogError.at(source, name, surface_range, reason, shown=shown)
 
 
 def check_power(estimate: Estimate, records: Sequence[FlightRecord], base: BaseModel) -> None:
-    """Raise LogError if a log's mean battery power differs too much from the identified aircraft's.
+    """Raise LogError if the logged battery power differs too much from the identified aircraft's power.
 
-    Without a logged current nothing is checked.
+    Both are means over a log.  Without a logged current nothing is checked.
     """
     if not estimate.with_current:
         return
@@ -97,7 +100,7 @@ def check_power(estimate: Estimate, records: Sequence[FlightRecord], base: BaseM
 def check_estimate(estimate: Estimate, base: BaseModel, outputs: dict[str, int], source: str) -> None:
     """Raise LogError for an estimate with an implausible value.
 
-    Implausible are a reversed control, a lift slope or parameter beyond its limits, and a changing mass.
+    Implausible are a reversed control, a lift slope or a parameter outside its limits, and a mass that changes.
 
     outputs: servo output number of each control that has its own output.
     source: name of the logs, for the one-line message.
@@ -110,9 +113,9 @@ def check_estimate(estimate: Estimate, base: BaseModel, outputs: dict[str, int],
         ):
             output = outputs.get(control)
             if output is None:
-                message = f"the {control} seems reversed: it moves the aircraft the other way"
+                message = f"the {control} seems reversed: it moves the aircraft in the opposite direction"
                 raise LogError(f"{source}: {message}", file=source, field=control)
-            message = f"output {output} seems reversed: {control} moves the aircraft the other way"
+            message = f"output {output} seems reversed: {control} moves the aircraft in the opposite direction"
             raise LogError(
                 f"{source}: {message} (SERVO{output}_REVERSED)", file=source, field=f"SERVO{output}_REVERSED"
             )
@@ -129,18 +132,18 @@ def check_estimate(estimate: Estimate, base: BaseModel, outputs: dict[str, int],
             allowed = f"allowed {min_value:g}..{max_value:g}"
             message = f"{parameter.title} ({parameter.name}) = {value:.2f} is at its bound: {allowed}"
             raise LogError(f"{source}: {message}", file=source, field=parameter.name, value=value, allowed=allowed)
-    change, sd = mass_change(estimate, base)
+    change, sd = estimate_mass_change(estimate, base)
     if abs(change) > MAX_MASS_CHANGE and abs(change) > _MASS_CHANGE_SIGMAS * sd:
         message = f"the mass seems to change by {100.0 * change:+.0f} % within the logs; it must stay the same"
         raise LogError(f"{source}: {message}", file=source, value=change)
 
 
-def mass_change(estimate: Estimate, base: BaseModel) -> tuple[float, float]:
+def estimate_mass_change(estimate: Estimate, base: BaseModel) -> tuple[float, float]:
     """Return the change of mass within the logs, as a fraction of the mass, and its standard deviation.
 
-    An aircraft that burns fuel or drops a load needs an ever smaller angle of attack than its assumed mass requires.
-    The change is the trend of the measured minus the predicted angle of attack, divided by the predicted angle above
-    zero lift.  Returns 0 and infinity if the logs are too short.
+    An aircraft that burns fuel or drops a load needs less and less angle of attack than its assumed mass requires.  The
+    change is the trend of the measured minus the predicted angle of attack, divided by the predicted angle above zero
+    lift.  Returns 0 and infinity if the logs are too short.
     """
     equation = estimate.equations[0]
     c = base.coefficients

@@ -24,8 +24,8 @@ from flight.dynamics.trim import steady_flight
 from flight.guidance.model_gains import gains_from_model, gains_text
 from flight.mission_files.wpl import waypoints_text
 from logs.importers.motion import MotionLog
-from planfly.identification.manoeuvres import identification_mission
-from planfly.identification.model_text import identified_xml
+from planfly.identification.manoeuvres import make_identification_mission
+from planfly.identification.model_text import format_identified_model
 from planfly.identification.propulsion_check import PowerConflict, power_conflict
 from planfly.identification.servos import ServoOutput
 from world.arrays import Floats
@@ -136,11 +136,11 @@ def make_identification(
     outputs: servo output of each control.
     until: time in each log from which rows were not used, s; None if all rows were used.
     """
-    cruise = _airspeeds(logs[-1], base)[0]
+    cruise = _find_airspeeds(logs[-1], base)[0]
     return Identified(base, numbers, estimate, draw_aircraft(estimate), logs, outputs, cruise, until)
 
 
-def folder_files(identified: Identified, name: str, battery: tuple[float, float]) -> dict[str, str]:
+def make_folder_files(identified: Identified, name: str, battery: tuple[float, float]) -> dict[str, str]:
     """Return the text of each file of an identified aircraft's folder by file name, except the HTML page.
 
     The mission of manoeuvres starts at the home position of the last log that has one; without a home position it is
@@ -149,17 +149,17 @@ def folder_files(identified: Identified, name: str, battery: tuple[float, float]
     battery: voltage, V, and energy, J.
     Raises LogError if the identified model has no level flight at cruise.
     """
-    xml = identified_xml(identified.base, name, identified.numbers, identified.estimate.values)
+    xml = format_identified_model(identified.base, name, identified.numbers, identified.estimate.values)
     with temporary_folder("planfly-identified-") as parent:
         folder = parent / name
         folder.mkdir()
         (folder / f"{name}.xml").write_text(xml, encoding="utf-8")
         toml = folder / f"{name}.toml"
-        toml.write_text(_metadata_text(identified, battery, 0.0), encoding="utf-8")
+        toml.write_text(_format_metadata(identified, battery, 0.0), encoding="utf-8")
         _check_level_flight_at_cruise(identified, read_aircraft(folder))
         envelope = load_envelope(read_aircraft(folder))
         min_speed, max_speed = envelope.level_speeds(0.0)
-        toml.write_text(_metadata_text(identified, battery, min_speed, max_speed), encoding="utf-8")
+        toml.write_text(_format_metadata(identified, battery, min_speed, max_speed), encoding="utf-8")
         aircraft = read_aircraft(folder)
         home = next((log.home for log in reversed(identified.logs) if log.home is not None), None)
         files = {
@@ -168,14 +168,14 @@ def folder_files(identified: Identified, name: str, battery: tuple[float, float]
             "gains.toml": gains_text(gains_from_model(aircraft)),
         }
         if home is not None:
-            parameters = flown_parameters(identified.logs[-1])
+            parameters = select_flown_parameters(identified.logs[-1])
             rates = parameters.get("TECS_CLMB_MAX", math.inf), parameters.get("TECS_SINK_MAX", math.inf)
-            mission = identification_mission(aircraft, envelope, *home, max_rates=rates)
+            mission = make_identification_mission(aircraft, envelope, *home, max_rates=rates)
             files["identify.waypoints"] = waypoints_text(mission)
     return files | {
-        **_parameter_file_text_by_name(identified),
-        "ardupilot.toml": _servo_file_text(identified.outputs),
-        "posterior.toml": posterior_text(identified),
+        **_format_parameter_file(identified),
+        "ardupilot.toml": _format_servo_file(identified.outputs),
+        "posterior.toml": format_posterior(identified),
         "draws.csv": draws_text(identified.aircraft_draws()),
     }
 
@@ -199,14 +199,12 @@ def _check_level_flight_at_cruise(identified: Identified, aircraft: Aircraft) ->
     raise LogError(f"{source}: {message}: {allowed}", file=source, field="mass", value=numbers.mass, allowed=allowed)
 
 
-def _airspeeds(log: MotionLog, base: Aircraft) -> tuple[float, float, float]:
-    """Return cruise, minimum and maximum airspeed from a log's parameters, as true airspeeds at `AMSL`.
-
-    The unit is m/s.
+def _find_airspeeds(log: MotionLog, base: Aircraft) -> tuple[float, float, float]:
+    """Return cruise, minimum and maximum airspeed (m/s, true at `AMSL`) from a log's parameters.
 
     Airspeeds that the log does not state are those of the base.  ArduPlane's parameters are equivalent airspeeds.
     """
-    parameters = flown_parameters(log)
+    parameters = select_flown_parameters(log)
     ratio = math.sqrt(1.225 / DENSITY)
     cruise, min_airspeed, max_airspeed = (
         parameters[name] * ratio if name in parameters else base_value
@@ -219,7 +217,7 @@ def _airspeeds(log: MotionLog, base: Aircraft) -> tuple[float, float, float]:
     return cruise, min_airspeed, max_airspeed
 
 
-def _metadata_text(
+def _format_metadata(
     identified: Identified, battery: tuple[float, float], min_level_speed: float, max_level_speed: float = math.inf
 ) -> str:
     """Return the text of ``name.toml``, the metadata of the aircraft.
@@ -227,8 +225,8 @@ def _metadata_text(
     battery: voltage, V, and energy, J.
     min_level_speed, max_level_speed: minimum and maximum airspeed of level flight, m/s.
     """
-    base, value = identified.base, flown_parameters(identified.logs[-1]).get
-    _, stated_min, stated_max = _airspeeds(identified.logs[-1], base)
+    base, get_parameter = identified.base, select_flown_parameters(identified.logs[-1]).get
+    _, stated_min, stated_max = _find_airspeeds(identified.logs[-1], base)
     min_airspeed = max(min(stated_min, identified.cruise), min_level_speed + 0.1)
     cruise = max(identified.cruise, min_airspeed)
     max_airspeed = max(cruise, min(stated_max, max_level_speed))
@@ -242,7 +240,7 @@ def _metadata_text(
         "airspeed_min_mps": min_airspeed,
         "airspeed_max_mps": max_airspeed,
         "stall_speed_mps": stall,
-        "max_bank_deg": value("ROLL_LIMIT_DEG", math.degrees(base.max_bank)),
+        "max_bank_deg": get_parameter("ROLL_LIMIT_DEG", math.degrees(base.max_bank)),
         "max_pitch_deg": math.degrees(base.max_pitch),
         "max_elevator_deg": math.degrees(base.max_elevator),
         "max_aileron_deg": math.degrees(base.max_aileron),
@@ -254,14 +252,14 @@ def _metadata_text(
         "battery_wh": energy / 3600.0,
     }
     lines = [
-        "# What planner, guidance and verdict need to know of the aircraft; posterior.toml says what was estimated.",
+        "# Data of the aircraft for planner, guidance and verdict; posterior.toml states what was estimated.",
         f'title = "aircraft of {identified.numbers.mass:.3g} kg, identified from flight logs"',
         *(f"{key} = {number:.6g}" for key, number in rows.items()),
     ]
     return "\n".join(lines) + "\n"
 
 
-def flown_parameters(log: MotionLog) -> dict[str, float]:
+def select_flown_parameters(log: MotionLog) -> dict[str, float]:
     """Return the parameters of a log that determine flight behaviour, by their current names and units.
 
     The log may use the parameter names of ArduPlane 4.4 and earlier; values out of range are left out.
@@ -278,13 +276,13 @@ def flown_parameters(log: MotionLog) -> dict[str, float]:
     return {name: value for name, value in flight_parameters.items() if not name.startswith(_HARDWARE_PREFIXES)}
 
 
-def _parameter_file_text_by_name(identified: Identified) -> dict[str, str]:
+def _format_parameter_file(identified: Identified) -> dict[str, str]:
     """Return the text of ``ardupilot.parm`` by this file name, from the parameters of the last log.
 
     For a log without parameters the base's file is copied; if the base has no such file, the result is empty.
     """
     log, base_file = identified.logs[-1], identified.base.folder / AIRCRAFT_FILE
-    parameters = flown_parameters(log)
+    parameters = select_flown_parameters(log)
     if not parameters:
         return {AIRCRAFT_FILE: base_file.read_text(encoding="utf-8")} if base_file.is_file() else {}
     lines = [f"# Parameters of {Path(log.source).name} that determine flight; hardware parameters are left out."]
@@ -292,7 +290,7 @@ def _parameter_file_text_by_name(identified: Identified) -> dict[str, str]:
     return {AIRCRAFT_FILE: "\n".join(lines) + "\n"}
 
 
-def _servo_file_text(outputs: Mapping[str, ServoOutput]) -> str:
+def _format_servo_file(outputs: Mapping[str, ServoOutput]) -> str:
     """Return the text of ``ardupilot.toml``: output number, pulses (us) and deflections of each control."""
     lines = ["# Servo output of each control, and the value of the control at each pulse.", ""]
     for name, output in outputs.items():
@@ -308,7 +306,7 @@ def _servo_file_text(outputs: Mapping[str, ServoOutput]) -> str:
     return "\n".join(lines)
 
 
-def posterior_text(identified: Identified) -> str:
+def format_posterior(identified: Identified) -> str:
     """Return the text of ``posterior.toml``: the estimated quantities, their correlation, and the logs."""
     estimate = identified.estimate
     _, samples = identified.performance()
@@ -320,8 +318,8 @@ def posterior_text(identified: Identified) -> str:
     fastest = max_level_speeds(identified.numbers, identified.draws, DENSITY)
     log_fractions = estimate.log_fractions()
     lines = [
-        "# What flight logs say of this aircraft.  Each property is one of the model's: a factor on the base's",
-        "# coefficient, or an offset to it; the model's own value of it is the estimate.",
+        "# Result of the identification of this aircraft from flight logs.  Each quantity is a property of the model:",
+        "# a factor on a coefficient of the base, or an offset to it.  Its value in the model is the estimate.",
         "",
         'source = "flight logs"',
         f"climb_sd_deg = {climb:.3f}    # of the steepest climb at cruise, one standard deviation",
@@ -340,19 +338,19 @@ def posterior_text(identified: Identified) -> str:
         "]",
     ]
     for log in identified.logs:
-        lines += ["", "[[log]]", f'file = "{_toml_safe(Path(log.source).name)}"', f'sha256 = "{log.sha256}"']
+        lines += ["", "[[log]]", f'file = "{_make_toml_safe(Path(log.source).name)}"', f'sha256 = "{log.sha256}"']
         end = log.span[1] if identified.until is None else min(identified.until, log.span[1])
         lines += [f"from_s = {log.span[0]:.9g}  # earlier rows were not used"] if math.isfinite(log.span[0]) else []
         lines += [f"until_s = {end:.9g}  # later rows were not used"] if math.isfinite(end) else []
     for k, parameter in enumerate(PARAMETERS):
         numbers = parameter.prior, parameter.sd, estimate.values[k], estimate.sds[k], log_fractions[k]
         unit = "factor" if parameter.kind == "factor" else "1"
-        lines += _quantity_lines(parameter.property_name, unit, numbers, parameter.title)
+        lines += _format_quantity(parameter.property_name, unit, numbers, parameter.title)
     correlation = estimate.covariance / np.outer(estimate.sds, estimate.sds)
     if not estimate.with_current:
         numbers = 1.0, EFFICIENCY_LOG_SD, 1.0, EFFICIENCY_LOG_SD, 0.0
-        lines += _quantity_lines(
-            DRIVE_POWER, "factor", numbers, "battery power of the motor, which only the current shows"
+        lines += _format_quantity(
+            DRIVE_POWER, "factor", numbers, "battery power of the motor, which only a logged current shows"
         )
         correlation = np.block([[correlation, np.zeros((len(correlation), 1))], [np.zeros(len(correlation)), 1.0]])
     lines += ["", "[correlation]", "# Rows and columns in the order of the quantities.", "matrix = ["]
@@ -360,7 +358,7 @@ def posterior_text(identified: Identified) -> str:
     return "\n".join([*lines, "]", ""])
 
 
-def _quantity_lines(name: str, unit: str, numbers: tuple[float, float, float, float, float], reason: str) -> list[str]:
+def _format_quantity(name: str, unit: str, numbers: tuple[float, float, float, float, float], reason: str) -> list[str]:
     """Return the lines of a ``[[quantity]]`` table.
 
     numbers: prior, standard deviation of the prior, estimate, standard deviation of the estimate, and the fraction of
@@ -376,11 +374,11 @@ def _quantity_lines(name: str, unit: str, numbers: tuple[float, float, float, fl
         f"prior_sd = {prior_sd:g}",
         f"estimate = {value:.6g}",
         f"sd = {sd:.4g}",
-        f"of_log = {log_share:.3f}  # share of the interval that is the logs'",
+        f"of_log = {log_share:.3f}  # fraction of the prior variance that the logs removed",
         f'reason = "{reason}"',
     ]
 
 
-def _toml_safe(text: str) -> str:
+def _make_toml_safe(text: str) -> str:
     """Replace backslashes and double quotes, so that the text needs no escapes in a TOML string."""
     return text.replace("\\", "/").replace('"', "'")

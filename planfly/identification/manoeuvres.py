@@ -26,7 +26,7 @@ _SLOPE_TIME_S = 25.0
 _START_HEIGHT_M = 150.0
 
 
-def identification_mission(
+def make_identification_mission(
     aircraft: Aircraft,
     envelope: Envelope,
     lat_deg: float,
@@ -44,7 +44,7 @@ def identification_mission(
 
     The legs form squares, so that every manoeuvre is flown with the wind and against it.
     """
-    waypoints = list(_waypoints(aircraft, envelope, ground + _START_HEIGHT_M, repeats, max_rates))
+    waypoints = list(_lay_out_waypoints(aircraft, envelope, ground + _START_HEIGHT_M, repeats, max_rates))
     east, north = np.array([waypoint[:2] for waypoint in waypoints]).T
     lats, lons = to_geo(GeoOrigin(lat_deg, lon_deg), east, north)
     items: list[MissionItem] = []
@@ -71,13 +71,13 @@ def identification_mission(
     )
 
 
-def _waypoints(
-    aircraft: Aircraft, envelope: Envelope, base: float, repeats: int, max_rates: tuple[float, float]
+def _lay_out_waypoints(
+    aircraft: Aircraft, envelope: Envelope, start_altitude: float, repeats: int, max_rates: tuple[float, float]
 ) -> Iterator[tuple[float, float, float, float]]:
     """Yield east, north and altitude (m) of each waypoint, and the airspeed on the leg to it (m/s).
 
-    base: altitude of the first waypoint, m AMSL.
-    repeats, max_rates: see `identification_mission`.
+    start_altitude: altitude of the first waypoint, m AMSL.
+    repeats, max_rates: see `make_identification_mission`.
     """
     cruise = aircraft.airspeed
     slow_speed = aircraft.airspeed_min + 0.15 * (cruise - aircraft.airspeed_min)
@@ -99,7 +99,7 @@ def _waypoints(
         (cruise, _SLOPE_TIME_S, -1),
     )
     east = north = 0.0
-    altitude, heading = base, 0.0
+    altitude, heading = start_altitude, 0.0
     yield east, north, altitude, cruise
     for _ in range(repeats):
         for number, (speed, seconds, vertical_direction) in enumerate(sequence):
@@ -110,7 +110,7 @@ def _waypoints(
             rate_angle = math.asin(min(1.0, _RATE_FRACTION * max_rate / speed))
             angle = min(steepest * _SLOPE_FRACTION, rate_angle) if vertical_direction else 0.0
             altitude = max(
-                base - 60.0,
+                start_altitude - 60.0,
                 altitude + vertical_direction * length * math.tan(max(0.0, angle) if math.isfinite(angle) else 0.0),
             )
             east += length * math.sin(heading)

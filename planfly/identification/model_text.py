@@ -27,7 +27,7 @@ _POUND_KG = 0.45359237
 _MAX_ALPHA_RAD = 0.25
 
 
-def identified_xml(base: Aircraft, name: str, numbers: BaseModel, values: Floats) -> str:
+def format_identified_model(base: Aircraft, name: str, numbers: BaseModel, values: Floats) -> str:
     """Return the text of ``name.xml``, the base's JSBSim model with the identified changes.
 
     base: the aircraft whose model is extended.
@@ -46,12 +46,12 @@ def identified_xml(base: Aircraft, name: str, numbers: BaseModel, values: Floats
         if (property_element.text or "").strip().startswith("base/")
     ]
     old_reactions = _find_part(root, "external_reactions", base)
-    reactions = ElementTree.fromstring(_reactions_text(numbers, values, base_properties))
+    reactions = ElementTree.fromstring(_format_reactions(numbers, values, base_properties))
     root.remove(old_reactions)
     # Insert the properties before the elements that read them.
     root.insert(list(root).index(_find_part(root, "flight_control", base)), reactions)
     aerodynamics = _find_part(root, "aerodynamics", base)
-    shared = f"<a>{_lift_functions(numbers)}</a>"
+    shared = f"<a>{_format_lift_functions(numbers)}</a>"
     first_axis = list(aerodynamics).index(_find_part(root, "aerodynamics/axis", base))
     for k, function in enumerate(ElementTree.fromstring(shared)):
         aerodynamics.insert(first_axis + k, function)
@@ -59,7 +59,7 @@ def identified_xml(base: Aircraft, name: str, numbers: BaseModel, values: Floats
     control = " <p> aero/control-factor </p>" if "aero/control-factor" in text else ""
     for axis in aerodynamics.iter("axis"):
         for function in ElementTree.fromstring(
-            f"<a>{_added_function(base, numbers, axis.get('name', ''), drag, control)}</a>"
+            f"<a>{_format_added_function(base, numbers, axis.get('name', ''), drag, control)}</a>"
         ):
             axis.append(function)
     ElementTree.indent(root)
@@ -77,7 +77,7 @@ _REQUIRED_PARTS = (
 
 
 def check_base(base: Aircraft) -> None:
-    """Raise FlightError if the base's model lacks a part that `identified_xml` needs."""
+    """Raise FlightError if the base's model lacks a part that `format_identified_model` needs."""
     try:
         root = ElementTree.parse(base.model_file).getroot()
     except (OSError, ElementTree.ParseError) as error:
@@ -127,17 +127,17 @@ def _set_sizes(root: ElementTree.Element, numbers: BaseModel, base: Aircraft) ->
 # Write the aerodynamic terms that the estimate adds, from the coefficients of the base.
 
 
-def _factor_minus_one(name: str) -> str:
+def _format_factor_minus_one(name: str) -> str:
     """Return the XML of the factor ``ident/NAME`` minus 1."""
     return f"<sum> <p> ident/{name} </p> <v> -1 </v> </sum>"
 
 
-def _product_term(coefficient: float, *factors: str) -> str:
+def _write_product(coefficient: float, *factors: str) -> str:
     """Return the XML product of a coefficient and of factors given as XML."""
     return f"<product> <v> {number(coefficient)} </v> {' '.join(factors)} </product>"
 
 
-def _lift_functions(numbers: BaseModel) -> str:
+def _format_lift_functions(numbers: BaseModel) -> str:
     """Return the JSBSim functions for the lift coefficients of the base and the estimate.
 
     The angle of attack is clipped to plus or minus `_MAX_ALPHA_RAD`.
@@ -147,13 +147,13 @@ def _lift_functions(numbers: BaseModel) -> str:
     <function name="ident/alpha-rad"> <min> <v> {_MAX_ALPHA_RAD} </v>
       <max> <v> {-_MAX_ALPHA_RAD} </v> <p> aero/alpha-rad </p> </max> </min> </function>
     <function name="ident/lift-before">
-      <sum> <v> {number(c.lift_zero)} </v> {_product_term(c.lift_alpha, "<p> ident/alpha-rad </p>")} </sum> </function>
+      <sum> <v> {number(c.lift_zero)} </v> {_write_product(c.lift_alpha, "<p> ident/alpha-rad </p>")} </sum> </function>
     <function name="ident/lift-after">
       <sum> <v> {number(c.lift_zero)} </v> <p> ident/lift-offset </p>
-        {_product_term(c.lift_alpha, "<p> ident/lift-slope </p>", "<p> ident/alpha-rad </p>")} </sum> </function>"""
+        {_write_product(c.lift_alpha, "<p> ident/lift-slope </p>", "<p> ident/alpha-rad </p>")} </sum> </function>"""
 
 
-def _added_function(base: Aircraft, numbers: BaseModel, axis: str, drag: str, control: str) -> str:
+def _format_added_function(base: Aircraft, numbers: BaseModel, axis: str, drag: str, control: str) -> str:
     """Return the JSBSim function that adds the estimated terms to an axis.
 
     Returns "" for an axis without estimated terms.
@@ -176,32 +176,32 @@ def _added_function(base: Aircraft, numbers: BaseModel, axis: str, drag: str, co
     terms_by_axis = {
         "X": (
             f"{drag} ",
-            _product_term(c.drag_zero, _factor_minus_one("zero-lift-drag")),
-            _product_term(c.drag_induced, "<p> ident/induced-drag </p>", after),
-            _product_term(-c.drag_induced / numbers.induced_factor, before),
+            _write_product(c.drag_zero, _format_factor_minus_one("zero-lift-drag")),
+            _write_product(c.drag_induced, "<p> ident/induced-drag </p>", after),
+            _write_product(-c.drag_induced / numbers.induced_factor, before),
         ),
         "Z": ("", "<difference> <p> ident/lift-after </p> <p> ident/lift-before </p> </difference>"),
         "ROLL": (
             "<p> metrics/bw-ft </p>",
-            _product_term(c.roll_beta, _factor_minus_one("dihedral-effect"), beta),
-            _product_term(c.roll_roll, _factor_minus_one("roll-damping"), span_factor, roll),
-            _product_term(c.roll_yaw, _factor_minus_one("roll-from-yaw"), span_factor, yaw),
-            _product_term(c.roll_aileron, _factor_minus_one("aileron-power"), aileron),
+            _write_product(c.roll_beta, _format_factor_minus_one("dihedral-effect"), beta),
+            _write_product(c.roll_roll, _format_factor_minus_one("roll-damping"), span_factor, roll),
+            _write_product(c.roll_yaw, _format_factor_minus_one("roll-from-yaw"), span_factor, yaw),
+            _write_product(c.roll_aileron, _format_factor_minus_one("aileron-power"), aileron),
         ),
         "PITCH": (
             "<p> metrics/cbarw-ft </p>",
             "<p> ident/pitch-offset </p>",
-            _product_term(c.pitch_alpha, _factor_minus_one("pitch-stiffness"), "<p> aero/alpha-rad </p>"),
-            _product_term(c.pitch_rate, _factor_minus_one("pitch-damping"), chord_factor, pitch),
-            _product_term(c.pitch_elevator, _factor_minus_one("elevator-power"), elevator),
+            _write_product(c.pitch_alpha, _format_factor_minus_one("pitch-stiffness"), "<p> aero/alpha-rad </p>"),
+            _write_product(c.pitch_rate, _format_factor_minus_one("pitch-damping"), chord_factor, pitch),
+            _write_product(c.pitch_elevator, _format_factor_minus_one("elevator-power"), elevator),
         ),
         "YAW": (
             "<p> metrics/bw-ft </p>",
-            _product_term(c.yaw_beta, _factor_minus_one("weathercock"), beta),
-            _product_term(c.yaw_roll, _factor_minus_one("yaw-from-roll"), span_factor, roll),
-            _product_term(c.yaw_yaw, _factor_minus_one("yaw-damping"), span_factor, yaw),
-            _product_term(c.yaw_aileron, _factor_minus_one("adverse-yaw"), aileron),
-            _product_term(c.yaw_rudder, _factor_minus_one("rudder-power"), rudder),
+            _write_product(c.yaw_beta, _format_factor_minus_one("weathercock"), beta),
+            _write_product(c.yaw_roll, _format_factor_minus_one("yaw-from-roll"), span_factor, roll),
+            _write_product(c.yaw_yaw, _format_factor_minus_one("yaw-damping"), span_factor, yaw),
+            _write_product(c.yaw_aileron, _format_factor_minus_one("adverse-yaw"), aileron),
+            _write_product(c.yaw_rudder, _format_factor_minus_one("rudder-power"), rudder),
         ),
     }
     if axis not in terms_by_axis:
@@ -219,15 +219,20 @@ _SPEED = "<p> motor/propeller-rad_sec </p>"
 _AIR = "<p> motor/airspeed-mps </p>"
 
 
-def _reactions_text(numbers: BaseModel, values: Floats, base_properties: list[ElementTree.Element]) -> str:
-    """Return the text of ``<external_reactions>``: properties, and forces of motor and propeller."""
+def _format_reactions(numbers: BaseModel, values: Floats, base_properties: list[ElementTree.Element]) -> str:
+    """Return the text of ``<external_reactions>``: properties, and forces of motor and propeller.
+
+    numbers: model values of the base, scaled to the aircraft.
+    values: estimated values of `PARAMETERS`, (n,), which become properties.
+    base_properties: properties of the base's model that are kept.
+    """
     identified_text = "\n".join(
         f'<property value="{values[INDEX[parameter.name]]:.9g}"> {parameter.property_name} </property>'
         for parameter in PARAMETERS
     )
     base_text = "\n".join(ElementTree.tostring(element, encoding="unicode").strip() for element in base_properties)
     motor = numbers.motor
-    functions = _motor_functions(motor)
+    functions = _format_motor_functions(motor)
     functions["battery-power-w"] = f"<product> <p> {DRIVE_POWER} </p> {functions['battery-power-w']} </product>"
     body = "\n".join(f'<function name="motor/{name}"> {text} </function>' for name, text in functions.items())
     torque = """<moment name="torque" frame="BODY">
@@ -250,7 +255,7 @@ def _reactions_text(numbers: BaseModel, values: Floats, base_properties: list[El
 </external_reactions>"""
 
 
-def _motor_functions(motor: Motor) -> dict[str, str]:
+def _format_motor_functions(motor: Motor) -> dict[str, str]:
     """Return the content of each JSBSim function ``motor/NAME`` by NAME, in order of computation."""
     shared = {
         "rho-kg_m3": "<product> <p> atmosphere/rho-slugs_ft3 </p> <v> 515.3788183931961 </v> </product>",
@@ -258,15 +263,15 @@ def _motor_functions(motor: Motor) -> dict[str, str]:
     }
     match motor:
         case ElectricMotor():
-            return shared | _electric_functions(motor)
+            return shared | _format_electric_functions(motor)
         case PropellerDisc():
-            return shared | _disc_functions(motor)
+            return shared | _format_disc_functions(motor)
         case MotorTable():
-            return shared | _table_functions(motor)
+            return shared | _format_table_functions(motor)
     raise TypeError(type(motor).__name__)
 
 
-def _disc_functions(disc: PropellerDisc) -> dict[str, str]:
+def _format_disc_functions(disc: PropellerDisc) -> dict[str, str]:
     """Return JSBSim functions for a propeller disc: exit speed, thrust, torque, battery power and current."""
     exit_property = "<p> motor/exit-mps </p>"
     full_speed = f"<product> <v> {number(disc.exit_speed)} </v> <p> ident/motor-speed </p> </product>"
@@ -288,7 +293,7 @@ def _disc_functions(disc: PropellerDisc) -> dict[str, str]:
     }
 
 
-def _table_functions(motor: MotorTable) -> dict[str, str]:
+def _format_table_functions(motor: MotorTable) -> dict[str, str]:
     """Return JSBSim functions that look up the tables of a motor.
 
     A factor s on motor speed keeps the advance ratio: the tables are read at 1/s of the airspeed, and thrust and torque
@@ -297,7 +302,7 @@ def _table_functions(motor: MotorTable) -> dict[str, str]:
     speed = "<p> ident/motor-speed </p>"
     density_ratio = f"<quotient> {_RHO} <v> {number(motor.density)} </v> </quotient>"
 
-    def table(values: Floats) -> str:
+    def format_table(values: Floats) -> str:
         """Return a JSBSim table of values by scaled airspeed (rows) and throttle (columns)."""
         header = "  ".join(number(throttle) for throttle in motor.throttles.tolist())
         rows = "\n".join(
@@ -308,28 +313,28 @@ def _table_functions(motor: MotorTable) -> dict[str, str]:
           <independentVar lookup="column"> motor/throttle-norm </independentVar>
           <tableData>\n{header}\n{rows}\n</tableData> </table>"""
 
-    def scaled(values: Floats, factor: str, power: int) -> str:
+    def format_scaled(values: Floats, factor: str, power: int) -> str:
         """Return the XML product of a table, a factor, the density ratio and a power of the speed factor."""
-        return f"<product> {factor} {density_ratio} {power * speed} {table(values)} </product>"
+        return f"<product> {factor} {density_ratio} {power * speed} {format_table(values)} </product>"
 
     load = "<p> ident/propeller-torque </p>"
     return {
         "scaled-airspeed-mps": f"<quotient> {_AIR} {speed} </quotient>",
-        "thrust-n": scaled(motor.thrust_factor * motor.thrusts, "<p> ident/thrust </p>", 2),
-        "torque-n_m": scaled(motor.load * motor.torques, load, 2),
-        "battery-power-w": scaled(motor.load * motor.powers, load, 3),
+        "thrust-n": format_scaled(motor.thrust_factor * motor.thrusts, "<p> ident/thrust </p>", 2),
+        "torque-n_m": format_scaled(motor.load * motor.torques, load, 2),
+        "battery-power-w": format_scaled(motor.load * motor.powers, load, 3),
         "battery-current-a": "<quotient> <p> motor/battery-power-w </p> <p> motor/battery-v </p> </quotient>",
     }
 
 
-def _electric_functions(motor: ElectricMotor) -> dict[str, str]:
+def _format_electric_functions(motor: ElectricMotor) -> dict[str, str]:
     """Return JSBSim functions for an electric motor with its propeller.
 
     The speed of the propeller is the positive root of the balance of motor and propeller torque.
     """
     q2, q1, q0 = (number(value) for value in motor.torque)
     kv, resistance = motor.back_voltage, motor.resistance
-    # Divide by the factor on motor speed: KV is divided by it, and its square is KQ KV.
+    # The factor on motor speed divides the torques at a given voltage, and its square divides the damping.
     speed = "<p> ident/motor-speed </p>"
     loss_torque = f"<quotient> <v> {number(kv * motor.idle_current)} </v> {speed} </quotient>"
     drive_torque = (
@@ -340,8 +345,8 @@ def _electric_functions(motor: ElectricMotor) -> dict[str, str]:
         f"<quotient> <v> {number(kv * kv / resistance)} </v> <product> {speed} {speed} </product> </quotient>"
     )
 
-    def positive_root(b: str, c: str) -> str:
-        """Return the XML of the positive root of the quadratic equation with terms `b` and `c`."""
+    def format_positive_root(b: str, c: str) -> str:
+        """Return the XML of the positive root w of q2 w^2 + b w + (q0 + c) = 0, for XML terms `b` and `c`."""
         discriminant = f"""<difference> <product> {b} {b} </product>
           <product> <v> 4 </v> <p> motor/q2 </p> <sum> <p> motor/q0 </p> {c} </sum> </product> </difference>"""
         return f"""<quotient> <difference> <sqrt> <max> <v> 0 </v> {discriminant} </max> </sqrt> {b} </difference>
@@ -360,8 +365,8 @@ def _electric_functions(motor: ElectricMotor) -> dict[str, str]:
         "q1": f"<product> <v> {q1} </v> {torque} {_RHO} {_AIR} </product>",
         "q0": f"<product> <v> {q0} </v> {torque} {_RHO} {_AIR} {_AIR} </product>",
         "b": f"<sum> <p> motor/q1 </p> {back_voltage_damping} </sum>",
-        "driven-rad_sec": positive_root("<p> motor/b </p>", f"{loss_torque} {drive_torque}"),
-        "windmill-rad_sec": positive_root("<p> motor/q1 </p>", loss_torque),
+        "driven-rad_sec": format_positive_root("<p> motor/b </p>", f"{loss_torque} {drive_torque}"),
+        "windmill-rad_sec": format_positive_root("<p> motor/q1 </p>", loss_torque),
         "propeller-rad_sec": "<max> <v> 0 </v> <p> motor/driven-rad_sec </p>"
         " <difference> <p> motor/windmill-rad_sec </p>"
         " <product> <v> 1000000000 </v> <p> motor/braking </p> </product> </difference> </max>",

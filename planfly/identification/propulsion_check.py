@@ -30,12 +30,12 @@ class PowerConflict:
         """Description of the conflict, and of the log that would resolve it.
 
         >>> PowerConflict(55.0, 58.0, 200.0).text
-        'drag takes 55 W, so 58 W would need an efficiency of 95 %: power may be up to 200 W; log the current (BAT)'
+        'drag takes 55 W, so 58 W would need an efficiency of 95 %; power may be up to 200 W; log the current (BAT)'
         """
         efficiency = 100.0 * self.drag_power / self.power
         return (
-            f"drag takes {self.drag_power:.0f} W, so {self.power:.0f} W would need an efficiency of {efficiency:.0f} %:"
-            f" power may be up to {self.largest_power:.0f} W; log the current (BAT)"
+            f"drag takes {self.drag_power:.0f} W, so {self.power:.0f} W would need an efficiency of"
+            f" {efficiency:.0f} %; power may be up to {self.largest_power:.0f} W; log the current (BAT)"
         )
 
 

@@ -98,30 +98,30 @@ def flight_records(
     _check_usable(log)
     if log.elevons:
         _check_flying_wing_base(log, aircraft)
-    grid = _time_grid(log)
+    grid = _make_time_grid(log)
     pulses = (
         _hold_samples(log.outputs, grid)
         if len(log.outputs.time)
         else np.zeros((len(grid), log.outputs.values.shape[1]))
     )
     if len(log.controls.time):
-        controls = _fractions_to_controls(_hold_samples(log.controls, grid), aircraft, log.angles)
+        controls = _convert_fractions(_hold_samples(log.controls, grid), aircraft, log.angles)
     else:
-        controls = _pulses_to_controls(servos or log_outputs(log, aircraft), pulses)
+        controls = _convert_pulses(servos or log_outputs(log, aircraft), pulses)
     # A surface that is commanded beyond its stop stays at the stop.
     stops = np.array([aircraft.max_elevator, aircraft.max_aileron, aircraft.max_rudder, 1.0])
     controls = np.clip(controls, -stops, stops)
     height = _interpolate(log.height, grid)[:, 0]
-    ratio = _interpolate(log.ratio, grid)[:, 0] if len(log.ratio.time) else _true_airspeed_ratio(height)
+    ratio = _interpolate(log.ratio, grid)[:, 0] if len(log.ratio.time) else _compute_true_airspeed_ratio(height)
     airspeed = _interpolate(log.airspeed, grid)[:, 0] * ratio
     inertial = _interpolate(log.inertial, grid)
     attitude = np.column_stack(
         [np.interp(grid, log.attitude.time, np.unwrap(angle)) for angle in log.attitude.values.T]
     )
     battery = _interpolate(log.battery, grid) if _has_current(log) else np.full((len(grid), 2), np.nan)
-    usable = _settled_flight_rows(log, grid, airspeed / ratio, pulses) & (grid < until)
+    usable = _find_settled_flight(log, grid, airspeed / ratio, pulses) & (grid < until)
     velocity, wind = _interpolate(log.velocity, grid), _interpolate(log.wind, grid)
-    is_blocked = _blocked_airspeed_rows(airspeed, velocity[:, :2] - wind, attitude[:, 2])
+    is_blocked = _find_blocked_airspeed(airspeed, velocity[:, :2] - wind, attitude[:, 2])
     usable = _cut_blocked_rows(log, usable, is_blocked)
     flight = FlightRecord(
         time=grid,
@@ -139,23 +139,23 @@ def flight_records(
         source=log.source,
     )
     records = [flight.rows(slice(begin, end)) for begin, end in _find_segments(usable)]
-    _check_duration(log, records, min_seconds, until, cut=bool(_vtol_rows(log, grid, pulses).any()))
+    _check_duration(log, records, min_seconds, until, has_vtol_flight=bool(_find_vtol_rows(log, grid, pulses).any()))
     return records
 
 
 def _check_duration(
-    log: MotionLog, records: list[FlightRecord], min_seconds: float, until: float, *, cut: bool
+    log: MotionLog, records: list[FlightRecord], min_seconds: float, until: float, *, has_vtol_flight: bool
 ) -> None:
     """Raise LogError if the segments are shorter in total than `min_seconds`.
 
     until: time in the log from which rows are not used, s.
-    cut: True if flight on lifting motors was cut.
+    has_vtol_flight: True if the log contains flight on lifting motors, which was cut.
     """
     seconds = sum(record.seconds for record in records)
     if seconds < min_seconds:
-        vtol_note = "; flight on lifting motors is not used" if cut else ""
+        vtol_note = "; flight on lifting motors is not used" if has_vtol_flight else ""
         until_note = f" before {until:g} s" if math.isfinite(until) else ""
-        message = f"only {seconds:.0f} s{until_note} are usable wing-borne flight{vtol_note}"
+        message = f"only {seconds:.0f} s of usable wing-borne flight{until_note}{vtol_note}"
         allowed = f"at least {min_seconds:g} s are needed"
         if min_seconds == MIN_SECONDS:
             allowed += f" to identify an aircraft, and {MIN_CHECK_SECONDS:g} s to check one"
@@ -163,10 +163,11 @@ def _check_duration(
         raise LogError(f"{log.source}: {message}: {allowed}", file=log.source, value=seconds, allowed=allowed)
 
 
-def _pulses_to_controls(outputs: Mapping[str, ServoOutput], pulses: Floats) -> Floats:
+def _convert_pulses(outputs: Mapping[str, ServoOutput], pulses: Floats) -> Floats:
     """Return the controls (n, 4) at the logged pulses: elevator, aileron, rudder (rad) and throttle.
 
     With elevons, elevator and aileron are half the sum and half the difference of the elevons.
+
     pulses: pulses of the m servo outputs, (n, m) us.
     """
     controls = {name: output.control(pulses[:, output.output - 1]) for name, output in outputs.items()}
@@ -177,11 +178,12 @@ def _pulses_to_controls(outputs: Mapping[str, ServoOutput], pulses: Floats) -> F
     return np.column_stack([controls.get(name, zeros) for name in ("elevator", "aileron", "rudder", "throttle")])
 
 
-def _fractions_to_controls(fractions: Floats, aircraft: Aircraft, angles: tuple[bool, bool, bool]) -> Floats:
+def _convert_fractions(fractions: Floats, aircraft: Aircraft, angles: tuple[bool, bool, bool]) -> Floats:
     """Convert logged fractions of full travel, or angles, to the model's controls (n, 4).
 
     The controls are elevator, aileron, rudder (rad) and throttle.  Full travel is the maximum deflection of the base
     aircraft.
+
     fractions: elevator, aileron, rudder and throttle of the log, (n, 4).
     angles: True for each surface whose values are angles, rad.
     """
@@ -236,7 +238,7 @@ _SERIES = {
 def _check_usable(log: MotionLog) -> None:
     """Raise LogError for a log that no identification can use.
 
-    These are logs of other vehicles, without a required series, and with a flap that moves in flight.
+    Unusable are logs of other vehicles, logs without a required series, and logs in which a flap moves in flight.
     """
     if log.vehicle not in ("plane", "unknown"):
         raise LogError(f"{log.source}: flown by a {log.vehicle} ({log.program}): expected a plane", file=log.source)
@@ -244,7 +246,7 @@ def _check_usable(log: MotionLog) -> None:
     for samples, name in ((log.inertial, "inertial"), (log.surface_commands, "outputs")):
         if len(samples.time) < 2:
             series = " and no ".join(log.missing.get(name, ())) or series_names[name]
-            raise LogError(f"{log.source}: no {series}: {_recording_hint(log)}", file=log.source)
+            raise LogError(f"{log.source}: no {series}: {_describe_recording(log)}", file=log.source)
     for samples, name in ((log.attitude, "attitude"), (log.velocity, "velocity"), (log.height, "height")):
         if len(samples.time) < 2:
             raise LogError(f"{log.source}: no {series_names[name]}", file=log.source)
@@ -256,47 +258,50 @@ def _check_usable(log: MotionLog) -> None:
             f"{log.source}: the airspeed stays at {log.airspeed.values[0, 0]:.3g} m/s: expected a sensor's airspeed"
         )
         raise LogError(message, file=log.source, field="airspeed")
-    for number, function in _servo_functions(log).items():
+    for number, function in _read_servo_functions(log).items():
         if function in _FLAPS:
-            min_pulse, max_pulse = _pulse_range(log, number)
+            min_pulse, max_pulse = _find_pulse_range(log, number)
             if max_pulse - min_pulse > 20.0:
                 message = f"output {number} (SERVO{number}_FUNCTION {function}, {_FLAPS[function]}) moves in flight"
                 raise LogError(f"{log.source}: {message}, but its effect is not modelled", file=log.source)
 
 
-def slowest_log_rate(log: MotionLog) -> float:
+def find_slowest_log_rate(log: MotionLog) -> float:
     """Return the lower of the log rates of inertial sensors and surface commands, Hz."""
     return min(log.inertial.rate, log.surface_commands.rate)
 
 
-def recording_setting(log: MotionLog) -> str:
+def describe_recording_setting(log: MotionLog) -> str:
     """Return the setting that records sensors and outputs at a high rate, such as "LOG_BITMASK 65535"."""
     if log.program_kind in _RECORDING_SETTINGS:
         return _RECORDING_SETTINGS[log.program_kind]
     return f"SDLOG_PROFILE {_HIGH_RATE_PROFILE}" if log.program_kind == "px4" else f"LOG_BITMASK {_HIGH_RATE_BITMASK}"
 
 
-def _recording_hint(log: MotionLog) -> str:
-    """Return a hint for a log without a required series: the setting that records the series."""
+def _describe_recording(log: MotionLog) -> str:
+    """Return the setting that records a missing series, as the end of an error message."""
     if log.program_kind == "columns":
         return "expected in [columns] of its table"
     if log.program_kind == "telemetry":
-        return f"{recording_setting(log)} send them"
+        return f"{describe_recording_setting(log)} send them"
     if log.program_kind == "px4":
-        return f"{recording_setting(log)}, the default set at a high rate, records them (PX4 1.14 or later)"
+        return f"{describe_recording_setting(log)}, the default set at a high rate, records them (PX4 1.14 or later)"
     mask = log.parameters.get("LOG_BITMASK")
-    return f"{recording_setting(log)} records them{'' if mask is None else f' (it is {mask:.0f})'}"
+    return f"{describe_recording_setting(log)} records them{'' if mask is None else f' (the log has {mask:.0f})'}"
 
 
-def _pulse_range(log: MotionLog, number: int) -> tuple[float, float]:
+def _find_pulse_range(log: MotionLog, number: int) -> tuple[float, float]:
     """Return the shortest and the longest pulse of an output in the log, us, or zeros without pulses."""
     pulses = log.outputs.values[:, number - 1]
     pulses = pulses[pulses > 0.0]
     return (float(pulses.min()), float(pulses.max())) if len(pulses) else (0.0, 0.0)
 
 
-def _servo_functions(log: MotionLog) -> dict[int, int]:
-    """Return SERVOn_FUNCTION by output number, or ArduPlane's defaults if the log has no such parameter."""
+def _read_servo_functions(log: MotionLog) -> dict[int, int]:
+    """Return the function number of each servo output (SERVOn_FUNCTION), by output number.
+
+    A log without these parameters has ArduPlane's defaults.
+    """
     functions = {
         k: int(log.parameters[f"SERVO{k}_FUNCTION"])
         for k in range(1, log.outputs.values.shape[1] + 1)
@@ -305,12 +310,14 @@ def _servo_functions(log: MotionLog) -> dict[int, int]:
     return functions or {1: _AILERON, 2: _ELEVATOR, 3: _THROTTLE, 4: _RUDDER}
 
 
-def _first_output(log: MotionLog, function: int) -> int:
+def _find_first_output(log: MotionLog, function: int) -> int:
     """Return the number of the first output whose SERVOn_FUNCTION is `function`.
 
     Returns 0 if there is no such output.
     """
-    return next((number for number, output_function in _servo_functions(log).items() if output_function == function), 0)
+    return next(
+        (number for number, output_function in _read_servo_functions(log).items() if output_function == function), 0
+    )
 
 
 def log_outputs(log: MotionLog, aircraft: Aircraft) -> dict[str, ServoOutput]:
@@ -321,7 +328,7 @@ def log_outputs(log: MotionLog, aircraft: Aircraft) -> dict[str, ServoOutput]:
     `LEFT` and `RIGHT`, positive trailing edge down, in place of elevator and aileron.  Raises LogError for mixes that
     are not modelled, and for elevons if the base has a tail.
     """
-    functions = _servo_functions(log)
+    functions = _read_servo_functions(log)
     for number, kind in functions.items():
         if kind in _MIXED_FUNCTIONS:
             message = f"output {number} (SERVO{number}_FUNCTION {kind}) is one half of {_MIXED_FUNCTIONS[kind]}"
@@ -339,15 +346,15 @@ def log_outputs(log: MotionLog, aircraft: Aircraft) -> dict[str, ServoOutput]:
         (LEFT, _ELEVON_LEFT, -aircraft.max_elevator),
         (RIGHT, _ELEVON_RIGHT, -aircraft.max_elevator),
     ):
-        number = _first_output(log, function)
+        number = _find_first_output(log, function)
         if number:
-            min_pulse, trim_pulse, max_pulse, sign = _pulse_travel(log, number)
+            min_pulse, trim_pulse, max_pulse, sign = _read_pulse_travel(log, number)
             outputs[name] = ServoOutput(
                 number, (min_pulse, trim_pulse, max_pulse), (-max_deflection * sign, 0.0, max_deflection * sign)
             )
-    number = _first_output(log, _THROTTLE)
+    number = _find_first_output(log, _THROTTLE)
     if number:
-        min_pulse, _, max_pulse, _ = _pulse_travel(log, number)
+        min_pulse, _, max_pulse, _ = _read_pulse_travel(log, number)
         outputs["throttle"] = ServoOutput(number, (min_pulse, max_pulse), (0.0, 1.0))
     for name in ("throttle",) if LEFT in outputs else ("elevator", "aileron", "throttle"):
         if name not in outputs:
@@ -363,20 +370,20 @@ def _check_flying_wing_base(log: MotionLog, aircraft: Aircraft) -> None:
         raise LogError(f"{log.source}: {message}", file=log.source)
 
 
-def _pulse_travel(log: MotionLog, number: int) -> tuple[float, float, float, float]:
+def _read_pulse_travel(log: MotionLog, number: int) -> tuple[float, float, float, float]:
     """Return the minimum, trim and maximum pulse (us) and the sign of an output.
 
     The sign is -1 if the output is reversed, otherwise 1.
     """
-    value = log.parameters.get
-    min_pulse = value(f"SERVO{number}_MIN", 1100.0)
-    max_pulse = value(f"SERVO{number}_MAX", 1900.0)
-    trim_pulse = min(max(value(f"SERVO{number}_TRIM", 1500.0), min_pulse + 1.0), max_pulse - 1.0)
-    return min_pulse, trim_pulse, max_pulse, -1.0 if value(f"SERVO{number}_REVERSED", 0.0) > 0.0 else 1.0
+    get_parameter = log.parameters.get
+    min_pulse = get_parameter(f"SERVO{number}_MIN", 1100.0)
+    max_pulse = get_parameter(f"SERVO{number}_MAX", 1900.0)
+    trim_pulse = min(max(get_parameter(f"SERVO{number}_TRIM", 1500.0), min_pulse + 1.0), max_pulse - 1.0)
+    return min_pulse, trim_pulse, max_pulse, -1.0 if get_parameter(f"SERVO{number}_REVERSED", 0.0) > 0.0 else 1.0
 
 
-def _time_grid(log: MotionLog) -> Floats:
-    """Return the times (n,) of the common grid, s: at `GRID_HZ` over the period that all series cover."""
+def _make_time_grid(log: MotionLog) -> Floats:
+    """Return times (n,), s, with the rate `GRID_HZ` over the period that all series of a log cover."""
     series = (log.inertial, log.surface_commands, log.attitude, log.velocity, log.height, log.airspeed, log.wind)
     start_time = max(samples.time[0] for samples in series)
     end_time = min(samples.time[-1] for samples in series)
@@ -389,12 +396,12 @@ def _interpolate(samples: Samples, grid: Floats) -> Floats:
 
 
 def _hold_samples(samples: Samples, grid: Floats) -> Floats:
-    """Resample at the times of the grid, holding each sample until the next sample; return (n, columns)."""
+    """Resample at the times of the grid, (n, columns): each sample holds until the next sample."""
     rows = np.clip(np.searchsorted(samples.time, grid, side="right") - 1, 0, len(samples.time) - 1)
     return np.asarray(samples.values[rows])
 
 
-def _true_airspeed_ratio(amsl: Floats) -> Floats:
+def _compute_true_airspeed_ratio(amsl: Floats) -> Floats:
     """Return the ratio of true to equivalent airspeed in the standard atmosphere.  amsl: altitude, m AMSL."""
     return np.asarray((1.0 - 2.25577e-5 * np.clip(amsl, -500.0, 9000.0)) ** -2.12794)
 
@@ -404,7 +411,7 @@ def _has_current(log: MotionLog) -> bool:
     return len(log.battery.time) > 10 and bool(np.any(log.battery.values[:, 1] > 0.5))
 
 
-def _vtol_rows(log: MotionLog, grid: Floats, pulses: Floats) -> Flags:
+def _find_vtol_rows(log: MotionLog, grid: Floats, pulses: Floats) -> Flags:
     """Return a boolean mask (n,): True where lifting motors run or a VTOL mode is set."""
     rows = np.zeros(len(grid), np.bool_)
     for (start, number), (end, _) in zip(log.modes, (*log.modes[1:], (np.inf, 0)), strict=False):
@@ -414,20 +421,20 @@ def _vtol_rows(log: MotionLog, grid: Floats, pulses: Floats) -> Flags:
         rows |= (grid >= start) & (grid < end)
     if not len(log.outputs.time) or log.parameters.get("Q_ENABLE", 0.0) <= 0.0:
         return rows
-    for number, function in _servo_functions(log).items():
+    for number, function in _read_servo_functions(log).items():
         if function in _LIFT_MOTORS:
             rows |= pulses[:, number - 1] > 1100.0
     return rows
 
 
-def _settled_flight_rows(log: MotionLog, grid: Floats, equivalent_airspeed: Floats, pulses: Floats) -> Flags:
+def _find_settled_flight(log: MotionLog, grid: Floats, equivalent_airspeed: Floats, pulses: Floats) -> Flags:
     """Return a boolean mask (n,): True in settled wing-borne flight without gaps in the data.
 
     Gaps are pauses in sensors, surface commands, airspeed or wind.  The first `_SETTLING_TIME_S` of each segment are
     False.
     """
     min_airspeed = log.parameters.get("AIRSPEED_MIN", log.parameters.get("ARSPD_FBW_MIN", 9.0))
-    is_flying = (equivalent_airspeed > _MIN_AIRSPEED_FRACTION * min_airspeed) & ~_vtol_rows(log, grid, pulses)
+    is_flying = (equivalent_airspeed > _MIN_AIRSPEED_FRACTION * min_airspeed) & ~_find_vtol_rows(log, grid, pulses)
     sensors = [
         (samples, _MAX_SENSOR_GAP_S) for samples in (log.inertial, log.surface_commands, log.attitude, log.velocity)
     ]
@@ -442,20 +449,22 @@ def _settled_flight_rows(log: MotionLog, grid: Floats, equivalent_airspeed: Floa
     return is_usable
 
 
-def _blocked_airspeed_rows(airspeed: Floats, air_velocity: Floats, heading: Floats) -> Flags:
+def _find_blocked_airspeed(airspeed: Floats, air_velocity: Floats, heading: Floats) -> Flags:
     """Return a boolean mask (n,): True where the airspeed sensor is blocked.
 
-    In a window with a blocked sensor the airspeed hardly varies, although the ground velocity minus wind does.
+    In a window with a blocked sensor the airspeed hardly varies, although the ground velocity minus wind along the
+    heading varies.
+
     air_velocity: ground velocity minus wind, to north and east, (n, 2) m/s.
     heading: (n,) rad.
     """
-    along = air_velocity[:, 0] * np.cos(heading) + air_velocity[:, 1] * np.sin(heading)
-    length = round(_COMPARED_WINDOW_S * GRID_HZ)
+    air_speed_ahead = air_velocity[:, 0] * np.cos(heading) + air_velocity[:, 1] * np.sin(heading)
+    window_rows = round(_COMPARED_WINDOW_S * GRID_HZ)
     is_blocked = np.zeros(len(airspeed), np.bool_)
     # Windows overlap by nine tenths.
-    for begin in range(0, len(airspeed) - length + 1, length // 10):
-        rows = slice(begin, begin + length)
-        if airspeed[rows].std() < _BLOCKED_AIRSPEED_SD_MPS and along[rows].std() > _MOVING_AIRSPEED_SD_MPS:
+    for begin in range(0, len(airspeed) - window_rows + 1, window_rows // 10):
+        rows = slice(begin, begin + window_rows)
+        if airspeed[rows].std() < _BLOCKED_AIRSPEED_SD_MPS and air_speed_ahead[rows].std() > _MOVING_AIRSPEED_SD_MPS:
             is_blocked[rows] = True
     return is_blocked
 
@@ -471,7 +480,7 @@ def _cut_blocked_rows(log: MotionLog, usable: Flags, is_blocked: Flags) -> Flags
     seconds = float(usable.sum()) / GRID_HZ
     if blocked_seconds > _MAX_BLOCKED_FRACTION * seconds:
         shown = f"hardly varies for {blocked_seconds:.0f} s of {seconds:.0f} s of flight"
-        allowed = "ground velocity minus wind does: check the sensor"
+        allowed = "the ground velocity minus wind varies: check the sensor"
         raise LogError.at(log.source, "airspeed", blocked_seconds, allowed, shown=shown)
     return usable & ~is_blocked
 

@@ -37,7 +37,7 @@ class ServoOutput:
 
     @property
     def reversed(self) -> "ServoOutput":
-        """Return a copy of the output with the opposite direction."""
+        """The same output with the opposite direction."""
         return ServoOutput(self.output, self.pulse, tuple(-value for value in self.value))
 
 
@@ -60,10 +60,11 @@ def read_servos(file: Path) -> Mapping[str, ServoOutput]:
             angles = entry.get("value") or [math.radians(angle) for angle in entry["value_deg"]]
             pulses = [float(pulse) for pulse in entry["pulse_us"]]
             if len(pulses) != len(angles) or len(pulses) < 2 or any(np.diff(pulses) <= 0.0):
-                raise ValueError("pulse_us must rise, with as many values")
+                raise ValueError("pulse_us must increase, and have one value each")
             outputs[name] = ServoOutput(int(entry["output"]), tuple(pulses), tuple(float(angle) for angle in angles))
     except OSError as error:
         raise FlightError(f"{file}: {error.strerror}", file=file) from None
     except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise FlightError(f"{file}: {' '.join(str(error).split())}: no table of servo outputs", file=file) from None
+        message = f"{file}: {' '.join(str(error).split())}: not a table of servo outputs"
+        raise FlightError(message, file=file) from None
     return outputs

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 MAX_SINK_FRACTION = 0.10
 # Maximum half width of the 95 % interval of the power in level flight, as a fraction of the estimate.
 MAX_POWER_FRACTION = 0.20
-# Duration of a glide that shows what half an hour of powered flight does not show, s; from
+# Duration of a glide at idle that narrows the interval of the sink more than half an hour of powered flight, s; from
 # `benchmarks.identification_information`.
 GLIDE_TIME_S = 20
 
@@ -54,7 +54,7 @@ def wide_quantities(sink: Interval, power: Interval, *, with_current: bool) -> t
             "power in level flight",
             power,
             MAX_POWER_FRACTION,
-            speed_runs if with_current else "with the battery's current logged (BAT); no manoeuvre does without it",
+            speed_runs if with_current else "with the battery's current logged (BAT); without it no manoeuvre helps",
         ),
     ):
         half_width = 0.5 * (upper - lower) / abs(value)

@@ -76,7 +76,7 @@ def _make_scenario() -> Scenario:
     return scenario_from_spec(tomllib.loads(SCENARIO_TEXT), "field")
 
 
-def _make_scenario_and_airframe() -> tuple[Scenario, Uav]:
+def _make_scenario_and_uav() -> tuple[Scenario, Uav]:
     """Return the scenario of `_make_scenario` and its UAV."""
     scenario = _make_scenario()
     return scenario, load_uav(scenario)
@@ -102,13 +102,13 @@ def _compile_rank_kernels() -> None:
 
 def _compile_planner_kernels(part: str) -> None:
     """Compile the kernels of one part of the planner.  part: a name in `PARTS`, or `FRONT`."""
-    scenario, uav = _make_scenario_and_airframe()
+    scenario, uav = _make_scenario_and_uav()
     call_kernels(part, scenario, uav.limits)
 
 
 def _compile_flight_kernels() -> None:
     """Compile the kernels that fly, judge and record a mission."""
-    scenario, uav = _make_scenario_and_airframe()
+    scenario, uav = _make_scenario_and_uav()
     setup = make_setup(scenario, uav, parse_mission(MISSION_TEXT, "field.waypoints"), 1)
     flight = fly_and_judge(setup)
     returns_line(setup, flight.track)
@@ -119,7 +119,7 @@ def _compile_flight_kernels() -> None:
 
 def _compile_glide_kernels() -> None:
     """Compile the kernels that judge returns and glides."""
-    scenario, uav = _make_scenario_and_airframe()
+    scenario, uav = _make_scenario_and_uav()
     setup = make_setup(scenario, uav, parse_mission(MISSION_TEXT, "field.waypoints"), 1)
     return_summary(setup, None).data_for_pictures()
 

@@ -149,6 +149,7 @@ class ServedFlights:
     """Factory of a flight process, which judges missions in the served scenario and opens flight logs."""
 
     def __init__(self, options: ServeOptions) -> None:
+        """Load the scenario of the options, with its UAV."""
         self._served = load_served_scenario(options)
         self._logs = options.logs
         # Uav with the parameters of the last judged mission.
@@ -184,8 +185,8 @@ class ServedFlights:
     def prepare(self, request: JudgeMission) -> tuple[PreparedFlight | None, MissionJudged]:
         """Judge the geometry of a mission, and check that its flight can start.
 
-        Returns the prepared flight and the answer for the vehicle; None and an answer with the reason for a mission
-        that cannot be flown.
+        Returns the prepared flight, and the answer for the vehicle.  For a mission that cannot be flown, the flight is
+        None and the answer states the reason.
         """
         served_scenario = self._served
         try:
@@ -205,7 +206,7 @@ class ServedFlights:
         if home is None:
             home = Home(start.lat_deg, start.lon_deg, start.amsl - (0.0 if math.isnan(start.height) else start.height))
         items = tuple(int(item) for item in setup.route.items)
-        texts = mission_texts(setup, verdict)
+        texts = describe_mission(setup, verdict)
         # A mission that is not judged in full is armed with a warning; for example, MAVSDK writes ground speeds.
         can_arm = verdict.flies or verdict.undecided
         mission_judged = MissionJudged(request.number, True, can_arm, texts, home, items, start)
@@ -216,6 +217,7 @@ class ServedFlights:
 
         In AUTO the mission is flown from its first item, in RTL the aircraft returns home, and in other modes it
         loiters for `LOITER_DURATION_S`.
+
         position: east, north and altitude AMSL, (3,) m.
         """
         served_scenario = self._served
@@ -231,7 +233,7 @@ class ServedFlights:
         elif request.mode == RTL:
             items = (MissionItem(0, int(Command.NAV_RETURN_TO_LAUNCH), int(Frame.MISSION), no_params, 0.0, 0.0, 0.0),)
         else:
-            items = (_loiter_item(start_item, request.center),)
+            items = (_make_loiter_item(start_item, request.center),)
         mission = replace(request.mission, items=(start_item, *items), source=MODE_NAMES[request.mode])
         # The aircraft is in the air, so there is no take-off, and it does not land.
         setup = make_setup(without_ground_phases(served_scenario.scenario), self._uav, mission, served_scenario.seed)
@@ -251,7 +253,7 @@ class ServedFlights:
         return ServedLog(path, setup, self.aircraft, mode)
 
 
-def _loiter_item(current_item: MissionItem, center: LoiterCenter) -> MissionItem:
+def _make_loiter_item(current_item: MissionItem, center: LoiterCenter) -> MissionItem:
     """Return the item of a loiter around `center`.
 
     A position or an altitude that `center` does not state is taken from `current_item`.
@@ -274,6 +276,7 @@ class ServedLog:
     """Log of one served flight."""
 
     def __init__(self, path: Path, setup: FlightSetup, aircraft: Aircraft, mode: int) -> None:
+        """Open the log file of a flight in a mode, such as `AUTO`."""
         self._path, self._setup, self._aircraft = path, setup, aircraft
         self._verdict_basis = "flown" if mode == AUTO else f"flown in {MODE_NAMES[mode]}"
         self._recorder = Recorder(path, setup)
@@ -288,8 +291,9 @@ class ServedLog:
     def finish(self, end_reason: str, should_abort: Callable[[], bool]) -> FlightJudged:
         """Judge the flight and close the log.
 
-        If the path was abandoned within a second, the log is deleted.  If the process is to end, an abandoned path is
-        not judged; `planfly check` can judge it.
+        If the aircraft left the path within a second, the log is deleted.  If the process must end, a path that was
+        left is not judged; `planfly check` can judge it later.
+
         should_abort: see `planfly.workflow.reference_flights.explain_verdict`.
         """
         track = join_tracks(self._track_blocks)
@@ -311,9 +315,9 @@ class ServedLog:
             verdict, reference = explain_verdict(requirements, self._aircraft, verdict, should_abort=should_abort)
         self._recorder.finish(end_reason, verdict, reference)
         texts = (
-            unfinished_texts(self._verdict_basis, end_reason, verdict)
+            describe_unfinished_flight(self._verdict_basis, end_reason, verdict)
             if was_abandoned
-            else verdict_texts(self._verdict_basis, verdict)
+            else describe_verdict(self._verdict_basis, verdict)
         )
         return FlightJudged(verdict.flyable, (*texts, StatusText(f"log {self._path}", INFO)))
 
@@ -322,7 +326,7 @@ class ServedLog:
         self._recorder.abandon()
 
 
-def mission_texts(setup: FlightSetup, verdict: Verdict) -> tuple[StatusText, ...]:
+def describe_mission(setup: FlightSetup, verdict: Verdict) -> tuple[StatusText, ...]:
     """Return the texts on a mission for stations: its size, its geometric verdict, and notes on its route."""
     route = setup.route
     length = float(np.linalg.norm(np.diff(route.positions[:, :2], axis=0), axis=1).sum()) / 1000.0
@@ -330,14 +334,14 @@ def mission_texts(setup: FlightSetup, verdict: Verdict) -> tuple[StatusText, ...
         f"mission: {count_text(len(route.points), 'waypoint')}, {length:.1f} km; {route.started}", INFO
     )
     notes = tuple(StatusText(f"note: {note}", NOTICE) for note in route.notes[:_MAX_TEXTS_PER_VERDICT])
-    return (size_text, *verdict_texts("geometry", verdict), *notes)
+    return (size_text, *describe_verdict("geometry", verdict), *notes)
 
 
 # Rules that fail on a path only because the aircraft left it before its end.
 _RULES_OF_UNFINISHED_PATHS = ("completion", "loiter", "waypoint", "turn", "survey")
 
 
-def unfinished_texts(basis: str, end_reason: str, verdict: Verdict) -> tuple[StatusText, ...]:
+def describe_unfinished_flight(basis: str, end_reason: str, verdict: Verdict) -> tuple[StatusText, ...]:
     """Return texts with the verdict on the flown part of a path that the aircraft left before its end.
 
     basis: basis of the verdict, such as "flown in GUIDED".
@@ -345,10 +349,10 @@ def unfinished_texts(basis: str, end_reason: str, verdict: Verdict) -> tuple[Sta
     failed_findings = [finding for finding in verdict.failed if finding.rule not in _RULES_OF_UNFINISHED_PATHS]
     findings_text = count_text(len(failed_findings), "finding") if failed_findings else "no findings"
     first_text = StatusText(f"verdict ({basis}): {end_reason}; {findings_text} failed until then", INFO)
-    return (first_text, *_finding_texts(failed_findings))
+    return (first_text, *_describe_findings(failed_findings))
 
 
-def verdict_texts(basis: str, verdict: Verdict) -> tuple[StatusText, ...]:
+def describe_verdict(basis: str, verdict: Verdict) -> tuple[StatusText, ...]:
     """Return texts that describe a verdict: its result, the deciding parameter, and the failed findings.
 
     basis: basis of the verdict, such as "flown" or "geometry".
@@ -359,13 +363,13 @@ def verdict_texts(basis: str, verdict: Verdict) -> tuple[StatusText, ...]:
     if verdict.state == "open":
         return (StatusText(f"{answer}: {verdict.unjudged}", WARNING),)
     deciding_texts = () if verdict.deciding is None else (StatusText(deciding_text(verdict.deciding), WARNING),)
-    return (StatusText(answer, WARNING), *deciding_texts, *_finding_texts(verdict.failed))
+    return (StatusText(answer, WARNING), *deciding_texts, *_describe_findings(verdict.failed))
 
 
-def _finding_texts(findings: Sequence[Finding]) -> list[StatusText]:
-    """Return a text for each of the first findings, then the number of other findings.
+def _describe_findings(findings: Sequence[Finding]) -> list[StatusText]:
+    """Return a text for each of the first `_MAX_TEXTS_PER_VERDICT` findings, then the number of others.
 
-    At most `_MAX_TEXTS_PER_VERDICT` findings are named.  The place is left out if the reason names it.
+    The place of a finding is left out if its reason names it.
     """
     texts = []
     for finding in findings[:_MAX_TEXTS_PER_VERDICT]:

@@ -41,7 +41,7 @@ def serve_vehicle(
         host, port = link.address
         targets = ", ".join(f"{station}:{station_port}" for station, station_port in access.to)
         on_message(f"vehicle {SYSTEM} at {host}:{port}, calling {targets}; scenario {served_scenario.scenario.name}")
-        on_message(f"flight logs go to {options.logs}/; Ctrl-C ends")
+        on_message(f"flight logs are written to {options.logs}/; Ctrl-C ends")
         if served_scenario.mission is not None:
             vehicle.load(served_scenario.mission)
         elif served_scenario.fence or served_scenario.rally:
@@ -56,7 +56,11 @@ def serve_vehicle(
 def _make_vehicle(
     link: Link, pool: "_FlightPool", served_scenario: ServedScenario, speed: float, on_message: Callable[[str], None]
 ) -> Vehicle:
-    """Return the vehicle for the stations, still without a mission.  speed: multiple of real time."""
+    """Make the vehicle that ground stations see, still without a mission.
+
+    pool: flight processes, which fly the missions.
+    speed: multiple of real time.
+    """
     uav = served_scenario.uav
     autopilot_settings = uav.autopilot.parameters
     parameters = vehicle_parameters(
@@ -69,7 +73,7 @@ def _make_vehicle(
         system=SYSTEM,
         speed=speed,
     )
-    standby = standby_at_start(served_scenario.scenario)
+    standby = make_standby_at_start(served_scenario.scenario)
     return Vehicle(
         link,
         pool.spawn,
@@ -85,6 +89,7 @@ class _FlightPool:
     """Pool of flight processes; the vehicle requests another process when one has died."""
 
     def __init__(self, options: ServeOptions) -> None:
+        """Start with no process; `spawn` starts the processes."""
         self._options = options
         self._context = multiprocessing.get_context("spawn")
         self._children: list[multiprocessing.process.BaseProcess] = []
@@ -108,7 +113,7 @@ class _FlightPool:
         end_children([child for child in self._children if child.is_alive()], _CHILD_END_TIMEOUT_S)
 
 
-def standby_at_start(scenario: Scenario) -> Standby:
+def make_standby_at_start(scenario: Scenario) -> Standby:
     """Return state and home of a vehicle without a mission.
 
     The vehicle is at the scenario's start and heads for the destination.  Home is on the ground below the start, or at

@@ -11,20 +11,20 @@ _VALID_UNTIL = datetime(9999, 12, 31, tzinfo=UTC)
 class Certificate(NamedTuple):
     """A self-signed TLS certificate and its private key, as PEM text.
 
-    Both exist in the memory of the run's processes, and, for the moment in which Python's TLS loads them, in a
-    temporary folder that only their user can read.
+    Both are kept in the memory of the run's processes.  Python's TLS can load them only from files, which exist for
+    that moment in a temporary folder that only their user can read.
     """
 
     certificate: str
     key: str
 
 
-def temporary_certificate() -> Certificate:
+def make_temporary_certificate() -> Certificate:
     """Return a new self-signed certificate for ``localhost``, with a new private key.
 
     The key is on the elliptic curve P-256.
 
-    >>> one, other = temporary_certificate(), temporary_certificate()
+    >>> one, other = make_temporary_certificate(), make_temporary_certificate()
     >>> one.certificate.splitlines()[0], one.key == other.key
     ('-----BEGIN CERTIFICATE-----', False)
     """

@@ -14,7 +14,7 @@ from typing import Any
 
 from logs.recording.reader import FlightLog, LogChannel, LogMessage, log_channels, log_messages
 from logs.recording.state_channel import EPOCH_NS
-from planfly.replays.certificates import temporary_certificate
+from planfly.replays.certificates import make_temporary_certificate
 from planfly.replays.origin_gate import HOST, VIEWERS, OriginGate
 from world.errors import FlightError
 from world.running_clock import RunningClock
@@ -69,7 +69,7 @@ def _start_server(foxglove: Any, name: str, broadcast: "_Broadcast", gate: Origi
 
     No page can bypass the gate, because no browser trusts the certificate of the server.
     """
-    certificate = temporary_certificate()
+    certificate = make_temporary_certificate()
     try:
         server = foxglove.start_server(
             name=name,
@@ -141,6 +141,7 @@ class _Broadcast:
     """
 
     def __init__(self, foxglove: Any, channels: list[LogChannel]) -> None:
+        """Make a Foxglove channel for each topic of the log."""
         self.context = foxglove.Context()
         self.listeners = 0
         self._channels = {
@@ -158,7 +159,7 @@ class _Broadcast:
         self._waiting: list[tuple[float, str]] = []
 
     def record_scenes_until(self, messages: Iterator[LogMessage], start_ns: int) -> Iterator[LogMessage]:
-        """Store the newest scene of each topic before `start_ns`, and return the messages from `start_ns` on."""
+        """Store each topic's last scene before `start_ns`, and return the messages from `start_ns` on."""
         for message in messages:
             if message.log_time >= start_ns:
                 return itertools.chain([message], messages)

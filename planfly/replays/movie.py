@@ -54,7 +54,7 @@ def write_movie(
     program = _find_ffmpeg(target) if kind == ".mp4" else ""
     film = MovieFrames(log.setup, log.track, start, end, speed or max(1.0, (end - start) / _DEFAULT_DURATION_S))
     if len(film) > _MAX_FRAMES:
-        allowed = f"{len(film):,} frames: at most {_MAX_FRAMES:,}; raise `speed`"
+        allowed = f"{len(film):,} frames: at most {_MAX_FRAMES:,} are allowed; raise `speed`"
         raise PlanflyError.of_argument("movie", len(film), allowed, shown="", file=target)
     if not kind:
         return _write_frame_files(target, film)
@@ -85,11 +85,10 @@ def _write_frame_files(folder: Path, film: MovieFrames) -> list[Path]:
 
 
 def _make_palette(frame: Image.Image) -> Image.Image:
-    """Return an image whose palette serves all frames.
+    """Return an image whose palette is used for all frames of a film.
 
-    It has the exact drawing colours, and the main colours of `frame`.
-
-    If the colours were chosen by area alone, thin lines and small marks would get the colours of the ground.
+    The palette has the exact drawing colours, and the main colours of `frame`.  If all colours were chosen by area,
+    thin lines and small marks would get the colours of the ground.
     """
     drawing_colours = [ImageColor.getrgb(colour)[:3] for colour in palette_colours()]
     blended_palette = frame.quantize(_TRANSPARENT - len(drawing_colours), dither=Image.Dither.NONE).getpalette() or []

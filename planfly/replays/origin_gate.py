@@ -35,7 +35,7 @@ _MAX_REPORTED = 16
 _MAX_REPORTED_LENGTH = 80
 
 
-def refusal_reason(head: bytes, port: int, allowed: Collection[str]) -> str:
+def find_refusal_reason(head: bytes, port: int, allowed: Collection[str]) -> str:
     r"""Return the reason why a WebSocket request is refused; "" if it is accepted.
 
     head: first line and headers of the request.
@@ -43,7 +43,7 @@ def refusal_reason(head: bytes, port: int, allowed: Collection[str]) -> str:
     allowed: accepted origins of web pages; a request without an origin is from a program, and is accepted.
 
     >>> page = b"GET / HTTP/1.1\r\nHost: 127.0.0.1:8765\r\nOrigin: https://example.com\r\n\r\n"
-    >>> refusal_reason(page, 8765, VIEWERS), refusal_reason(page, 8765, ["https://example.com"])
+    >>> find_refusal_reason(page, 8765, VIEWERS), find_refusal_reason(page, 8765, ["https://example.com"])
     ('a page of https://example.com', '')
     """
     try:
@@ -52,13 +52,13 @@ def refusal_reason(head: bytes, port: int, allowed: Collection[str]) -> str:
         return "not a valid request"
     hosts, origins = headers.get_all("Host", []), headers.get_all("Origin", [])
     if [host.strip().lower() for host in hosts] not in [[f"{name}:{port}"] for name in _HOST_NAMES]:
-        return f"a request to {_header_text(hosts)}"
+        return f"a request to {_format_header(hosts)}"
     if origins and [origin.strip() for origin in origins] not in [[allowed_origin] for allowed_origin in allowed]:
-        return f"a page of {_header_text(origins)}"
+        return f"a page of {_format_header(origins)}"
     return ""
 
 
-def _header_text(values: list[str]) -> str:
+def _format_header(values: list[str]) -> str:
     """Return the values of a header as text for a terminal, without control characters.
 
     Without values the text is "no host".
@@ -74,7 +74,7 @@ class OriginGate:
 
         port: port number; 0 for any free port.
         allowed: origins of web pages that are accepted.
-        on_refused: called, from another thread, with each new `refusal_reason`.
+        on_refused: called, from another thread, with each new `find_refusal_reason`.
         Raises OSError for a port in use.
         """
         try:
@@ -96,7 +96,7 @@ class OriginGate:
         self._thread.start()
 
     def close(self) -> None:
-        """Forward pending messages, and close all connections; the server must be stopped before."""
+        """Forward pending messages, and close all connections; stop the server first."""
         if self._thread.is_alive():
             self._loop.call_soon_threadsafe(self._closed.set)
             self._thread.join(2.0 * _CLOSE_TIMEOUT_S)
@@ -134,7 +134,7 @@ class OriginGate:
                 head = await asyncio.wait_for(reader.readuntil(b"\r\n\r\n"), _HEAD_TIMEOUT_S)
             except asyncio.LimitOverrunError:
                 return
-            reason = refusal_reason(head, self.port, self._allowed)
+            reason = find_refusal_reason(head, self.port, self._allowed)
             if reason:
                 self._report_refusal(reason)
                 writer.write(b"HTTP/1.1 403 Forbidden\r\nContent-Length: 0\r\nConnection: close\r\n\r\n")
@@ -146,7 +146,7 @@ class OriginGate:
             await asyncio.gather(_forward_data(reader, server_writer), _forward_data(server_reader, writer))
 
     def _report_refusal(self, reason: str) -> None:
-        """Report a reason for a refusal once; after too many different reasons, report nothing."""
+        """Report each reason for a refusal once, up to `_MAX_REPORTED` different reasons."""
         if reason not in self._reported and len(self._reported) < _MAX_REPORTED:
             self._reported.add(reason)
             self._on_refused(reason)

@@ -77,6 +77,7 @@ class _Player:
     """Sender of a log's telemetry to ground stations, in place of a vehicle."""
 
     def __init__(self, link: Link, status: Status, on_message: OnMessage) -> None:
+        """Take the link to the stations, and the state of the vehicle that they see."""
         self._link, self._status, self._on_message = link, status, on_message
         self._start_time = link.clock()
         self._next_heartbeat = 0.0

@@ -85,7 +85,7 @@ class _Pair(NamedTuple):
     series: values of the quantity.
     expected: values that follow from the partner, at the times of the grid, (n,).
     exact: True if both must be equal, False if they only vary together.
-    at_once: True if both vary at the same time, without a delay of the motion.
+    simultaneous: True if both vary at the same time, False if the motion delays the partner.
     """
 
     quantity: str
@@ -93,7 +93,7 @@ class _Pair(NamedTuple):
     series: Series
     expected: Floats
     exact: bool = True
-    at_once: bool = True
+    simultaneous: bool = True
 
 
 def check_signs_and_units(log: ColumnLog) -> None:
@@ -101,39 +101,39 @@ def check_signs_and_units(log: ColumnLog) -> None:
 
     The message names the key of the table to check.  Nothing is checked for a log with too few rows in flight.
     """
-    grid = _flying_grid(log)
+    grid = _make_flying_grid(log)
     if len(grid) < _MIN_ROWS:
         return
     for quantity in _SENSORS:
         if quantity in log.table.columns and all(entry.value is None for entry in log.table.columns[quantity]):
             _check_not_frozen(log, quantity, grid)
-    for pair in _pairs_to_check(log, grid):
+    for pair in _list_pairs(log, grid):
         _check_pair(log, pair, grid)
     if log.has("acceleration_down"):
-        _check_force(log, float(np.median(_mean_on_grid(log.series("acceleration_down"), grid))))
+        _check_force(log, float(np.median(_average_on_grid(log.series("acceleration_down"), grid))))
     if log.has("yaw"):
         _check_heading(log, grid)
     if log.has("throttle", "current"):
         _check_throttle(log, grid)
     if log.has("airspeed"):
         _check_airspeed(log, grid)
-    for pair in _pairs_to_check(log, grid):
+    for pair in _list_pairs(log, grid):
         _check_delay(log, pair, grid)
 
 
-def _flying_grid(log: ColumnLog) -> Floats:
+def _make_flying_grid(log: ColumnLog) -> Floats:
     """Return the times of a regular grid at which the aircraft flies and the log has rows, s, (n,).
 
     The grid is empty for a log without ground velocity and ground speed.
     """
     if log.has("velocity_north", "velocity_east"):
         north, east = log.series("velocity_north"), log.series("velocity_east")
-        speed = Series(north.time, np.hypot(north.values, np.interp(north.time, *_finite_rows(east))))
+        speed = Series(north.time, np.hypot(north.values, np.interp(north.time, *_select_finite_rows(east))))
     elif log.has("ground_speed"):
         speed = log.series("ground_speed")
     else:
         return np.zeros(0)
-    time, values = _finite_rows(speed)
+    time, values = _select_finite_rows(speed)
     if len(time) < 2:
         return np.zeros(0)
     grid = np.arange(time[0], time[-1], _STEP_S)
@@ -142,20 +142,20 @@ def _flying_grid(log: ColumnLog) -> Floats:
     return np.asarray(grid[is_recorded & (np.interp(grid, time, values) > _FLYING_MPS)])
 
 
-def _finite_rows(series: Series) -> tuple[Floats, Floats]:
-    """Return the times and values of a series, only for the rows with a finite value."""
+def _select_finite_rows(series: Series) -> tuple[Floats, Floats]:
+    """Return the times (s) and the values of the rows of a series that have a finite value."""
     is_known = np.isfinite(series.values)
     return series.time[is_known], series.values[is_known]
 
 
-def _mean_on_grid(series: Series, grid: Floats, *, wraps: bool = False) -> Floats:
+def _average_on_grid(series: Series, grid: Floats, *, wraps: bool = False) -> Floats:
     """Return the mean of a series over an interval of `_STEP_S` around each time of a grid, (n,).
 
     An interval without rows gets the interpolated value.
 
     wraps: True for an angle that jumps at full turns.
     """
-    time, values = _finite_rows(series)
+    time, values = _select_finite_rows(series)
     values = np.unwrap(values) if wraps else values
     sums = np.concatenate([[0.0], np.cumsum(values)])
     start_rows, end_rows = (np.searchsorted(time, grid + side * 0.5 * _STEP_S) for side in (-1.0, 1.0))
@@ -163,54 +163,56 @@ def _mean_on_grid(series: Series, grid: Floats, *, wraps: bool = False) -> Float
     return np.asarray(np.where(end_rows > start_rows, means, np.interp(grid, time, values)))
 
 
-def _rate_of_change(series: Series, grid: Floats, *, wraps: bool = False, step: float = _STEP_S) -> Floats:
+def _differentiate_on_grid(series: Series, grid: Floats, *, wraps: bool = False, step: float = _STEP_S) -> Floats:
     """Return the rate of change of a series at each time of a grid, per second, (n,).
 
     step: interval around each time over which the rate is computed, s.
     wraps: True for an angle that jumps at full turns.
     """
-    time, values = _finite_rows(series)
+    time, values = _select_finite_rows(series)
     values = np.unwrap(values) if wraps else values
     later, earlier = (np.interp(grid + side * 0.5 * step, time, values) for side in (1.0, -1.0))
     return np.asarray((later - earlier) / step)
 
 
-def _pairs_to_check(log: ColumnLog, grid: Floats) -> Iterator[_Pair]:
+def _list_pairs(log: ColumnLog, grid: Floats) -> Iterator[_Pair]:
     """Yield the pairs of measurements to check, which must agree or vary together."""
     if log.has("velocity_down", "altitude"):
-        sink = -_rate_of_change(log.series("altitude"), grid)
+        sink = -_differentiate_on_grid(log.series("altitude"), grid)
         yield _Pair("velocity_down", "the change of altitude", log.series("velocity_down"), sink)
     if log.has("latitude", "longitude", "velocity_north", "velocity_east"):
         latitude = log.series("latitude")
-        north = _rate_of_change(latitude, grid, step=_PLACE_STEP_S) * _EARTH_RADIUS_M
+        north = _differentiate_on_grid(latitude, grid, step=_PLACE_STEP_S) * _EARTH_RADIUS_M
         yield _Pair("velocity_north", "the change of latitude", log.series("velocity_north"), north)
-        east = _rate_of_change(log.series("longitude"), grid, wraps=True, step=_PLACE_STEP_S) * _EARTH_RADIUS_M
-        east = east * np.cos(_mean_on_grid(latitude, grid))
+        east = _differentiate_on_grid(log.series("longitude"), grid, wraps=True, step=_PLACE_STEP_S) * _EARTH_RADIUS_M
+        east = east * np.cos(_average_on_grid(latitude, grid))
         yield _Pair("velocity_east", "the change of longitude", log.series("velocity_east"), east)
     if log.has("roll", "pitch", "yaw"):
-        yield from _attitude_pairs(log, grid)
+        yield from _list_attitude_pairs(log, grid)
     if log.has("throttle", "current"):
-        current = _mean_on_grid(log.series("current"), grid)
+        current = _average_on_grid(log.series("current"), grid)
         yield _Pair("throttle", "the current", log.series("throttle"), current, exact=False)
     if log.has("pitch", "altitude"):
-        climb = _rate_of_change(log.series("altitude"), grid)
-        yield _Pair("pitch", "the change of altitude", log.series("pitch"), climb, exact=False, at_once=False)
-    if (triangle := _velocity_triangle(log, grid)) is not None:
+        climb = _differentiate_on_grid(log.series("altitude"), grid)
+        yield _Pair("pitch", "the change of altitude", log.series("pitch"), climb, exact=False, simultaneous=False)
+    if (triangle := _fit_wind_triangle(log, grid)) is not None:
         air = np.abs(triangle.velocity - triangle.wind)
         yield _Pair("airspeed", "ground velocity and heading", log.series("airspeed"), air, exact=False)
     # The accelerations come last, because a wrong velocity or attitude contradicts all of them.
-    yield from _acceleration_pairs(log, grid)
+    yield from _list_acceleration_pairs(log, grid)
 
 
-def _attitude_pairs(log: ColumnLog, grid: Floats) -> Iterator[_Pair]:
+def _list_attitude_pairs(log: ColumnLog, grid: Floats) -> Iterator[_Pair]:
     """Yield pairs to cross-check the logged angular rates and the roll angle.
 
     Each logged body rate is paired with the rate that follows from roll, pitch and yaw, and roll with the turn rate
     that follows from yaw.
     """
     angles = {name: log.series(name) for name in ("roll", "pitch", "yaw")}
-    roll, pitch = (_mean_on_grid(angles[name], grid, wraps=True) for name in ("roll", "pitch"))
-    roll_change, pitch_change, yaw_change = (_rate_of_change(series, grid, wraps=True) for series in angles.values())
+    roll, pitch = (_average_on_grid(angles[name], grid, wraps=True) for name in ("roll", "pitch"))
+    roll_change, pitch_change, yaw_change = (
+        _differentiate_on_grid(series, grid, wraps=True) for series in angles.values()
+    )
     expected = {
         "roll_rate": roll_change - yaw_change * np.sin(pitch),
         "pitch_rate": pitch_change * np.cos(roll) + yaw_change * np.cos(pitch) * np.sin(roll),
@@ -219,18 +221,20 @@ def _attitude_pairs(log: ColumnLog, grid: Floats) -> Iterator[_Pair]:
     for name, values in expected.items():
         if log.has(name):
             yield _Pair(name, "the change of roll, pitch and yaw", log.series(name), values)
-    yield _Pair("roll", "the turn that yaw shows", angles["roll"], yaw_change, exact=False, at_once=False)
+    yield _Pair("roll", "the turn rate from yaw", angles["roll"], yaw_change, exact=False, simultaneous=False)
 
 
-def _acceleration_pairs(log: ColumnLog, grid: Floats) -> Iterator[_Pair]:
+def _list_acceleration_pairs(log: ColumnLog, grid: Floats) -> Iterator[_Pair]:
     """Yield pairs to cross-check the logged accelerations.
 
     Each acceleration is paired with the rate of change of the velocity minus gravity, in body axes.
     """
     if not log.has("roll", "pitch", "yaw", "velocity_north", "velocity_east", "velocity_down"):
         return
-    roll, pitch, yaw = (_mean_on_grid(log.series(name), grid, wraps=True) for name in ("roll", "pitch", "yaw"))
-    north, east, down = (_rate_of_change(log.series(f"velocity_{axis}"), grid) for axis in ("north", "east", "down"))
+    roll, pitch, yaw = (_average_on_grid(log.series(name), grid, wraps=True) for name in ("roll", "pitch", "yaw"))
+    north, east, down = (
+        _differentiate_on_grid(log.series(f"velocity_{axis}"), grid) for axis in ("north", "east", "down")
+    )
     forward = north * np.cos(yaw) + east * np.sin(yaw)
     right = east * np.cos(yaw) - north * np.sin(yaw)
     down = down - _GRAVITY_MPS2
@@ -245,14 +249,14 @@ def _acceleration_pairs(log: ColumnLog, grid: Floats) -> Iterator[_Pair]:
             yield _Pair(name, "the change of velocity, and the attitude", log.series(name), values)
 
 
-def _ground_velocity(log: ColumnLog, grid: Floats) -> NDArray[np.complex128] | None:
+def _find_ground_velocity(log: ColumnLog, grid: Floats) -> NDArray[np.complex128] | None:
     """Return the ground velocity on the grid, m/s, (n,), north + i east; None if it is unknown."""
     if log.has("velocity_north", "velocity_east"):
-        north, east = (_mean_on_grid(log.series(f"velocity_{axis}"), grid) for axis in ("north", "east"))
+        north, east = (_average_on_grid(log.series(f"velocity_{axis}"), grid) for axis in ("north", "east"))
         return np.asarray(north + 1j * east)
     if log.has("ground_speed", "ground_course"):
-        course = _mean_on_grid(log.series("ground_course"), grid, wraps=True)
-        return np.asarray(_mean_on_grid(log.series("ground_speed"), grid) * np.exp(1j * course))
+        course = _average_on_grid(log.series("ground_course"), grid, wraps=True)
+        return np.asarray(_average_on_grid(log.series("ground_speed"), grid) * np.exp(1j * course))
     return None
 
 
@@ -269,19 +273,19 @@ class _Triangle(NamedTuple):
     wind: complex
 
 
-def _velocity_triangle(log: ColumnLog, grid: Floats) -> _Triangle | None:
-    """Return the wind triangle that fits ground velocity, heading and airspeed best, or None.
+def _fit_wind_triangle(log: ColumnLog, grid: Floats) -> _Triangle | None:
+    """Fit the wind triangle: ground velocity = factor * airspeed along the heading + wind.
 
-    The triangle is unknown without these quantities, and in a flight without turns, because only turns distinguish the
-    wind from an error of the airspeed.  All velocities are complex numbers, as in `_Triangle`.
+    Return None if the log lacks one of these quantities.  Return None also for a flight without turns, because only
+    turns distinguish the wind from an error of the airspeed.  All velocities are complex numbers, as in `_Triangle`.
     """
-    velocity = _ground_velocity(log, grid)
+    velocity = _find_ground_velocity(log, grid)
     if velocity is None or not log.has("airspeed", "yaw"):
         return None
-    direction = np.exp(1j * _mean_on_grid(log.series("yaw"), grid, wraps=True))
+    direction = np.exp(1j * _average_on_grid(log.series("yaw"), grid, wraps=True))
     if abs(direction.mean()) > _CLEAR_ALIGNMENT:
         return None
-    air_velocity = _mean_on_grid(log.series("airspeed"), grid) * direction
+    air_velocity = _average_on_grid(log.series("airspeed"), grid) * direction
     air_deviation = air_velocity - air_velocity.mean()
     if not air_deviation.any():
         return None
@@ -290,13 +294,13 @@ def _velocity_triangle(log: ColumnLog, grid: Floats) -> _Triangle | None:
 
 
 def _correlate(values: Floats, expected: Floats) -> float:
-    """Return the correlation coefficient of two series; 0 if one of them is constant."""
+    """Return the correlation coefficient of two series of equal length; 0 if one of them is constant."""
     values, expected = values - values.mean(), expected - expected.mean()
     norm_product = float(np.sqrt((values @ values) * (expected @ expected)))
     return float(values @ expected) / norm_product if norm_product > 0.0 else 0.0
 
 
-def _contradiction_error(log: ColumnLog, quantity: str, message: str, hint: str) -> LogError:
+def _make_contradiction_error(log: ColumnLog, quantity: str, message: str, hint: str) -> LogError:
     """Return the error for a quantity that contradicts the others.
 
     hint: text on what to check in the table.
@@ -311,7 +315,7 @@ def _check_not_frozen(log: ColumnLog, quantity: str, grid: Floats) -> None:
 
     A current of 0 A is accepted, because the motor may be idle.
     """
-    time, values = _finite_rows(log.series(quantity))
+    time, values = _select_finite_rows(log.series(quantity))
     is_in_flight = (time >= grid[0]) & (time <= grid[-1])
     time, values = time[is_in_flight], values[is_in_flight]
     if len(time) < 2:
@@ -326,32 +330,32 @@ def _check_not_frozen(log: ColumnLog, quantity: str, grid: Floats) -> None:
         end = float(time[min(lasts[k] + 1, len(time) - 1)])
         flight_time = np.count_nonzero((grid > start) & (grid < end)) * _STEP_S
         if flight_time > limit and not (quantity == "current" and values[firsts[k]] == 0.0):
-            hint = "expected a sensor that works; leave its cells empty, or read a part (span_s)"
-            raise _contradiction_error(
+            hint = "expected a sensor that works; leave its cells empty, or read another part of the log (span_s)"
+            raise _make_contradiction_error(
                 log, quantity, f"is stuck at one value from {start:.6g} to {end:.6g} s, in flight", hint
             )
 
 
 def _check_pair(log: ColumnLog, pair: _Pair, grid: Floats) -> None:
-    """Raise LogError if two measurements differ in sign, do not correlate, or differ by a factor.
+    """Raise LogError if two measurements have opposite signs, do not correlate, or differ by a factor.
 
     With errors in both measurements, the factor lies between r c and r / c, where r is the ratio of the standard
     deviations and c the correlation (Frisch 1934).
     """
-    values = _mean_on_grid(pair.series, grid, wraps=pair.quantity == "yaw")
+    values = _average_on_grid(pair.series, grid, wraps=pair.quantity == "yaw")
     correlation = _correlate(values, pair.expected)
     if correlation < -_CLEAR_CORRELATION:
         message = f"varies opposite to {pair.partner} (correlation {correlation:.2f})"
-        raise _contradiction_error(log, pair.quantity, message, "check sign and frame")
+        raise _make_contradiction_error(log, pair.quantity, message, "check sign and frame")
     moves = max(float(values.std()), float(pair.expected.std())) > _LEAST_MOTIONS.get(pair.quantity, math.inf)
     if moves and correlation < _LEAST_CORRELATION:
         message = f"does not follow {pair.partner} (correlation {correlation:.2f})"
-        raise _contradiction_error(log, pair.quantity, message, "check column, clock and rows without a value")
+        raise _make_contradiction_error(log, pair.quantity, message, "check column, clock and rows without a value")
     if pair.exact and correlation > _LEAST_CORRELATION:
         ratio = float(np.std(values) / np.std(pair.expected))
         if ratio * correlation > _MAX_RATIO or ratio / correlation < 1.0 / _MAX_RATIO:
             hint = f"check unit ({log.unit(pair.quantity)}) and scale"
-            raise _contradiction_error(log, pair.quantity, f"is {ratio:.3g} times {pair.partner}", hint)
+            raise _make_contradiction_error(log, pair.quantity, f"is {ratio:.3g} times {pair.partner}", hint)
 
 
 def _check_delay(log: ColumnLog, pair: _Pair, grid: Floats) -> None:
@@ -361,25 +365,28 @@ def _check_delay(log: ColumnLog, pair: _Pair, grid: Floats) -> None:
     after it, because it then does not compare the same motion.
     """
     is_inner = (grid > grid[0] - _SHIFTS_S[0]) & (grid < grid[-1] - _SHIFTS_S[-1])
-    if not pair.at_once or np.count_nonzero(is_inner) < _MIN_ROWS:
+    if not pair.simultaneous or np.count_nonzero(is_inner) < _MIN_ROWS:
         return
     expected, inner_grid = pair.expected[is_inner], grid[is_inner]
     correlations = [
-        _correlate(_mean_on_grid(pair.series, inner_grid + shift), expected) for shift in _SHIFTS_S.tolist()
+        _correlate(_average_on_grid(pair.series, inner_grid + shift), expected) for shift in _SHIFTS_S.tolist()
     ]
     best, unshifted = max(correlations), correlations[len(correlations) // 2]
     shift = float(_SHIFTS_S[int(np.argmax(correlations))])
     is_better = 1.0 - best * best < _SHIFTED_RESIDUAL * (1.0 - unshifted * unshifted)
-    ratio = float(np.std(_mean_on_grid(pair.series, inner_grid + shift)) / max(1e-12, float(np.std(expected))))
+    ratio = float(np.std(_average_on_grid(pair.series, inner_grid + shift)) / max(1e-12, float(np.std(expected))))
     if pair.exact and not 1.0 / _MAX_RATIO <= ratio <= _MAX_RATIO:
         return
     if best > _SHIFTED_CORRELATION and is_better and abs(shift) >= _LATE_S:
-        message = f"comes {abs(shift):g} s {'after' if shift > 0.0 else 'before'} {pair.partner}"
-        raise _contradiction_error(log, pair.quantity, message, "check its clock (offset_s)")
+        message = f"{'lags' if shift > 0.0 else 'leads'} {pair.partner} by {abs(shift):g} s"
+        raise _make_contradiction_error(log, pair.quantity, message, "check its clock (offset_s)")
 
 
 def _check_force(log: ColumnLog, force: float) -> None:
-    """Raise LogError for an implausible median of the specific force down in flight, m/s²."""
+    """Raise LogError for an implausible specific force down.
+
+    force: median of the specific force down in flight, m/s².
+    """
     low, high = _FORCE_RANGE_MPS2
     if not low <= force <= high:
         entry = log.table.columns["acceleration_down"][0]
@@ -395,54 +402,57 @@ def _check_airspeed(log: ColumnLog, grid: Floats) -> None:
 
     If the flight has turns, a logged wind that contradicts the wind of the velocity triangle also raises LogError.
     """
-    airspeed, column = _mean_on_grid(log.series("airspeed"), grid), log.column("airspeed")
+    airspeed, column = _average_on_grid(log.series("airspeed"), grid), log.column("airspeed")
     if np.median(airspeed) < _MIN_AIRSPEED_MPS:
         allowed = f"expected more than {_MIN_AIRSPEED_MPS:g} m/s: check column and unit"
         shown = f"{column} is {np.median(airspeed):.3g} m/s in flight"
         raise LogError.at(log.table_path, "columns.airspeed", shown, allowed)
-    triangle = _velocity_triangle(log, grid)
+    triangle = _fit_wind_triangle(log, grid)
     if triangle is None:
         return
     if not 1.0 / _MAX_AIRSPEED_RATIO <= triangle.factor <= _MAX_AIRSPEED_RATIO:
-        message = f"is {1.0 / triangle.factor:.3g} times the airspeed of ground velocity and heading"
-        raise _contradiction_error(log, "airspeed", message, f"check unit ({log.unit('airspeed')}) and scale")
+        message = f"is {1.0 / triangle.factor:.3g} times the airspeed that follows from ground velocity and heading"
+        raise _make_contradiction_error(log, "airspeed", message, f"check unit ({log.unit('airspeed')}) and scale")
     if abs(triangle.wind) > _CLEAR_WIND_MPS:
-        for quantity, wind in _logged_winds(log, grid):
+        for quantity, wind in _read_mean_winds(log, grid):
             wind_ratio = (wind / triangle.wind).real
             low, high = _WIND_RATIO_RANGE
             if not low <= wind_ratio <= high:
-                message = f"states {wind_ratio:.2g} times the wind of airspeed, heading and ground velocity"
-                raise _contradiction_error(log, quantity, message, "check unit and frame (from, to)")
+                message = f"states {wind_ratio:.2g} times the wind that follows from airspeed, heading and velocity"
+                raise _make_contradiction_error(log, quantity, message, "check unit and frame (from, to)")
 
 
-def _logged_winds(log: ColumnLog, grid: Floats) -> Iterator[tuple[str, complex]]:
+def _read_mean_winds(log: ColumnLog, grid: Floats) -> Iterator[tuple[str, complex]]:
     """Yield each logged mean wind with the name of a quantity that states it.
 
     The wind is a complex number, north + i east, m/s.
     """
     if log.has("wind_north", "wind_east"):
-        north, east = (float(np.mean(_mean_on_grid(log.series(f"wind_{axis}"), grid))) for axis in ("north", "east"))
+        north, east = (float(np.mean(_average_on_grid(log.series(f"wind_{axis}"), grid))) for axis in ("north", "east"))
         yield "wind_north", complex(north, east)
     if log.has("wind_speed", "wind_direction"):
-        origin = _mean_on_grid(log.series("wind_direction"), grid, wraps=True)
-        yield "wind_direction", complex(-np.mean(_mean_on_grid(log.series("wind_speed"), grid) * np.exp(1j * origin)))
+        origin = _average_on_grid(log.series("wind_direction"), grid, wraps=True)
+        yield (
+            "wind_direction",
+            complex(-np.mean(_average_on_grid(log.series("wind_speed"), grid) * np.exp(1j * origin))),
+        )
 
 
 def _check_throttle(log: ColumnLog, grid: Floats) -> None:
     """Raise LogError for a throttle that is constant in flight while the current changes."""
-    throttle, current = (_mean_on_grid(log.series(name), grid) for name in ("throttle", "current"))
+    throttle, current = (_average_on_grid(log.series(name), grid) for name in ("throttle", "current"))
     low, high = np.percentile(current, [5.0, 95.0]).tolist()
     if np.ptp(throttle) < _MIN_THROTTLE_RANGE and high - low > _MIN_CURRENT_RANGE_A:
-        message = f"stays at {throttle[0]:.3g} in flight, and the current goes from {low:.3g} to {high:.3g} A"
-        raise _contradiction_error(log, "throttle", message, "check the column")
+        message = f"stays at {throttle[0]:.3g} in flight while the current goes from {low:.3g} to {high:.3g} A"
+        raise _make_contradiction_error(log, "throttle", message, "check the column")
 
 
 def _check_heading(log: ColumnLog, grid: Floats) -> None:
     """Raise LogError if the heading is far from the ground course, or turns in the opposite direction."""
-    velocity = _ground_velocity(log, grid)
+    velocity = _find_ground_velocity(log, grid)
     if velocity is None:
         return
-    course, yaw = np.angle(velocity), _mean_on_grid(log.series("yaw"), grid, wraps=True)
+    course, yaw = np.angle(velocity), _average_on_grid(log.series("yaw"), grid, wraps=True)
     same, reversed_yaw = (complex(np.mean(np.exp(1j * (course - sign * yaw)))) for sign in (1.0, -1.0))
     difference = math.degrees(math.atan2(same.imag, same.real))
     message = ""
@@ -451,4 +461,4 @@ def _check_heading(log: ColumnLog, grid: Floats) -> None:
     elif abs(reversed_yaw) > _CLEAR_ALIGNMENT > abs(same):
         message = "turns opposite to the ground course"
     if message:
-        raise _contradiction_error(log, "yaw", message, "check sign, frame and offset")
+        raise _make_contradiction_error(log, "yaw", message, "check sign, frame and offset")

@@ -25,7 +25,7 @@ from logs.importers.columns.quantities import (
     QUATERNION,
     UNIT_ZEROS,
     UNITS,
-    likelier_unit,
+    find_likelier_unit,
     to_default_frame,
 )
 from world.arrays import Flags, Floats
@@ -79,6 +79,7 @@ class ColumnLog:
     """
 
     def __init__(self, path: Path) -> None:
+        """Read the table of columns, and check that the data files have its columns."""
         table_path = path if is_column_table_name(path) else find_column_table(path)
         self.path, self.table_path = path, table_path
         self.table: LogTable = read_column_table(table_path)
@@ -100,7 +101,7 @@ class ColumnLog:
         It identifies the log from which an aircraft was identified, even if the table is edited.
         """
         digest = hashlib.sha256()
-        for path in sorted({self._data_path(clock) for clock in self.table.clocks.values()}):
+        for path in sorted({self._find_data_path(clock) for clock in self.table.clocks.values()}):
             digest.update(path.read_bytes())
         return digest.hexdigest()
 
@@ -124,7 +125,7 @@ class ColumnLog:
         return self.table.columns[quantity][0].unit
 
     def frame(self, quantity: str) -> str:
-        """Return the frame of the first entry of a quantity, or the default frame."""
+        """Return the frame (axes, such as "NED") of a quantity's first entry, or the default frame."""
         return self.table.columns[quantity][0].frame or QUANTITIES[quantity].frames[0]
 
     def series(self, quantity: str) -> Series:
@@ -135,35 +136,36 @@ class ColumnLog:
         Raises LogError for a missing column, text in place of numbers, and implausible values.
         """
         if self._is_from_quaternion(quantity):
-            return self._angle_of_quaternion(quantity)
+            return self._compute_angle(quantity)
         entries = self.table.columns[quantity]
-        parts = [self._entry_series(quantity, entry) for entry in entries]
+        parts = [self._read_entry(quantity, entry) for entry in entries]
         if len(parts) == 1:
             return parts[0]
         time = parts[0].time
         values = parts[0].values.copy()
         for entry, part in zip(entries[1:], parts[1:], strict=True):
             if len(part.time) != len(time):
-                raise self._error(f"columns.{quantity}.clock", entry.clock, "all entries of a quantity share one clock")
+                raise self._make_error(f"columns.{quantity}.clock", entry.clock, "expected one clock for all entries")
             values = np.where(np.isfinite(values), values, part.values)
         return Series(time, values)
 
-    def _angle_of_quaternion(self, angle: str) -> Series:
-        """Return roll, pitch or yaw from the quaternion from FRD to NED, or from FLU to ENU.
+    def _compute_angle(self, angle: str) -> Series:
+        """Compute roll, pitch or yaw, rad, from the logged attitude quaternion.
 
-        Raises LogError if the parts have different times, and for a quaternion whose norm is not 1.
+        The quaternion leads from body axes FRD to NED, or from FLU to ENU.  Raises LogError if its components have
+        different times, or if its norm is not 1.
         """
         parts = [self.series(name) for name in QUATERNION]
         time = parts[0].time
         if any(not np.array_equal(part.time, time) for part in parts):
             allowed = "expected the clock of quaternion_w"
-            raise self._error("columns.quaternion_x.clock", self.column("quaternion_x"), allowed)
+            raise self._make_error("columns.quaternion_x.clock", self.column("quaternion_x"), allowed)
         w, x, y, z = (part.values for part in parts)
         norms = np.sqrt(w * w + x * x + y * y + z * z)
         known = norms[np.isfinite(norms)]
         if known.size and np.mean(np.abs(known - 1.0) < _MAX_QUATERNION_ERROR) < _MIN_PLAUSIBLE_FRACTION:
             shown = f"{self.column('quaternion_w')} and the other parts have a length of {np.median(known):.3g}"
-            raise self._error("columns.quaternion_w", shown, "expected 1")
+            raise self._make_error("columns.quaternion_w", shown, "expected 1")
         angles = {
             "roll": lambda: np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)),
             "pitch": lambda: np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0)),
@@ -172,11 +174,11 @@ class ColumnLog:
         factor, offset = to_default_frame(angle, self.frame("quaternion_w"))
         return Series(time, factor * angles[angle]() + offset)
 
-    def raw(self, quantity: str) -> tuple[Floats, Column]:
+    def raw_values(self, quantity: str) -> tuple[Floats, Column]:
         """Return the times and the unconverted values of a quantity, such as the names or numbers of modes."""
         entry = self.table.columns[quantity][0]
-        clock = self._clock(entry.clock)
-        return self._times(entry.clock), self._column_on_clock(
+        clock = self._get_clock(entry.clock)
+        return self._align_times(entry.clock), self._find_column_on_clock(
             clock, entry.column or "", f"columns.{quantity}.column", entry.clock
         )
 
@@ -187,24 +189,26 @@ class ColumnLog:
         """
         if self.table.parameter_columns is None:
             return dict(self.table.parameters)
-        data = self._data_file(next(iter(self.table.clocks.values())))
+        data = self._open_data_file(next(iter(self.table.clocks.values())))
         names, values = (
-            self._column_by_name(data, column, "parameter_columns") for column in self.table.parameter_columns
+            self._find_column(data, column, "parameter_columns") for column in self.table.parameter_columns
         )
         if len(names) != len(values):
-            raise self._error("parameter_columns", f"{len(names)} names", f"{len(values)} values: expected as many")
-        numbers = _numbers(values, self._location(data, self.table.parameter_columns[1]))
-        stored = {cell_text(name): value for name, value in zip(names, numbers.tolist(), strict=True)}
+            raise self._make_error(
+                "parameter_columns", f"{len(names)} names", f"{len(values)} values: expected equal numbers"
+            )
+        numbers = _parse_numbers(values, self._locate_column(data, self.table.parameter_columns[1]))
+        stored = {decode_cell(name): value for name, value in zip(names, numbers.tolist(), strict=True)}
         return {name: value for name, value in stored.items() if math.isfinite(value)} | self.table.parameters
 
     # ------------------------------------------------------------------
     # Files and clocks.
 
-    def _error(self, field: str, value: Any, allowed: str) -> LogError:
-        """Return the error for a field of the table."""
+    def _make_error(self, field: str, value: Any, allowed: str) -> LogError:
+        """Return the error for a wrong value of a field of the table, with the allowed values."""
         return LogError.at(self.table_path, field, value, allowed)
 
-    def _data_path(self, clock: ClockTable) -> Path:
+    def _find_data_path(self, clock: ClockTable) -> Path:
         """Return the data file of a clock: the clock's file, else the opened data file, else the table's file."""
         if clock.file is not None:
             return self.table_path.parent / clock.file
@@ -212,18 +216,20 @@ class ColumnLog:
             return self.path
         if self.table.file is None:
             raise LogError(
-                f"{self.table_path}: file: missing; it names the data file", file=self.table_path, field="file"
+                f"{self.table_path}: file: missing; expected the path of the data file",
+                file=self.table_path,
+                field="file",
             )
         return self.table_path.parent / self.table.file
 
-    def _data_file(self, clock: ClockTable) -> DataFile:
+    def _open_data_file(self, clock: ClockTable) -> DataFile:
         """Return the contents of a clock's data file, which is read at the first call."""
-        path = self._data_path(clock)
+        path = self._find_data_path(clock)
         if path not in self._files:
             self._files[path] = read_data_file(path)
         return self._files[path]
 
-    def _clock(self, name: str) -> _Clock:
+    def _get_clock(self, name: str) -> _Clock:
         """Return the clock with a name; its times are read at the first call."""
         if name not in self._clocks:
             self._clocks[name] = self._read_clock(name, self.table.clocks[name])
@@ -234,16 +240,16 @@ class ColumnLog:
 
         Raises LogError for missing, decreasing or too many times, and for a stated rate that contradicts the times.
         """
-        data, field = self._data_file(clock), f"clocks.{name}"
+        data, field = self._open_data_file(clock), f"clocks.{name}"
         if clock.column is None:
-            lengths = [len(self._column_by_name(data, column)) for column in self._clock_columns(name)]
+            lengths = [len(self._find_column(data, column)) for column in self._list_columns_of_clock(name)]
             rate = clock.rate or 1.0
             return _Clock(data, np.arange(max(lengths, default=0)) / rate + clock.offset_s, rate)
-        values = self._column_by_name(data, clock.column, f"{field}.column")
+        values = self._find_column(data, clock.column, f"{field}.column")
         if clock.unit == "iso" or values.dtype.kind == "M":
-            time = _seconds_of_dates(values, self._location(data, clock.column))
+            time = _parse_dates(values, self._locate_column(data, clock.column))
         else:
-            time = _numbers(values, self._location(data, clock.column)) * UNITS["time"][clock.unit]
+            time = _parse_numbers(values, self._locate_column(data, clock.column)) * UNITS["time"][clock.unit]
         missing_rows = np.flatnonzero(~np.isfinite(time))
         if missing_rows.size:
             k = int(missing_rows[0])
@@ -251,7 +257,7 @@ class ColumnLog:
         decreasing_rows = np.flatnonzero(np.diff(time) < 0.0)
         if decreasing_rows.size:
             k = int(decreasing_rows[0]) + 1
-            allowed = f"after {time[k - 1]:.6g} s: expected rising times"
+            allowed = f"after {time[k - 1]:.6g} s:expected increasing times"
             raise LogError.at(data.path, f"{clock.column}[{k}]", f"{time[k]:.6g} s", allowed)
         if len(time) < 2 or time[-1] <= time[0]:
             raise LogError.at(data.path, clock.column, len(time), "expected at least two rows at different times")
@@ -264,13 +270,13 @@ class ColumnLog:
         usual_rate = float(1.0 / np.median(steps[steps > 0.0]))
         if clock.rate is not None and not 1.0 / _MAX_RATE_RATIO <= usual_rate / clock.rate <= _MAX_RATE_RATIO:
             allowed = f"the times in {clock.column} have {usual_rate:.3g} rows a second: check the unit ({clock.unit})"
-            raise self._error(f"{field}.rate", f"{clock.rate:g} Hz", allowed)
+            raise self._make_error(f"{field}.rate", f"{clock.rate:g} Hz", allowed)
         return _Clock(data, time + clock.offset_s, rate)
 
     @cached_property
     def start(self) -> float:
         """Time of the main clock that becomes time 0, s: its first time if it counts from 1970, otherwise 0."""
-        first = float(self._clock(self._main_clock).time[0])
+        first = float(self._get_clock(self._main_clock).time[0])
         if first > _UTC_AFTER_S:
             self.utc_start = first
             return first
@@ -281,44 +287,45 @@ class ColumnLog:
         """Name of the main clock: "main", or else the name of the first clock."""
         return MAIN_CLOCK if MAIN_CLOCK in self.table.clocks else next(iter(self.table.clocks))
 
-    def _times(self, name: str) -> Floats:
+    def _align_times(self, name: str) -> Floats:
         """Return the times of a clock, converted to the main clock, s."""
         self._check_overlap(name)
-        return self._own_times(name) + self._clock_shift(name)
+        return self._get_unaligned_times(name) + self._align_clock(name)
 
     def _check_overlap(self, name: str) -> None:
         """Raise LogError for a clock that is not aligned and has no time in common with the main clock."""
-        time, main = self._own_times(name), self._own_times(self._main_clock)
+        time, main = self._get_unaligned_times(name), self._get_unaligned_times(self._main_clock)
         if self.table.clocks[name].align is None and (time[0] > main[-1] or time[-1] < main[0]):
             spans = f"{time[0]:.6g} to {time[-1]:.6g} s, {self._main_clock} from {main[0]:.6g} to {main[-1]:.6g} s"
-            allowed = f"runs from {spans}, without overlap: expected the same clock, `offset_s` or `align`"
-            raise self._error(f"clocks.{name}", self.table.clocks[name].column or "rows", allowed)
+            allowed = f"runs from {spans}, without overlap: use one clock, or set `offset_s` or `align`"
+            raise self._make_error(f"clocks.{name}", self.table.clocks[name].column or "rows", allowed)
 
-    def _own_times(self, name: str) -> Floats:
+    def _get_unaligned_times(self, name: str) -> Floats:
         """Return the times of a clock before its alignment, s.
 
         Dates become seconds since the start of the main clock.
         """
-        time = self._clock(name).time
+        time = self._get_clock(name).time
         return time - self.start if time[0] > _UTC_AFTER_S else time
 
-    def _clock_shift(self, name: str) -> float:
-        """Return the shift that aligns a clock's column with its partner, s; 0 for a clock without `align`.
+    def _align_clock(self, name: str) -> float:
+        """Return the time to add to a clock to align it with the main clock, s; 0 without `align`.
 
-        Raises LogError if the correlation is too small at every shift.
+        The shift is the one with the best correlation between the two signals in `align`.  Raises LogError if the
+        correlation is too small at every shift.
         """
         align = self.table.clocks[name].align
         if align is None:
             return 0.0
         if name not in self._shifts:
-            clock, field = self._clock(name), f"clocks.{name}.align"
-            values = _numbers(
-                self._column_on_clock(clock, align.column, f"{field}.column", name),
-                self._location(clock.data, align.column),
+            clock, field = self._get_clock(name), f"clocks.{name}.align"
+            values = _parse_numbers(
+                self._find_column_on_clock(clock, align.column, f"{field}.column", name),
+                self._locate_column(clock.data, align.column),
             )
-            partner = self._alignment_partner(align.partner, field)
+            partner = self._read_alignment_partner(align.partner, field)
             is_known = np.isfinite(values)
-            time = self._own_times(name)[is_known]
+            time = self._get_unaligned_times(name)[is_known]
             best = find_clock_shift(time, values[is_known], *partner, align.within_s)
             if best.correlation < _MIN_CORRELATION:
                 message = f"{align.column} and {align.partner} have a correlation of at most {best.correlation:.2f}"
@@ -329,7 +336,7 @@ class ColumnLog:
             self._shifts[name] = best.shift
         return self._shifts[name]
 
-    def _alignment_partner(self, name: str, field: str) -> tuple[Floats, Floats]:
+    def _read_alignment_partner(self, name: str, field: str) -> tuple[Floats, Floats]:
         """Return times and finite values of the signal to which a clock is aligned.
 
         name: a quantity, or a column with the main clock.
@@ -337,16 +344,18 @@ class ColumnLog:
         if name in self.table.columns:
             series = self.series(name)
         else:
-            clock = self._clock(self._main_clock)
-            column = self._column_on_clock(clock, name, f"{field}.with", self._main_clock)
-            series = Series(self._times(self._main_clock), _numbers(column, self._location(clock.data, name)))
+            clock = self._get_clock(self._main_clock)
+            column = self._find_column_on_clock(clock, name, f"{field}.with", self._main_clock)
+            series = Series(
+                self._align_times(self._main_clock), _parse_numbers(column, self._locate_column(clock.data, name))
+            )
         known = np.isfinite(series.values)
         return series.time[known], series.values[known]
 
     # ------------------------------------------------------------------
     # Columns.
 
-    def _clock_columns(self, clock: str) -> list[str]:
+    def _list_columns_of_clock(self, clock: str) -> list[str]:
         """Return the names of the columns that use a clock."""
         return [
             entry.column
@@ -360,10 +369,10 @@ class ColumnLog:
         for quantity, entries in self.table.columns.items():
             for entry in entries:
                 if entry.column is not None:
-                    data = self._data_file(self.table.clocks[entry.clock])
-                    self._column_by_name(data, entry.column, f"columns.{quantity}.column")
+                    data = self._open_data_file(self.table.clocks[entry.clock])
+                    self._find_column(data, entry.column, f"columns.{quantity}.column")
 
-    def _column_by_name(self, data: DataFile, name: str, field: str = "") -> Column:
+    def _find_column(self, data: DataFile, name: str, field: str = "") -> Column:
         """Return a column of a data file by name.
 
         Raises LogError, with a similar name as a hint, if the file does not have the column.
@@ -372,50 +381,50 @@ class ColumnLog:
         """
         if name not in data.columns:
             hint = did_you_mean(name, data.columns) or f": it has {', '.join(list(data.columns)[:12])}"
-            raise self._error(field or "column", name, f"no such column in {data.path.name}{hint}")
+            raise self._make_error(field or "column", name, f"no such column in {data.path.name}{hint}")
         return data.columns[name]
 
-    def _column_on_clock(self, clock: _Clock, name: str, field: str, clock_name: str) -> Column:
+    def _find_column_on_clock(self, clock: _Clock, name: str, field: str, clock_name: str) -> Column:
         """Return a column that uses a clock.
 
         Raises LogError if the column and the clock have different numbers of rows.
         """
-        values = self._column_by_name(clock.data, name, field)
+        values = self._find_column(clock.data, name, field)
         if len(values) != len(clock.time):
-            allowed = f"{len(values)} rows, and the clock {clock_name} has {len(clock.time)}: expected as many"
-            raise self._error(field, name, allowed)
+            allowed = f"{len(values)} rows, but the clock {clock_name} has {len(clock.time)}: expected equal numbers"
+            raise self._make_error(field, name, allowed)
         return values
 
-    def _location(self, data: DataFile, name: str) -> str:
-        """Return file and column as the start of a message."""
+    def _locate_column(self, data: DataFile, name: str) -> str:
+        """Return the path of a data file and the name of a column, as the start of a message."""
         return f"{data.path}: {name}"
 
-    def _entry_series(self, quantity: str, entry: ColumnTable) -> Series:
+    def _read_entry(self, quantity: str, entry: ColumnTable) -> Series:
         """Return the series of one entry in SI units, radians and the default frame.
 
         Only the time span that the table names is read.  Rows that do not meet the entry's condition are NaN.
         """
         if entry.value is not None:
-            time = self._times(self._main_clock)
+            time = self._align_times(self._main_clock)
             return Series(time, np.full(len(time), self._convert(quantity, entry, np.array([entry.value]))[0]))
         field = f"columns.{quantity}"
-        clock = self._clock(entry.clock)
-        column = self._column_on_clock(clock, entry.column or "", f"{field}.column", entry.clock)
-        raw = _numbers(column, self._location(clock.data, entry.column or ""))
+        clock = self._get_clock(entry.clock)
+        column = self._find_column_on_clock(clock, entry.column or "", f"{field}.column", entry.clock)
+        raw = _parse_numbers(column, self._locate_column(clock.data, entry.column or ""))
         values = self._convert(quantity, entry, raw)
         if entry.when is not None:
-            partner = self._column_on_clock(clock, entry.when.column, f"{field}.when.column", entry.clock)
-            values = np.where(_mask_equal(partner, entry.when.value), values, np.nan)
+            partner = self._find_column_on_clock(clock, entry.when.column, f"{field}.when.column", entry.clock)
+            values = np.where(_find_equal_values(partner, entry.when.value), values, np.nan)
         self._check_plausible(quantity, entry, values)
-        time = self._times(entry.clock)
+        time = self._align_times(entry.clock)
         if entry.rate is not None:
-            time, values = self._changed_rows(quantity, entry, time, values)
+            time, values = self._select_changes(quantity, entry, time, values)
         if self.table.span_s is not None:
             start, end = self.table.span_s
             is_in_span = (time >= start) & (time <= end)
             if not is_in_span.any():
-                allowed = f"no rows of {quantity}, which has {time[0]:.6g} to {time[-1]:.6g} s"
-                raise self._error("span_s", f"{start:g} to {end:g} s", allowed)
+                allowed = f"{quantity} has no rows in this span, only from {time[0]:.6g} to {time[-1]:.6g} s"
+                raise self._make_error("span_s", f"{start:g} to {end:g} s", allowed)
             time, values = time[is_in_span], values[is_in_span]
         return Series(time, values)
 
@@ -433,7 +442,7 @@ class ColumnLog:
         """
         known = values[np.isfinite(values)]
         if not known.size:
-            raise self._error(f"columns.{quantity}", entry.column, "holds no numbers in the rows that are read")
+            raise self._make_error(f"columns.{quantity}", entry.column, "holds no numbers in the rows that are read")
         limits = QUANTITIES[quantity]
         if limits.dimension == "mode":
             return
@@ -443,41 +452,41 @@ class ColumnLog:
         factor = UNITS[limits.dimension][entry.unit]
         largest = float(known[np.argmax(np.abs(known))])
         zero = UNIT_ZEROS.get(entry.unit, 0.0)
-        unit = likelier_unit(quantity, entry.unit, float(np.quantile(np.abs(known - zero), 0.98)) / factor)
+        unit = find_likelier_unit(quantity, entry.unit, float(np.quantile(np.abs(known - zero), 0.98)) / factor)
         hint = f"; is it in {unit}?" if unit else ""
         shown = f"{(largest - zero) / factor:.4g} {entry.unit}".rstrip()
         bounds = " to ".join(f"{(limit - zero) / factor:.4g}" for limit in (limits.low, limits.high))
         allowed = f"expected {bounds} {entry.unit}".rstrip()
-        raise self._error(f"columns.{quantity}", f"{entry.column} has {shown}", f"{allowed}{hint}")
+        raise self._make_error(f"columns.{quantity}", f"{entry.column} has {shown}", f"{allowed}{hint}")
 
-    def _changed_rows(self, quantity: str, entry: ColumnTable, time: Floats, values: Floats) -> tuple[Floats, Floats]:
+    def _select_changes(self, quantity: str, entry: ColumnTable, time: Floats, values: Floats) -> tuple[Floats, Floats]:
         """Return the times and values of the rows in which the value changes.
 
         They are the measurements of a column that is written more often than it is measured.  Raises LogError if the
         value changes more often than the stated rate.
         """
-        changes: Flags = np.concatenate([[True], np.diff(values) != 0.0]) & np.isfinite(values)
-        rate = changes.sum() / max(1e-9, float(np.ptp(time)))
+        is_changed: Flags = np.concatenate([[True], np.diff(values) != 0.0]) & np.isfinite(values)
+        rate = is_changed.sum() / max(1e-9, float(np.ptp(time)))
         stated_rate = entry.rate or 0.0
         if rate > _MAX_RATE_RATIO * stated_rate:
-            allowed = f"it changes {rate:.3g} times a second"
-            raise self._error(f"columns.{quantity}.rate", f"{stated_rate:g} Hz", allowed)
-        return time[changes], values[changes]
+            allowed = f"the value changes {rate:.3g} times a second"
+            raise self._make_error(f"columns.{quantity}.rate", f"{stated_rate:g} Hz", allowed)
+        return time[is_changed], values[is_changed]
 
 
-def _mask_equal(values: Column, wanted: float | str) -> Flags:
+def _find_equal_values(values: Column, wanted: float | str) -> Flags:
     """Return a mask (n,): True where a value equals a number or a text."""
     if isinstance(wanted, str):
-        return np.asarray([cell_text(value) == wanted for value in values], np.bool_)
+        return np.asarray([decode_cell(value) == wanted for value in values], np.bool_)
     return np.asarray(values == wanted, np.bool_)
 
 
-def cell_text(value: Any) -> str:
+def decode_cell(value: Any) -> str:
     """Return a cell of a text column, which may be bytes, as a str."""
     return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
 
 
-def _numbers(values: Column, place: str) -> Floats:
+def _parse_numbers(values: Column, place: str) -> Floats:
     """Return a column as numbers; an empty text becomes NaN.
 
     Raises LogError for a text that is not a number.
@@ -488,7 +497,7 @@ def _numbers(values: Column, place: str) -> Floats:
         return values.astype(np.float64)
     numbers = np.full(len(values), np.nan)
     for k, value in enumerate(values):
-        text = cell_text(value).strip() if value is not None else ""
+        text = decode_cell(value).strip() if value is not None else ""
         if text:
             try:
                 numbers[k] = float(text)
@@ -497,14 +506,14 @@ def _numbers(values: Column, place: str) -> Floats:
     return numbers
 
 
-def _seconds_of_dates(values: Column, place: str) -> Floats:
+def _parse_dates(values: Column, place: str) -> Floats:
     """Return dates with times (ISO 8601) as seconds since 1970; a text without a time zone is UTC.
 
     Raises LogError for a text that is not a date.
     """
     import pandas as pd
 
-    texts = values if values.dtype.kind == "M" else [cell_text(value) for value in values]
+    texts = values if values.dtype.kind == "M" else [decode_cell(value) for value in values]
     try:
         stamps = pd.to_datetime(texts, utc=True, format=None if values.dtype.kind == "M" else "ISO8601")
     except (ValueError, TypeError) as error:

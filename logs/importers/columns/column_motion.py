@@ -9,7 +9,7 @@ import numpy as np
 from logs.importers.columns.column_checks import check_signs_and_units
 from logs.importers.columns.column_log import ColumnLog, Series
 from logs.importers.columns.quantities import FRACTION_UNITS
-from logs.importers.motion import MotionLog, Samples, first_ground_position, sort_samples
+from logs.importers.motion import MotionLog, Samples, find_first_ground_position, sort_samples
 from logs.importers.wind_triangle import estimate_wind
 from world.arrays import Floats
 from world.errors import LogError
@@ -44,8 +44,8 @@ def read_column_motion(path: Path) -> MotionLog:
     log = ColumnLog(path)
     check_signs_and_units(log)
     air, velocity = read_air(log), read_velocity(log)
-    controls, angles, elevons = _controls(log)
-    place = _joined_series(log, "latitude", "longitude", "altitude")
+    controls, angles, elevons = _read_controls(log)
+    place = _read_joined_series(log, "latitude", "longitude", "altitude")
     if len(place.time):
         place = Samples(place.time, place.values * np.array([math.degrees(1.0), math.degrees(1.0), 1.0]))
     return MotionLog(
@@ -54,17 +54,17 @@ def read_column_motion(path: Path) -> MotionLog:
         span=log.table.span_s or (-math.inf, math.inf),
         program=log.table.program,
         vehicle="plane",
-        inertial=_joined_series(log, *_INERTIAL),
+        inertial=_read_joined_series(log, *_INERTIAL),
         outputs=NO_SAMPLES,
-        attitude=_attitude(log),
+        attitude=_read_attitude(log),
         velocity=velocity,
         wind=air.wind,
         airspeed=air.airspeed,
         ratio=air.ratio,
-        height=_joined_series(log, "altitude"),
-        battery=_joined_series(log, "voltage", "current"),
+        height=_read_joined_series(log, "altitude"),
+        battery=_read_joined_series(log, "voltage", "current"),
         parameters=log.parameters(),
-        home=first_ground_position(place, velocity),
+        home=find_first_ground_position(place, velocity),
         program_kind="columns",
         controls=controls,
         angles=angles,
@@ -80,7 +80,7 @@ def read_column_motion(path: Path) -> MotionLog:
     )
 
 
-def _joined_series(log: ColumnLog, *quantities: str) -> Samples:
+def _read_joined_series(log: ColumnLog, *quantities: str) -> Samples:
     """Return several quantities as columns of one series, (n, k); no rows if the table lacks one of them."""
     if not log.has(*quantities):
         return NO_SAMPLES
@@ -105,9 +105,9 @@ def join_series(parts: list[Series]) -> Samples:
     return sort_samples(longest.time, np.column_stack(columns))
 
 
-def _attitude(log: ColumnLog) -> Samples:
+def _read_attitude(log: ColumnLog) -> Samples:
     """Return roll, pitch and yaw without jumps at full turns, rad, (n, 3); no rows if the table lacks one."""
-    attitude = _joined_series(log, "roll", "pitch", "yaw")
+    attitude = _read_joined_series(log, "roll", "pitch", "yaw")
     return Samples(attitude.time, np.unwrap(attitude.values, axis=0)) if len(attitude.time) else attitude
 
 
@@ -166,23 +166,26 @@ def read_air(log: ColumnLog) -> AirData:
     """
     ratio = NO_SAMPLES
     if log.has("static_pressure", "temperature"):
-        pressure = _joined_series(log, "static_pressure", "temperature")
+        pressure = _read_joined_series(log, "static_pressure", "temperature")
         density = pressure.values[:, 0] / (_GAS_CONSTANT * (pressure.values[:, 1] + _ZERO_CELSIUS_K))
         ratio = Samples(pressure.time, np.sqrt(_SEA_LEVEL_DENSITY / density)[:, np.newaxis])
-    airspeed = true_airspeed = _joined_series(log, "airspeed")
+    airspeed = true_airspeed = _read_joined_series(log, "airspeed")
     if len(airspeed.time):
-        factor = _airspeed_ratio_at(ratio, _joined_series(log, "altitude"), airspeed.time)[:, np.newaxis]
+        factor = _find_airspeed_ratio(ratio, _read_joined_series(log, "altitude"), airspeed.time)[:, np.newaxis]
         if log.frame("airspeed") == "true":
             airspeed = Samples(airspeed.time, airspeed.values / factor)
         else:
             true_airspeed = Samples(airspeed.time, airspeed.values * factor)
-    wind, source = _logged_wind(log), "wind of the table"
+    wind, source = _read_logged_wind(log), "wind of the table"
     if not len(wind.time):
-        wind, source = estimate_wind(read_velocity(log), _attitude(log), true_airspeed), "the triangle of velocities"
+        wind, source = (
+            estimate_wind(read_velocity(log), _read_attitude(log), true_airspeed),
+            "the triangle of velocities",
+        )
     return AirData(airspeed, true_airspeed, ratio, wind, source)
 
 
-def _logged_wind(log: ColumnLog) -> Samples:
+def _read_logged_wind(log: ColumnLog) -> Samples:
     """Return the logged wind velocity to north and east, m/s, (n, 2); no rows if it is not logged."""
     if log.has("wind_north", "wind_east"):
         return join_series([log.series("wind_north"), log.series("wind_east")])
@@ -193,10 +196,11 @@ def _logged_wind(log: ColumnLog) -> Samples:
     return NO_SAMPLES
 
 
-def _airspeed_ratio_at(ratio: Samples, height: Samples, time: Floats) -> Floats:
-    """Return the ratio of true to indicated airspeed at the given times, (n,).
+def _find_airspeed_ratio(ratio: Samples, height: Samples, time: Floats) -> Floats:
+    """Return the ratio of true to indicated airspeed at each time, (n,).
 
-    Without rows in `ratio`, the ratio of the standard atmosphere at the altitude is returned.
+    ratio: logged ratio, (k, 1); if it has no rows, the ratio of the standard atmosphere at the altitude is returned.
+    height: altitude, m AMSL, (m, 1); 0 if it has no rows.
     """
     if len(ratio.time):
         return np.asarray(np.interp(time, ratio.time, ratio.values[:, 0]))
@@ -204,32 +208,34 @@ def _airspeed_ratio_at(ratio: Samples, height: Samples, time: Floats) -> Floats:
     return np.asarray((1.0 - 2.25577e-5 * np.clip(altitude, -500.0, 9000.0)) ** -2.12794)
 
 
-def _controls(log: ColumnLog) -> tuple[Samples, tuple[bool, bool, bool], bool]:
-    """Return the controls, flags for the controls that are angles, and True if the aircraft has elevons.
+def _read_controls(log: ColumnLog) -> tuple[Samples, tuple[bool, bool, bool], bool]:
+    """Return the controls, three flags for controls that are angles, and True if the aircraft has elevons.
 
-    The controls and the flags of the three surfaces are those of `MotionLog.controls` and `MotionLog.angles`.  Left and
-    right halves become one surface: the elevator is their mean, the aileron half their difference.  There are no rows
-    if elevator, aileron or throttle is missing; a missing rudder is 0.
+    The controls and the flags are defined at `MotionLog.controls` and `MotionLog.angles`.  Left and right halves become
+    one surface: the elevator is their mean, the aileron half their difference.  There are no rows if elevator, aileron
+    or throttle is missing.  A missing rudder is 0.
     """
     has_elevons = log.has("elevon_left", "elevon_right")
-    elevator = _surface_deflections(
+    elevator = _read_surface(
         log, "elevator", ("elevon_left", "elevon_right") if has_elevons else ("elevator_left", "elevator_right")
     )
-    aileron = _surface_deflections(
+    aileron = _read_surface(
         log, "aileron", ("elevon_left", "elevon_right") if has_elevons else ("aileron_left", "aileron_right")
     )
-    rudder = _surface_deflections(log, "rudder", ())
+    rudder = _read_surface(log, "rudder", ())
     if elevator is None or aileron is None or not log.has("throttle"):
         return NO_SAMPLES, (False, False, False), has_elevons
     (elevator_series, elevator_unit), (aileron_series, aileron_unit) = elevator, aileron
     rudder_series, rudder_unit = rudder or (Series(elevator_series.time, 0.0 * elevator_series.values), "rad")
-    negated = Series(elevator_series.time, -elevator_series.values), Series(rudder_series.time, -rudder_series.values)
-    samples = join_series([negated[0], aileron_series, negated[1], log.series("throttle")])
+    # The elevator is positive with its trailing edge down, the rudder with its trailing edge to the left.
+    pitch_up = Series(elevator_series.time, -elevator_series.values)
+    yaw_right = Series(rudder_series.time, -rudder_series.values)
+    samples = join_series([pitch_up, aileron_series, yaw_right, log.series("throttle")])
     angles = tuple(unit not in FRACTION_UNITS for unit in (elevator_unit, aileron_unit, rudder_unit))
     return samples, (angles[0], angles[1], angles[2]), has_elevons
 
 
-def _surface_deflections(log: ColumnLog, name: str, halves: tuple[str, ...]) -> tuple[Series, str] | None:
+def _read_surface(log: ColumnLog, name: str, halves: tuple[str, ...]) -> tuple[Series, str] | None:
     """Return a surface's deflections and their unit, or None if the table lacks them.
 
     They come from the surface's own column, or else from the columns of its left and right half.  Raises LogError if

@@ -9,13 +9,14 @@ import numpy as np
 from flight.mission_files.formats import read_mission
 from flight.simulation.setup import VerticalDatum
 from logs.importers.columns.column_checks import check_signs_and_units
-from logs.importers.columns.column_log import ColumnLog, cell_text
+from logs.importers.columns.column_log import ColumnLog, decode_cell
 from logs.importers.columns.column_motion import join_series, read_air, read_velocity
 from logs.importers.raw_log import LoggedMission, LogSeries, ModeChange, RawLog
 from world.arrays import Floats
 from world.errors import LogError
 
 FORMAT = "table of columns"
+_POSITIONS_NEEDED = "expected a column, because a flight is judged by its positions"
 _DATUMS: dict[str, VerticalDatum] = {"amsl": "amsl", "ellipsoid": "ellipsoid", "start": "unstated"}
 
 
@@ -29,19 +30,19 @@ def read_columns(path: Path) -> RawLog:
     log = ColumnLog(path)
     for quantity in ("latitude", "longitude"):
         if not log.has(quantity):
-            raise LogError.at(log.table_path, f"columns.{quantity}", "missing", "a flight is judged by its positions")
+            raise LogError.at(log.table_path, f"columns.{quantity}", "missing", _POSITIONS_NEEDED)
     check_signs_and_units(log)
-    position = _position(log)
+    position = _read_position(log)
     return RawLog(
         source=str(path),
         format=FORMAT,
         program=log.table.program,
         vehicle="plane",
-        series={"position": position} | dict(_series(log)),
+        series={"position": position} | dict(_read_series(log)),
         heights=(),
         datum=_DATUMS[log.frame("altitude")] if log.has("altitude") else "unstated",
-        modes=tuple(_modes(log)),
-        missions=tuple(_missions(log)),
+        modes=tuple(_read_modes(log)),
+        missions=tuple(_read_missions(log)),
         parameters=log.parameters(),
         clock="start",
         utc_start=log.utc_start,
@@ -49,7 +50,7 @@ def read_columns(path: Path) -> RawLog:
     )
 
 
-def _position(log: ColumnLog) -> LogSeries:
+def _read_position(log: ColumnLog) -> LogSeries:
     """Return latitude (deg), longitude (deg) and altitude (m), (n, 3); the altitude is NaN if not logged."""
     latitude, longitude = log.series("latitude"), log.series("longitude")
     parts = join_series([latitude, longitude])
@@ -61,7 +62,7 @@ def _position(log: ColumnLog) -> LogSeries:
     return LogSeries(log.column("altitude" if log.has("altitude") else "latitude"), parts.time, values)
 
 
-def _series(log: ColumnLog) -> Iterator[tuple[str, LogSeries]]:
+def _read_series(log: ColumnLog) -> Iterator[tuple[str, LogSeries]]:
     """Yield the series of `logs.importers.raw_log.COLUMNS` that the table has, except the positions."""
     velocity = read_velocity(log)
     if len(velocity.time):
@@ -75,13 +76,13 @@ def _series(log: ColumnLog) -> Iterator[tuple[str, LogSeries]]:
     if len(air.wind.time):
         yield "wind", LogSeries(air.wind_source, air.wind.time, air.wind.values[:, ::-1])
     if log.has("current"):
-        yield "battery", _battery(log)
+        yield "battery", _read_battery(log)
     if log.has("throttle"):
         throttle = join_series([log.series("throttle")])
         yield "throttle", LogSeries(log.column("throttle"), throttle.time, throttle.values)
 
 
-def _battery(log: ColumnLog) -> LogSeries:
+def _read_battery(log: ColumnLog) -> LogSeries:
     """Return the current (A) and the energy taken from the battery (Wh), (n, 2).
 
     The energy is NaN if the voltage is not logged.
@@ -98,22 +99,22 @@ def _battery(log: ColumnLog) -> LogSeries:
     return LogSeries("battery", battery.time, np.column_stack([battery.values[:, 0], energy]))
 
 
-def _missions(log: ColumnLog) -> Iterator[LoggedMission]:
+def _read_missions(log: ColumnLog) -> Iterator[LoggedMission]:
     """Yield the mission file that the table names, if any."""
     if log.table.mission is not None:
         path = log.table_path.parent / log.table.mission
         yield LoggedMission(0.0, read_mission(path), path.name)
 
 
-def _modes(log: ColumnLog) -> Iterator[ModeChange]:
+def _read_modes(log: ColumnLog) -> Iterator[ModeChange]:
     """Yield each change of the quantity `mode`, with the mode's name from the table's [modes]."""
     if not log.has("mode"):
         return
-    time, values = log.raw("mode")
+    time, values = log.raw_values("mode")
     names, automatic = log.table.modes.names, log.table.modes.automatic
     previous = None
     for start, value in zip(time.tolist(), values.tolist(), strict=True):
         if value != previous:
-            key = f"{value:g}" if isinstance(value, float) else cell_text(value)
+            key = f"{value:g}" if isinstance(value, float) else decode_cell(value)
             yield ModeChange(start, names.get(key, key), value in automatic or key in automatic)
             previous = value

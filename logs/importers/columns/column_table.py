@@ -125,10 +125,10 @@ class LogTable(_Table):
             if clock.column is None and clock.rate is None:
                 raise ValueError(f"clocks.{name}: expected `column`, the column of times, or `rate`, rows per second")
             if name == MAIN_CLOCK and clock.align is not None:
-                raise ValueError(f"clocks.{name}.align: the other clocks are aligned to this one")
+                raise ValueError(f"clocks.{name}.align: not allowed: the other clocks are aligned to this clock")
             partners = self.columns.get(clock.align.partner, []) if clock.align is not None else []
             if any(entry.value is None and self.clocks[entry.clock].align is not None for entry in partners):
-                raise ValueError(f"clocks.{name}.align.with: expected a quantity whose clock has no `align` of its own")
+                raise ValueError(f"clocks.{name}.align.with: expected a quantity whose clock has no `align`")
         if self.span_s is not None and not self.span_s[0] < self.span_s[1]:
             raise ValueError(f"span_s: {list(self.span_s)}: expected a start before an end")
         return self

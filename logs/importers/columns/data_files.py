@@ -93,7 +93,7 @@ def _read_csv(path: Path) -> DataFile:
     if rows and not any(_NUMBER.fullmatch(cell) for cell in rows[0][1].split(separator) if cell.strip()):
         cells = [cell.strip().strip('"[]()') for cell in rows.pop(0)[1].split(separator)]
         units = dict(zip(names, cells, strict=False))
-    _check_widths(path, rows, separator, len(names))
+    _check_cell_counts(path, rows, separator, len(names))
     decimal = "," if separator == ";" and any("," in line for _, line in rows[:10]) else "."
     from io import StringIO
 
@@ -101,13 +101,13 @@ def _read_csv(path: Path) -> DataFile:
     # The names are given, so that a separator at the end of a row does not make its first cell an index.
     options = {"header": None, "names": names, "index_col": False, "skipinitialspace": True, "low_memory": False}
     table = pd.read_csv(StringIO(body), sep=separator, decimal=decimal, **options)
-    return DataFile(path, {str(name): _numbers_as_float64(table[name].to_numpy()) for name in table.columns}, units)
+    return DataFile(path, {str(name): _convert_numbers(table[name].to_numpy()) for name in table.columns}, units)
 
 
 def _is_remark(line: str, next_lines: list[str]) -> bool:
-    """Return True if a line is a remark.
+    """Return True if a line of a CSV file is a remark, which begins with # or %.
 
-    A line that begins with # or % and has as many cells as the next line is the header instead.
+    If such a line has as many cells as the next line, it is the header instead.
     """
     if not line.lstrip().startswith(("#", "%")):
         return False
@@ -116,8 +116,8 @@ def _is_remark(line: str, next_lines: list[str]) -> bool:
     return widths[0] == 0 or widths[0] != widths[-1] or not next_lines
 
 
-def _check_widths(path: Path, rows: list[tuple[int, str]], separator: str, width: int) -> None:
-    """Raise LogError if a row has another number of cells than the header.
+def _check_cell_counts(path: Path, rows: list[tuple[int, str]], separator: str, width: int) -> None:
+    """Raise LogError if a row of a CSV file has another number of cells than the header.
 
     rows: number and text of each line.
     width: number of cells in the header.
@@ -135,7 +135,7 @@ def _check_widths(path: Path, rows: list[tuple[int, str]], separator: str, width
             )
 
 
-def _numbers_as_float64(values: Column) -> Column:
+def _convert_numbers(values: Column) -> Column:
     """Return numeric values as float64, and other values unchanged."""
     return values.astype(np.float64) if values.dtype.kind in "fiub" else values
 
@@ -157,34 +157,33 @@ def _read_mat(path: Path) -> DataFile:
     for name, value in variables.items():
         if not name.startswith("__"):
             labels = variables.get(f"{name}_label")
-            columns |= dict(_mat_columns(name, value, labels))
+            columns |= dict(_list_mat_columns(name, value, labels))
     return DataFile(path, columns)
 
 
-def _mat_columns(name: str, value: Any, labels: Any = None) -> Iterator[tuple[str, Column]]:
-    """Yield the names and values of a variable's columns.
-
-    They are the fields of a struct, or the columns of a matrix.
+def _list_mat_columns(name: str, value: Any, labels: Any = None) -> Iterator[tuple[str, Column]]:
+    """Yield name and values of the columns of a MATLAB variable: a struct's fields or a matrix's columns.
 
     labels: names of a matrix's columns, if known.
     """
     if hasattr(value, "_fieldnames"):
         for field_name in value._fieldnames:
-            yield from _mat_columns(f"{name}.{field_name}", getattr(value, field_name))
+            yield from _list_mat_columns(f"{name}.{field_name}", getattr(value, field_name))
         return
     array = np.asarray(value)
     if array.dtype.names is not None:
         for field_name in array.dtype.names:
-            yield from _mat_columns(f"{name}.{field_name}", array[field_name])
+            yield from _list_mat_columns(f"{name}.{field_name}", array[field_name])
         return
     titles = [str(label) for label in np.atleast_1d(labels)] if labels is not None else []
-    yield from _array_columns(name, array, titles)
+    yield from _list_array_columns(name, array, titles)
 
 
-def _array_columns(name: str, array: Column, titles: list[str] | None = None) -> Iterator[tuple[str, Column]]:
-    """Yield an array of one dimension, or each column of a matrix, with their names; ignore other arrays.
+def _list_array_columns(name: str, array: Column, titles: list[str] | None = None) -> Iterator[tuple[str, Column]]:
+    """Yield name and values of each column of an array; ignore arrays of more than two dimensions.
 
-    The longer axis of a matrix is taken as its rows, unless the number of titles shows which axis has the columns.
+    An array of one dimension is one column.  The longer axis of a matrix is taken as its rows, unless the number of
+    titles shows which axis has the columns.
     """
     if array.ndim < 2:
         values = np.atleast_1d(array)
@@ -198,7 +197,7 @@ def _array_columns(name: str, array: Column, titles: list[str] | None = None) ->
         )
         for k in range(rows.shape[1]):
             title = f"{name}.{titles[k]}" if has_titles and titles else f"{name}[{k}]"
-            yield from _array_columns(title, np.ascontiguousarray(rows[:, k]))
+            yield from _list_array_columns(title, np.ascontiguousarray(rows[:, k]))
 
 
 # ----------------------------------------------------------------------
@@ -213,7 +212,7 @@ def _read_parquet(path: Path) -> DataFile:
     columns = {}
     for name in table.column_names:
         values = table[name].to_numpy()
-        columns[name] = _numbers_as_float64(np.asarray(values))
+        columns[name] = _convert_numbers(np.asarray(values))
     return DataFile(path, columns)
 
 
@@ -232,9 +231,9 @@ def _read_hdf5(path: Path) -> DataFile:
             values = np.array("".join(chr(code) for code in values.ravel()))
         if values.dtype.names is not None:
             for field_name in values.dtype.names:
-                columns.update(_array_columns(f"{title}.{field_name}", np.squeeze(values[field_name])))
+                columns.update(_list_array_columns(f"{title}.{field_name}", np.squeeze(values[field_name])))
         else:
-            columns.update(_array_columns(title, np.squeeze(values)))
+            columns.update(_list_array_columns(title, np.squeeze(values)))
 
     with h5py.File(path, "r") as file:
         file.visititems(visit)

@@ -30,5 +30,5 @@ def find_column_table(path: Path) -> Path:
     for choice in choices:
         if choice.is_file():
             return choice
-    advice = f"`planfly import {choices[0]} --columns-from {path}` writes one to check"
+    advice = f"`planfly import {choices[0]} --columns-from {path}` writes a first table, which you then check"
     raise LogError(f"{path}: no table of columns ({choices[0].name} or {FOLDER_TABLE}): {advice}", file=path)

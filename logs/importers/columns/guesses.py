@@ -146,8 +146,8 @@ _LEAST_MEDIANS = {"acceleration_down": 4.0, "voltage": 2.5}
 _HIGHEST_VOLTAGE_V = 130.0
 _HEAD = (
     "# Table of columns, guessed from names and values.  Check column, unit, sign and frame of each line with the mark",
-    "# `guess`, and remove the mark.  planfly refuses what contradicts itself, but cannot know the sign of a surface,",
-    "# or the datum of an altitude.",
+    "# `guess`, and remove the mark.  planfly refuses quantities that contradict each other, but cannot know the sign",
+    "# of a surface, or the datum of an altitude.",
     "",
 )
 _UNIT_SUFFIX = re.compile(r"(?:\s*[\[(]\s*([^\])]*)\s*[\])]|_([a-zA-Z%]+[0-9]?))\s*$")
@@ -204,7 +204,7 @@ def guess_column_table(paths: Sequence[Path], target: Path) -> str:
     """
     file_names = [Path(os.path.relpath(path, target.parent)).as_posix() for path in paths]
     files = {name: read_data_file(path) for name, path in zip(file_names, paths, strict=True)}
-    times = [clock for file, data in files.items() for clock in _time_clocks(data, file)]
+    times = [clock for file, data in files.items() for clock in _find_clocks(data, file)]
     clocks: list[_Clock] = []
     for clock in sorted(times, key=lambda clock: -clock.length):
         # Of several columns of times in a group, use the one with the most time in common with the longest group.
@@ -220,24 +220,25 @@ def guess_column_table(paths: Sequence[Path], target: Path) -> str:
     alternatives: list[_Guess] = []
     for quantity in NAMES:
         # A column with the rate of the sensors is preferred.
-        candidates = sorted(_candidate_entries(quantity, clocks, files), key=lambda guess: guess.clock != clocks[0])
+        candidates = sorted(_guess_entries(quantity, clocks, files), key=lambda guess: guess.clock != clocks[0])
         guesses += candidates[:1]
         alternatives += [guess for guess in candidates[1:] if guess.clock != candidates[0].clock]
     if not guesses:
         names = ", ".join(list(next(iter(files.values())).columns)[:12])
         raise LogError(f"{paths[0]}: no column was recognized among {names}; write a table by hand", file=paths[0])
-    return _table_text(guesses, alternatives, files)
+    return _format_table(guesses, alternatives, files)
 
 
-def _plain_name(name: str) -> str:
+def _normalize_name(name: str) -> str:
     """Return only the letters and digits of a name, in lower case."""
     return re.sub(r"[^a-z0-9]", "", name.lower())
 
 
-def _name_parts(data: DataFile, column: str) -> tuple[str, str, str]:
+def _split_column_name(data: DataFile, column: str) -> tuple[str, str, str]:
     """Split a column's name into a prefix, a name and a unit.
 
-    The unit is the one that the file or the name states; "" if neither states one.
+    The prefix is the text before the last dot, such as a message name.  The unit is stated by the file or by the end of
+    the name; it is "" if neither states one.
     """
     prefix, _, name = column.rpartition(".")
     unit = _SPELLINGS.get(data.units.get(column, "").strip().lower(), "")
@@ -248,19 +249,22 @@ def _name_parts(data: DataFile, column: str) -> tuple[str, str, str]:
     return prefix, name, unit
 
 
-def _time_clocks(data: DataFile, file: str) -> Iterator[_Clock]:
-    """Yield a clock for each column with increasing values and a name that stands for time."""
+def _find_clocks(data: DataFile, file: str) -> Iterator[_Clock]:
+    """Yield a clock for each column of a file with increasing values and a name that means time.
+
+    file: name of the file in the table.
+    """
     for column, values in data.columns.items():
-        prefix, name, unit = _name_parts(data, column)
-        if {_plain_name(name), _plain_name(column.rpartition(".")[2])} & set(_TIMES) and (
-            unit := _time_unit(values, unit)
+        prefix, name, unit = _split_column_name(data, column)
+        if {_normalize_name(name), _normalize_name(column.rpartition(".")[2])} & set(_TIMES) and (
+            unit := _find_time_unit(values, unit)
         ):
             factor = UNITS["time"][unit]
             span = (0.0, 0.0) if unit == "iso" else (float(values[0]) * factor, float(values[-1]) * factor)
             yield _Clock(file, prefix, column, unit, len(values), span)
 
 
-def _time_unit(values: Column, stated: str) -> str:
+def _find_time_unit(values: Column, stated: str) -> str:
     """Return the unit in which a column has increasing times at usual intervals.
 
     The unit is "iso" for dates with times of day.  Return "" if the column has no such times.
@@ -279,15 +283,18 @@ def _time_unit(values: Column, stated: str) -> str:
     return next((unit for unit in units if _STEPS_S[0] <= usual_step * UNITS["time"][unit] <= _STEPS_S[1]), "")
 
 
-def _candidate_entries(quantity: str, clocks: Sequence[_Clock], files: dict[str, DataFile]) -> Iterator[_Guess]:
-    """Yield a guess for each column that can hold a quantity, the best name first."""
+def _guess_entries(quantity: str, clocks: Sequence[_Clock], files: dict[str, DataFile]) -> Iterator[_Guess]:
+    """Yield a guessed entry for each column that can hold a quantity, in the order of `NAMES`."""
     for name in NAMES[quantity]:
         for clock in clocks:
             data = files[clock.file]
             for column, values in data.columns.items():
-                prefix, column_name, unit = _name_parts(data, column)
+                prefix, column_name, unit = _split_column_name(data, column)
                 has_clock = prefix == clock.prefix and len(values) == clock.length
-                if not has_clock or name not in (_plain_name(column_name), _plain_name(column.rpartition(".")[2])):
+                if not has_clock or name not in (
+                    _normalize_name(column_name),
+                    _normalize_name(column.rpartition(".")[2]),
+                ):
                     continue
                 guess = _guess_entry(quantity, column, clock, values, unit)
                 if guess is not None:
@@ -310,14 +317,14 @@ def _guess_entry(quantity: str, column: str, clock: _Clock, values: Column, stat
     known = numbers[np.isfinite(numbers)]
     if not known.size or not np.ptp(known):
         return None
-    unit = stated if stated in UNITS[entry.dimension] else _plausible_unit(quantity, known)
+    unit = stated if stated in UNITS[entry.dimension] else _find_plausible_unit(quantity, known)
     if unit is None:
         return None
     reason = f": largest value {np.abs(known).max():.4g}" + (f", named {stated}" if stated and unit == stated else "")
     return _Guess(quantity, column, clock, unit, _guess_frame(quantity, column, known), reason)
 
 
-def _plausible_unit(quantity: str, known: Floats) -> str | None:
+def _find_plausible_unit(quantity: str, known: Floats) -> str | None:
     """Return the first unit in which the values of a quantity are plausible, or None.
 
     They are plausible if at least 98 % of them lie in the range of the quantity, and their median is usual for it.
@@ -351,7 +358,7 @@ def _guess_frame(quantity: str, column: str, known: Floats) -> str:
     return frames[0] if frames else ""
 
 
-def _clock_names(guesses: Sequence[_Guess]) -> dict[_Clock, str]:
+def _name_clocks(guesses: Sequence[_Guess]) -> dict[_Clock, str]:
     """Return a name for each clock that the guesses use.
 
     The clock with the most guesses is the main clock.
@@ -365,12 +372,12 @@ def _clock_names(guesses: Sequence[_Guess]) -> dict[_Clock, str]:
     return names
 
 
-def _table_text(guesses: Sequence[_Guess], alternatives: Sequence[_Guess], files: dict[str, DataFile]) -> str:
+def _format_table(guesses: Sequence[_Guess], alternatives: Sequence[_Guess], files: dict[str, DataFile]) -> str:
     """Return the guessed table of columns as TOML, each guess with a remark.
 
     alternatives: columns for the guessed quantities on other clocks, used to align these clocks with the main clock.
     """
-    file, names = next(iter(files)), _clock_names(guesses)
+    file, names = next(iter(files)), _name_clocks(guesses)
     lines = [*_HEAD, f'file = "{file}"', 'program = ""']
     main_clock = next(clock for clock, name in names.items() if name == MAIN_CLOCK)
     for clock, name in names.items():
@@ -384,18 +391,18 @@ def _table_text(guesses: Sequence[_Guess], alternatives: Sequence[_Guess], files
             pair = f'column = "{partner.column}", with = "{partner.quantity}"'
             lines.append(f"align = {{ {pair} }}  # guess: both vary together")
         elif is_separate:
-            lines.append('# guess: the same clock as main; otherwise add align = { column = "...", with = "..." }')
+            lines.append('# guess: this clock equals main; otherwise add align = { column = "...", with = "..." }')
     lines += ["", "[columns]"]
     for guess in guesses:
         parts = [f'column = "{guess.column}"', *([f'unit = "{guess.unit}"'] if guess.unit else [])]
         parts += [f'frame = "{guess.frame}"'] if guess.frame else []
         parts += [f'clock = "{names[guess.clock]}"'] if guess.clock != main_clock else []
         lines.append(f"{guess.quantity} = {{ {', '.join(parts)} }}  # guess{guess.reason}")
-    return "\n".join([*lines, *_missing_lines(guesses), *_unused_lines(guesses, files)]) + "\n"
+    return "\n".join([*lines, *_format_missing_lines(guesses), *_format_unused_lines(guesses, files)]) + "\n"
 
 
-def _missing_lines(guesses: Sequence[_Guess]) -> Iterator[str]:
-    """Yield lines of remarks on the quantities that were not found."""
+def _format_missing_lines(guesses: Sequence[_Guess]) -> Iterator[str]:
+    """Yield comment lines for the table: the needed and the optional quantities that were not found."""
     found_quantities = {guess.quantity for guess in guesses}
     substitutes = dict.fromkeys(ANGLES, QUATERNION[-1]) | {
         "elevator": "elevon_left",
@@ -416,8 +423,8 @@ def _missing_lines(guesses: Sequence[_Guess]) -> Iterator[str]:
         yield f"# Not found, and optional: {', '.join(remaining_quantities)}"
 
 
-def _unused_lines(guesses: Sequence[_Guess], files: dict[str, DataFile]) -> Iterator[str]:
-    """Yield a line of remarks for each file with columns that no guess uses."""
+def _format_unused_lines(guesses: Sequence[_Guess], files: dict[str, DataFile]) -> Iterator[str]:
+    """Yield a comment line for each file with columns that no guess uses."""
     used = {(guess.clock.file, guess.column) for guess in guesses} | {
         (guess.clock.file, guess.clock.column) for guess in guesses
     }
@@ -429,4 +436,4 @@ def _unused_lines(guesses: Sequence[_Guess], files: dict[str, DataFile]) -> Iter
             if (file, name) not in used and (name.rpartition(".")[0], len(values)) in kinds
         ]
         if names:
-            yield f"# Not used of {file}: {', '.join(names)}"
+            yield f"# Columns of {file} that are not used: {', '.join(names)}"

@@ -59,7 +59,9 @@ QUANTITIES: dict[str, Quantity] = {
     "velocity_north": Quantity("speed", "ground velocity to the north", -150, 150),
     "velocity_east": Quantity("speed", "ground velocity to the east", -150, 150),
     "velocity_down": Quantity("speed", "vertical velocity, down (NED) or up (ENU)", -60, 60, _WORLD),
-    "ground_speed": Quantity("speed", "ground speed, with `ground_course` in place of north and east", -1, 150),
+    "ground_speed": Quantity(
+        "speed", "ground speed; with `ground_course` it replaces `velocity_north` and `velocity_east`", -1, 150
+    ),
     "ground_course": Quantity("angle", "ground course, clockwise from north", -_TURN, _TURN),
     "roll": Quantity("angle", "bank to the right", -3.2, 3.2),
     "pitch": Quantity("angle", "nose up (NED) or nose down (ENU)", -1.6, 1.6, _WORLD),
@@ -77,9 +79,9 @@ QUANTITIES: dict[str, Quantity] = {
         f"quaternion_{axis}": Quantity("ratio", f"{axis} component of the attitude quaternion", -1.01, 1.01)
         for axis in "xyz"
     },
-    "roll_rate": Quantity("angular rate", "about the axis forward", -12, 12, _BODY),
-    "pitch_rate": Quantity("angular rate", "about the axis right (FRD) or left (FLU)", -12, 12, _BODY),
-    "yaw_rate": Quantity("angular rate", "about the axis down (FRD) or up (FLU)", -12, 12, _BODY),
+    "roll_rate": Quantity("angular rate", "rotation about the forward axis", -12, 12, _BODY),
+    "pitch_rate": Quantity("angular rate", "rotation about the axis to the right (FRD) or left (FLU)", -12, 12, _BODY),
+    "yaw_rate": Quantity("angular rate", "rotation about the axis that points down (FRD) or up (FLU)", -12, 12, _BODY),
     "acceleration_forward": Quantity("acceleration", "specific force forward", -100, 100, _BODY),
     "acceleration_right": Quantity("acceleration", "specific force to the right (FRD) or left (FLU)", -100, 100, _BODY),
     "acceleration_down": Quantity(
@@ -88,7 +90,9 @@ QUANTITIES: dict[str, Quantity] = {
     "airspeed": Quantity("speed", "airspeed, indicated or true", -20, 150, ("indicated", "true")),
     "wind_north": Quantity("speed", "wind that blows to the north, or from the north", -40, 40, _WIND),
     "wind_east": Quantity("speed", "wind that blows to the east, or from the east", -40, 40, _WIND),
-    "wind_speed": Quantity("speed", "wind speed, with `wind_direction` in place of north and east", -0.1, 40),
+    "wind_speed": Quantity(
+        "speed", "wind speed; with `wind_direction` it replaces `wind_north` and `wind_east`", -0.1, 40
+    ),
     "wind_direction": Quantity(
         "angle", "direction from which (or to which) the wind blows", -_TURN, _TURN, ("from", "to")
     ),
@@ -134,14 +138,14 @@ def to_default_frame(quantity: str, frame: str) -> tuple[float, float]:
     return (-1.0 if _NEGATED_BY_FRAME.get(quantity) == frame else 1.0), 0.0
 
 
-def likelier_unit(quantity: str, unit: str, magnitude: float) -> str:
-    """Return another unit in which the same numbers would be plausible, "" if there is none.
+def find_likelier_unit(quantity: str, unit: str, magnitude: float) -> str:
+    """Return another unit in which numbers of a quantity would be plausible, or "" if there is none.
 
     magnitude: typical number in the data, which was read as a value in ``unit``.
 
-    >>> likelier_unit("roll", "rad", 179.0), likelier_unit("throttle", "fraction", 85.0)
+    >>> find_likelier_unit("roll", "rad", 179.0), find_likelier_unit("throttle", "fraction", 85.0)
     ('deg', '%')
-    >>> likelier_unit("roll", "deg", 9e9)
+    >>> find_likelier_unit("roll", "deg", 9e9)
     ''
     """
     entry = QUANTITIES[quantity]

@@ -23,13 +23,13 @@ Columns = NDArray[Any]
 # The flown rows as a table for spreadsheets and data frames: `.csv`, and `.parquet` if pyarrow is installed.
 
 
-def flight_columns(log: FlightLog) -> dict[str, NDArray[Any]]:
+def make_flight_columns(log: FlightLog) -> dict[str, NDArray[Any]]:
     """Return the rows of a flight as columns (t,) by name: the fields of `/state`, latitude and longitude.
 
     Each name ends with its unit.  East, north and courses refer to the map projection centred on the scenario's origin.
 
     >>> from logs.recording.example_log import example_log
-    >>> columns = flight_columns(example_log())
+    >>> columns = make_flight_columns(example_log())
     >>> list(columns)[:6], len(columns["time_s"])
     (['time_s', 'latitude_deg', 'longitude_deg', 'east_m', 'north_m', 'up_amsl_m'], 366)
     """
@@ -52,7 +52,7 @@ def csv_text(log: FlightLog) -> str:
     >>> csv_text(example_log()).splitlines()[1].split(",")[:6]
     ['0.0', '45.99999981773182', '7.993545330437746', '-500.0', '0.0', '200.0']
     """
-    columns = flight_columns(log)
+    columns = make_flight_columns(log)
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(columns)
@@ -81,14 +81,14 @@ def parquet_bytes(log: FlightLog) -> bytes:
         "planfly.origin_lon_deg": repr(scenario.origin.lon_deg),
         "planfly.ended": log.ended or "",
     }
-    table = pa.table(flight_columns(log)).replace_schema_metadata(metadata)
+    table = pa.table(make_flight_columns(log)).replace_schema_metadata(metadata)
     buffer = io.BytesIO()
     parquet.write_table(table, buffer, compression="zstd")
     return buffer.getvalue()
 
 
 def battery_voltage(log: FlightLog) -> float:
-    """Return the battery's constant voltage, V: the aircraft's, or the mean from logged energy and current.
+    """Return the battery's constant voltage, V: the aircraft's, or the mean by logged energy and current.
 
     Returns NaN for an aircraft without a battery.
 
@@ -138,7 +138,13 @@ _DENSITY_EXPONENT = 4.2559
 
 
 class _Topic(NamedTuple):
-    """A topic: fields after the timestamp (numpy type, shape), and values for the valid rows of the log."""
+    """A ULog topic.
+
+    name: name of the topic.
+    period: interval of its messages, s; 0 for a message for each row.
+    fields: name, numpy type and, for an array, length of each field after the timestamp.
+    values: values of each field and of the timestamp, for the valid rows of the log.
+    """
 
     name: str
     period: float
@@ -157,7 +163,7 @@ def px4_log_bytes(log: FlightLog) -> bytes:
     topics = [topic for topic in _make_topics(log, np.flatnonzero(is_finite)) if len(topic.values["timestamp"])]
     head = bytearray(_MAGIC + struct.pack("<Q", 0) + _encode_message(b"B", bytes(_FLAG_BITS_SIZE_BYTES)))
     for topic in topics:
-        head += _encode_message(b"F", f"{topic.name}:{_format_text(topic)}".encode())
+        head += _encode_message(b"F", f"{topic.name}:{_describe_format(topic)}".encode())
     for key, value in (("sys_name", "planfly"), ("ver_hw", "SITL"), ("sys_uuid", "planfly")):
         name = f"char[{len(value)}] {key}".encode()
         head += _encode_message(b"I", bytes([len(name)]) + name + value.encode())
@@ -169,7 +175,7 @@ def px4_log_bytes(log: FlightLog) -> bytes:
         head += _encode_message(b"A", struct.pack("<BH", 0, number) + topic.name.encode())
     stamps, messages = [], []
     for number, topic in enumerate(topics):
-        times, records = _topic_records(number, topic)
+        times, records = _encode_topic(number, topic)
         stamps += times
         messages += records
     for event in log.events:
@@ -182,11 +188,11 @@ def px4_log_bytes(log: FlightLog) -> bytes:
 
 
 def _encode_message(letter: bytes, body: bytes) -> bytes:
-    """Encode one message of a ULog file."""
+    """Encode one message of a ULog file: its length, the letter of its kind, and its content."""
     return struct.pack("<H", len(body)) + letter + body
 
 
-def _format_text(topic: _Topic) -> str:
+def _describe_format(topic: _Topic) -> str:
     """Return the format of a topic's fields in ULog syntax."""
     return "".join(
         f"{_TYPES[kind]}{f'[{shape[0]}]' if shape else ''} {name};"
@@ -194,7 +200,7 @@ def _format_text(topic: _Topic) -> str:
     )
 
 
-def _topic_records(number: int, topic: _Topic) -> tuple[list[int], list[bytes]]:
+def _encode_topic(number: int, topic: _Topic) -> tuple[list[int], list[bytes]]:
     """Return the timestamps (us) and the encoded data messages of a topic, at the topic's interval.
 
     number: number of the topic in the log.
@@ -230,17 +236,17 @@ def _make_topics(log: FlightLog, rows: NDArray[np.int64]) -> list[_Topic]:
     all_valid, ground_altitude = np.ones(len(rows), dtype=bool), up[0] if len(rows) else 0.0
     true_airspeed, height_above_ground = track.airspeed[rows].astype(np.float64), track.clearance[rows]
     calibrated_airspeed = true_airspeed * np.sqrt(np.maximum(1.0 - _DENSITY_LAPSE_PER_M * up, 0.0) ** _DENSITY_EXPONENT)
-    wind, battery = track.wind[rows], _battery_values(log, rows)
+    wind, battery = track.wind[rows], _make_battery_values(log, rows)
+    quaternions = compute_attitude_quaternion(track.attitude[rows])
 
-    def topic(name: str, period: float, fields: list[tuple[Any, ...]], **values: Any) -> _Topic:
+    def make_topic(name: str, period: float, fields: list[tuple[Any, ...]], **values: Any) -> _Topic:
+        """Make a topic with the timestamps of all rows."""
         return _Topic(name, period, fields, {"timestamp": stamp, **values})
 
     topics = [
-        topic(
-            "vehicle_attitude", _EVERY_ROW_INTERVAL_S, [("q", "<f4", 4)], q=attitude_quaternion(track.attitude[rows])
-        ),
-        topic("vehicle_angular_velocity", _EVERY_ROW_INTERVAL_S, [("xyz", "<f4", 3)], xyz=track.rates[rows]),
-        topic(
+        make_topic("vehicle_attitude", _EVERY_ROW_INTERVAL_S, [("q", "<f4", 4)], q=quaternions),
+        make_topic("vehicle_angular_velocity", _EVERY_ROW_INTERVAL_S, [("xyz", "<f4", 3)], xyz=track.rates[rows]),
+        make_topic(
             "vehicle_local_position",
             _SLOW_INTERVAL_S,
             [
@@ -270,7 +276,7 @@ def _make_topics(log: FlightLog, rows: NDArray[np.int64]) -> list[_Topic]:
             z_global=all_valid,
             dist_bottom_valid=np.isfinite(height_above_ground),
         ),
-        topic(
+        make_topic(
             "vehicle_global_position",
             _SLOW_INTERVAL_S,
             [("lat", "<f8"), ("lon", "<f8"), ("alt", "<f4"), ("terrain_alt", "<f4"), ("terrain_alt_valid", "?")],
@@ -280,7 +286,7 @@ def _make_topics(log: FlightLog, rows: NDArray[np.int64]) -> list[_Topic]:
             terrain_alt=up - height_above_ground,
             terrain_alt_valid=np.isfinite(height_above_ground),
         ),
-        topic(
+        make_topic(
             "airspeed_validated",
             _SLOW_INTERVAL_S,
             [(f"{name}_airspeed_m_s", "<f4") for name in ("indicated", "calibrated", "true")],
@@ -288,21 +294,21 @@ def _make_topics(log: FlightLog, rows: NDArray[np.int64]) -> list[_Topic]:
             calibrated_airspeed_m_s=calibrated_airspeed,
             true_airspeed_m_s=true_airspeed,
         ),
-        topic(
+        make_topic(
             "wind",
             _SLOW_INTERVAL_S,
             [("windspeed_north", "<f4"), ("windspeed_east", "<f4")],
             windspeed_north=wind[:, 1],
             windspeed_east=wind[:, 0],
         ),
-        topic(
+        make_topic(
             "vehicle_thrust_setpoint",
             _SLOW_INTERVAL_S,
             [("xyz", "<f4", 3)],
             xyz=track.commands[rows][:, [THROTTLE]] * np.array([1.0, 0.0, 0.0]),
         ),
-        topic("battery_status", _SLOW_INTERVAL_S, [(name, "<f4") for name in battery], **battery),
-        topic(
+        make_topic("battery_status", _SLOW_INTERVAL_S, [(name, "<f4") for name in battery], **battery),
+        make_topic(
             "vehicle_status",
             _LONG_INTERVAL_S,
             [(name, "u1") for name in ("arming_state", "nav_state", "vehicle_type")],
@@ -311,11 +317,11 @@ def _make_topics(log: FlightLog, rows: NDArray[np.int64]) -> list[_Topic]:
             vehicle_type=_FIXED_WING * all_valid,
         ),
     ]
-    return [*topics, _mission_item_topic(log, rows)]
+    return [*topics, _make_mission_item_topic(log, rows)]
 
 
-def _battery_values(log: FlightLog, rows: NDArray[np.int64]) -> dict[str, Columns]:
-    """Return the values of battery_status by field."""
+def _make_battery_values(log: FlightLog, rows: NDArray[np.int64]) -> dict[str, Columns]:
+    """Return the values of PX4's topic battery_status at some rows, by field."""
     time, current = log.track.time[rows], log.track.current[rows].astype(np.float64)
     energy = log.track.energy[rows].astype(np.float64)
     charge = np.concatenate([[0.0], np.cumsum(np.diff(time) * current[1:])])[: len(rows)]  # As
@@ -327,7 +333,7 @@ def _battery_values(log: FlightLog, rows: NDArray[np.int64]) -> dict[str, Column
     }
 
 
-def _mission_item_topic(log: FlightLog, rows: NDArray[np.int64]) -> _Topic:
+def _make_mission_item_topic(log: FlightLog, rows: NDArray[np.int64]) -> _Topic:
     """Return the topic navigator_mission_item, with each item from the time at which it becomes active.
 
     Items without a position get the time of the next item with a position, and the position 0, 0.  They are not
@@ -373,14 +379,14 @@ def _mission_item_topic(log: FlightLog, rows: NDArray[np.int64]) -> _Topic:
     return _Topic("navigator_mission_item", _EVERY_ROW_INTERVAL_S, list(field_types.items()), values)
 
 
-def attitude_quaternion(attitude: Any) -> Floats:
+def compute_attitude_quaternion(attitude: Any) -> Floats:
     """Convert roll, pitch and yaw to quaternions (n, 4): w, x, y, z.
 
     The quaternion rotates from forward, right, down to north, east, down.
 
     attitude: roll, pitch and yaw, rad, (n, 3).
 
-    >>> attitude_quaternion(np.array([[0.0, 0.0, np.pi]])).round(6).tolist()
+    >>> compute_attitude_quaternion(np.array([[0.0, 0.0, np.pi]])).round(6).tolist()
     [[0.0, 0.0, 0.0, 1.0]]
     """
     half = 0.5 * np.asarray(attitude, dtype=np.float64)

@@ -23,7 +23,7 @@ from logs.verdict.returns.drawn_returns import DrawnReturns
 from logs.verdict.returns.glide_footprint import BAND_ROLES, Part
 from logs.verdict.returns.glides_text import reached_text
 from logs.verdict.returns.returns_text import outcome_text, segment_text
-from logs.views.returns import path_by_outcome, path_by_reach
+from logs.views.returns import split_path_by_outcome, split_path_by_reach
 from world.airspace.zones_on_map import zone_parts
 from world.arrays import Floats
 from world.frames import to_geo
@@ -136,7 +136,7 @@ def return_lines(setup: FlightSetup, drawn_returns: DrawnReturns, track: Track |
     track: the flown track; None for returns from the planned path.
     """
     limit, lines = drawn_returns.returns.limit, []
-    for kind, segment in path_by_outcome(setup, drawn_returns, track):
+    for kind, segment in split_path_by_outcome(setup, drawn_returns, track):
         name = f"{segment[0].time:.0f} to {segment[-1].time:.0f} s: {segment_text(kind)}"
         positions = [point.position for point in segment]
         lines.append(_make_line(setup, name, positions, "returns to launch", f"return-{kind}"))
@@ -144,7 +144,7 @@ def return_lines(setup: FlightSetup, drawn_returns: DrawnReturns, track: Track |
         ret = worst.simulated
         name = f"{number}: from {ret.time:.0f} s to {ret.target.name}: {outcome_text(ret, limit)}"
         lines.append(_make_line(setup, name, worst.path, "the worst returns", "return-way"))
-    for reach, glide_segment in path_by_reach(setup, drawn_returns, track):
+    for reach, glide_segment in split_path_by_reach(setup, drawn_returns, track):
         name = f"{glide_segment[0].time:.0f} to {glide_segment[-1].time:.0f} s: {reached_text(reach)}"
         positions = [point.position for point in glide_segment]
         lines.append(_make_line(setup, name, positions, "without its engine", f"reach-{reach}"))
@@ -168,20 +168,20 @@ def glide_shapes(setup: FlightSetup, drawn_returns: DrawnReturns) -> list[MapZon
     if footprint is None:
         return []
 
-    def shape(name: str, role: str, parts: tuple[Part, ...]) -> MapZone:
+    def make_shape(name: str, role: str, parts: tuple[Part, ...]) -> MapZone:
         """Make an area on the map from outlines in m."""
         geographic_parts = tuple(tuple(_to_geographic(setup, ring) for ring in part) for part in parts)
         return MapZone(name, geographic_parts, folder="the glide's footprint", role=role)
 
     shapes = [
-        shape(f"home or another chosen place in reach from {band.max_height:.0f} m above ground", role, band.parts)
+        make_shape(f"home or another chosen place in reach from {band.max_height:.0f} m above ground", role, band.parts)
         for band in footprint.bands()
         for role in [BAND_ROLES[band.max_height]]
     ]
     flat_parts = footprint.landings()
     return [
         *shapes,
-        *([shape("flat ground according to the elevation file", "landable", flat_parts)] if flat_parts else []),
+        *([make_shape("flat ground according to the elevation file", "landable", flat_parts)] if flat_parts else []),
     ]
 
 
@@ -212,13 +212,13 @@ def kml_text(title: str, lines: list[MapLine], zones: Sequence[MapZone] = ()) ->
         _add_style(mark, line.role)
         string = _add_element(mark, "LineString")
         _add_element(string, "altitudeMode", "absolute")
-        _add_element(string, "coordinates", " ".join(_coordinates_text(line, k) for k in range(len(line.lat_deg))))
+        _add_element(string, "coordinates", " ".join(_format_coordinates(line, k) for k in range(len(line.lat_deg))))
         for k, name in enumerate(line.marks):
             mark = _add_element(folder, "Placemark")
             _add_element(mark, "name", name)
             point = _add_element(mark, "Point")
             _add_element(point, "altitudeMode", "absolute")
-            _add_element(point, "coordinates", _coordinates_text(line, k))
+            _add_element(point, "coordinates", _format_coordinates(line, k))
     _add_zones(folders, zones)
     ElementTree.indent(root)
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
@@ -228,6 +228,7 @@ class _Folders:
     """Folders of a KML document."""
 
     def __init__(self, document: ElementTree.Element) -> None:
+        """Take the KML element to which folders are added."""
         self._document = document
         self._folder_by_name: dict[str, ElementTree.Element] = {}
 
@@ -293,7 +294,7 @@ def _add_element(parent: ElementTree.Element, name: str, text: str = "") -> Elem
     return element
 
 
-def _coordinates_text(line: MapLine, k: int) -> str:
+def _format_coordinates(line: MapLine, k: int) -> str:
     """Return longitude, latitude and altitude of a point in the syntax of KML."""
     return f"{line.lon_deg[k]:.8f},{line.lat_deg[k]:.8f},{line.amsl[k]:.3f}"
 

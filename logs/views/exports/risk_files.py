@@ -55,7 +55,7 @@ def risk_geojson(setup: FlightSetup, volumes: Sequence[RiskVolume], properties: 
 
 
 def _round_height(height: float | None) -> float | None:
-    """Return a height in decimetres, or None."""
+    """Round a height (m) to 0.1 m; None stays None."""
     return None if height is None else round(height, 1)
 
 

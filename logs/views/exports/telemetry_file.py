@@ -55,22 +55,22 @@ def telemetry_bytes(log: FlightLog) -> bytes:
     """
     senders = {sender_ids: mavlink.MAVLink(None, *sender_ids) for sender_ids in (_VEHICLE, _STATION)}
     data = bytearray()
-    for time, sender_ids, message in _timed_messages(log):
+    for time, sender_ids, message in _list_timed_messages(log):
         sender = senders[sender_ids]
         data += _STAMP.pack(EPOCH_NS // 1000 + round(time * 1e6)) + message.pack(sender)
         sender.seq = (sender.seq + 1) % 256
     return bytes(data)
 
 
-def _timed_messages(log: FlightLog) -> Iterator[tuple[float, tuple[int, int], Any]]:
+def _list_timed_messages(log: FlightLog) -> Iterator[tuple[float, tuple[int, int], Any]]:
     """Yield the time in flight (s), the sender and the message of each frame, in order of time."""
-    for message in _upload_messages(log):
+    for message in _make_upload_messages(log):
         yield 0.0, _STATION, message
-    for time, message in _flight_messages(log):
+    for time, message in _make_flight_messages(log):
         yield time, _VEHICLE, message
 
 
-def _upload_messages(log: FlightLog) -> Iterator[Any]:
+def _make_upload_messages(log: FlightLog) -> Iterator[Any]:
     """Yield the messages with which a ground station uploads the mission."""
     items, _, _ = mission_lists(log.setup.mission)
     yield mavlink.MAVLink_heartbeat_message(mavlink.MAV_TYPE_GCS, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, 4, 3)
@@ -79,7 +79,7 @@ def _upload_messages(log: FlightLog) -> Iterator[Any]:
         yield to_message(item)
 
 
-def _flight_messages(log: FlightLog) -> Iterator[tuple[float, Any]]:
+def _make_flight_messages(log: FlightLog) -> Iterator[tuple[float, Any]]:
     """Yield the time (s) and the message of each frame of the vehicle during the flight."""
     setup, track = log.setup, log.track
     snapshots = SnapshotMaker(setup, LocalMap.around(setup))

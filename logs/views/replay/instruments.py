@@ -60,23 +60,23 @@ class Instruments:
         log = self.log
         k = max(0, int(np.searchsorted(log.track.time, time, side="right")) - 1)
         size = _WIDE if columns >= _WIDE.columns else _NARROW
-        horizon_lines, readout_lines = self._horizon_lines(k, size.horizon), self._readout_lines(k)
+        horizon_lines, readout_lines = self._draw_horizon(k, size.horizon), self._format_readouts(k)
         rows = max(len(horizon_lines), len(readout_lines))
         horizon_lines += [" " * (size.horizon + 2)] * (rows - len(horizon_lines))
         readout_lines += [""] * (rows - len(readout_lines))
-        lines = self._head_lines(k, columns)
+        lines = self._format_head_lines(k, columns)
         lines += [
             f"{left_line}  {right_line}" for left_line, right_line in zip(horizon_lines, readout_lines, strict=True)
         ]
         lines += [
             "",
-            *self._control_lines(k, size.bar),
-            self._threat_text(k),
-            *self._latest_entries(float(log.track.time[k])),
+            *self._format_control_lines(k, size.bar),
+            self._describe_threats(k),
+            *self._format_latest_entries(float(log.track.time[k])),
         ]
         return [shorten(line, columns).rstrip() for line in lines]
 
-    def _head_lines(self, k: int, columns: int) -> list[str]:
+    def _format_head_lines(self, k: int, columns: int) -> list[str]:
         """Return the title with the time, a bar of the time flown, and the leg with the remaining distance."""
         log, track = self.log, self.log.track
         time, end = float(track.time[k]), log.end_time
@@ -89,14 +89,14 @@ class Instruments:
         step = route.positions[leg + 1, :2] - track.position[k, :2] if leg < route.legs else np.zeros(2)
         leg_text = (
             f"leg {route.leg_numbers[leg]} of {route.leg_numbers[-1] + 1}, to {waypoint_name(route, leg + 1)},"
-            f" {_metres_text(float(np.hypot(*step)))} to go"
+            f" {_format_metres(float(np.hypot(*step)))} to go"
         )
         if leg >= route.legs:
             leg_text = "after the last waypoint"
         title_width = max(1, columns - len(clock))
-        return [_without_control_characters(title)[: title_width - 1].ljust(title_width) + clock, bar, leg_text]
+        return [_replace_control_characters(title)[: title_width - 1].ljust(title_width) + clock, bar, leg_text]
 
-    def _horizon_lines(self, k: int, columns: int) -> list[str]:
+    def _draw_horizon(self, k: int, columns: int) -> list[str]:
         """Return the artificial horizon: sky above, ground (:) below, the aircraft's wings in the center."""
         roll, pitch, _ = (float(angle) for angle in self.log.track.attitude[k])
         rows = []
@@ -115,7 +115,7 @@ class Instruments:
         edge = "+" + "-" * columns + "+"
         return [edge, *("|" + "".join(cells) + "|" for cells in rows), edge]
 
-    def _readout_lines(self, k: int) -> list[str]:
+    def _format_readouts(self, k: int) -> list[str]:
         """Return the numbers next to the horizon: speeds, heights, attitude, path errors, wind and battery."""
         track, setup = self.log.track, self.log.setup
         east, north, up = (float(value) for value in track.velocity[k])
@@ -123,27 +123,27 @@ class Instruments:
         _, _, amsl = track.position[k].tolist()
         height_above_ground = amsl - float(self.ground[k])
         wind_east, wind_north, _ = (float(value) for value in track.wind[k])
-        height = _metres_text(height_above_ground) if math.isfinite(height_above_ground) else "unknown"
+        height = _format_metres(height_above_ground) if math.isfinite(height_above_ground) else "unknown"
         airspeed, commanded, load_factor, energy_used, current = (
             float(column[k])
             for column in (track.airspeed, track.speed_command, track.load_factor, track.energy, track.current)
         )
         return [
-            f"airspeed     {_number_text(airspeed, 1)} m/s, commanded {_number_text(commanded, 1)}",
-            f"ground speed {_number_text(math.hypot(east, north), 1)} m/s, climb {_number_text(up, 1, '+')} m/s",
-            f"height       {_metres_text(amsl)} AMSL, {height} above ground",
-            f"course       {_course_text(math.degrees(math.atan2(east, north)))}, heading {_course_text(yaw)}",
-            f"roll, pitch  {_number_text(roll, 1, '+')}°, {_number_text(pitch, 1, '+')}°, "
-            f"{_number_text(load_factor, 2)} g",
-            f"off the path {_number_text(float(track.cross_track[k]), 1, '+')} m right, "
-            f"{_number_text(float(track.height_error[k]), 1, '+')} m high",
-            f"wind         {_number_text(math.hypot(wind_east, wind_north), 1)} m/s from "
-            f"{_course_text(math.degrees(math.atan2(-wind_east, -wind_north)))}",
-            f"battery      {_number_text(energy_used, 1)} of {_number_text(setup.battery, 0)} Wh used,"
-            f" {_number_text(current, 1)} A",
+            f"airspeed     {_format_number(airspeed, 1)} m/s, commanded {_format_number(commanded, 1)}",
+            f"ground speed {_format_number(math.hypot(east, north), 1)} m/s, climb {_format_number(up, 1, '+')} m/s",
+            f"height       {_format_metres(amsl)} AMSL, {height} above ground",
+            f"course       {_format_course(math.degrees(math.atan2(east, north)))}, heading {_format_course(yaw)}",
+            f"roll, pitch  {_format_number(roll, 1, '+')}°, {_format_number(pitch, 1, '+')}°, "
+            f"{_format_number(load_factor, 2)} g",
+            f"off the path {_format_number(float(track.cross_track[k]), 1, '+')} m right, "
+            f"{_format_number(float(track.height_error[k]), 1, '+')} m high",
+            f"wind         {_format_number(math.hypot(wind_east, wind_north), 1)} m/s from "
+            f"{_format_course(math.degrees(math.atan2(-wind_east, -wind_north)))}",
+            f"battery      {_format_number(energy_used, 1)} of {_format_number(setup.battery, 0)} Wh used,"
+            f" {_format_number(current, 1)} A",
         ]
 
-    def _control_lines(self, k: int, bar_width: int) -> list[str]:
+    def _format_control_lines(self, k: int, bar_width: int) -> list[str]:
         """Return one bar for each control, with its position (O) between its limits, and its command (|).
 
         The bar of a control without a limit ends at 30°.
@@ -164,28 +164,28 @@ class Instruments:
                     position = value if is_throttle else 0.5 + 0.5 * value / max_value
                     cells[round((bar_width - 1) * min(max(position, 0.0), 1.0))] = symbol
             state_text = (
-                f"{_number_text(100.0 * deflection, 0)} %"
+                f"{_format_number(100.0 * deflection, 0)} %"
                 if is_throttle
-                else f"{_number_text(math.degrees(deflection), 1, '+')}°"
+                else f"{_format_number(math.degrees(deflection), 1, '+')}°"
             )
             limit_text = "  AT ITS LIMIT" if (command >= 1.0 if is_throttle else abs(command) >= max_value) else ""
             lines.append(f"{name:<9} [{''.join(cells)}] {state_text}{limit_text}")
         return lines
 
-    def _threat_text(self, k: int) -> str:
+    def _describe_threats(self, k: int) -> str:
         """Return the names and distances of the missiles and radars whose range contains the aircraft."""
         threats, position = self.log.setup.scenario.threats, self.log.track.position[k]
         distances = np.sqrt(((threats.position - position) ** 2).sum(axis=1))
         threats_in_reach = [
-            f"{unit} {threats.names[m]} at {_metres_text(float(distances[m]))}"
+            f"{unit} {threats.names[m]} at {_format_metres(float(distances[m]))}"
             for unit, radii in (("MISSILE", threats.kill_radius), ("radar", threats.detection_radius))
             for m in np.flatnonzero((radii > 0.0) & (distances <= radii)).tolist()
         ]
-        return _without_control_characters(
-            "within reach of: " + "; ".join(threats_in_reach) if threats_in_reach else "within no unit's reach"
+        return _replace_control_characters(
+            "within reach of: " + "; ".join(threats_in_reach) if threats_in_reach else "outside the reach of all units"
         )
 
-    def _latest_entries(self, time: float) -> list[str]:
+    def _format_latest_entries(self, time: float) -> list[str]:
         """Return the latest entries of the timeline up to a time, s."""
         entry_count = bisect.bisect_right([entry.time for entry in self.entries], time + 1e-9)
         return [
@@ -215,22 +215,22 @@ def make_instruments(log: FlightLog) -> Instruments:
     return Instruments(log, tuple(timeline_of_legs(log)), ground, tuple(control_limits(log.setup.aircraft)))
 
 
-def _without_control_characters(text: str) -> str:
+def _replace_control_characters(text: str) -> str:
     """Replace unprintable characters with spaces, so that they cannot control the terminal."""
     return "".join(letter if letter.isprintable() else " " for letter in text)
 
 
-def _number_text(value: float, digits: int, sign: str = "") -> str:
+def _format_number(value: float, digits: int, sign: str = "") -> str:
     """Return a number with fixed decimals; "?" if it is not finite."""
     # Zero has no unwanted sign: "+0.0" or "0", never "-0".
     return f"{round(value, digits) + 0.0:{sign}.{digits}f}" if math.isfinite(value) else "?"
 
 
-def _metres_text(value: float) -> str:
+def _format_metres(value: float) -> str:
     """Return a length in whole metres with its unit."""
-    return f"{_number_text(value, 0)} m"
+    return f"{_format_number(value, 0)} m"
 
 
-def _course_text(degrees: float) -> str:
+def _format_course(degrees: float) -> str:
     """Return a course with three digits; "?" if it is not finite."""
     return f"{round(degrees) % 360:03d}°" if math.isfinite(degrees) else "?"

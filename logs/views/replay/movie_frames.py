@@ -95,6 +95,7 @@ class _MovingParts:
     """Trail, aircraft and numbers, which move over the map."""
 
     def __init__(self, figure: Figure, axes: Any, setup: FlightSetup, track: Track) -> None:
+        """Make the trail, the aircraft and the caption, which each frame draws again."""
         self._axes, self._figure, self._setup, self._track = axes, figure, setup, track
         look: dict[str, Any] = {"animated": True, "zorder": 9}
         (self._trail,) = axes.plot([], [], color=theme.colour("flown"), linewidth=1.6, **look)
@@ -128,12 +129,12 @@ class _MovingParts:
         rotation = Affine2D().rotate(-yaw if math.isfinite(yaw) else 0.0)
         self._aircraft.set_marker(MarkerStyle(_PLANE, transform=rotation))
         self._aircraft.set_data(track.position[k : k + 1, 0], track.position[k : k + 1, 1])
-        self._text.set_text(self._caption_text(k))
+        self._text.set_text(self._write_caption(k))
         for artist in (self._trail, self._aircraft):
             self._axes.draw_artist(artist)
         self._figure.draw_artist(self._text)
 
-    def _caption_text(self, k: int) -> str:
+    def _write_caption(self, k: int) -> str:
         """Return the caption of a row: time, leg, airspeed, altitude, height above ground and bank."""
         track = self._track
         roll, _, _ = track.attitude[k].tolist()
@@ -141,20 +142,20 @@ class _MovingParts:
         parts = [
             f"{float(track.time[k]):7.1f} s",
             f"leg {leg_numbers[min(int(track.leg[k]), len(leg_numbers) - 1)]} of {leg_numbers[-1] + 1}",
-            f"{signed_number(float(track.airspeed[k]), 1)} m/s",
-            f"{signed_number(float(track.position[k, 2]), 0)} m AMSL",
-            f"{signed_number(float(self._above[k]), 0)} m above ground",
-            f"bank {signed_number(math.degrees(roll), 0)}°",
+            f"{format_signed_number(float(track.airspeed[k]), 1)} m/s",
+            f"{format_signed_number(float(track.position[k, 2]), 0)} m AMSL",
+            f"{format_signed_number(float(self._above[k]), 0)} m above ground",
+            f"bank {format_signed_number(math.degrees(roll), 0)}°",
         ]
         return "   ".join(parts)
 
 
-def signed_number(value: float, digits: int) -> str:
+def format_signed_number(value: float, digits: int) -> str:
     """Return a number as text with ``digits`` decimals; "?" for a non-finite value.
 
     Zero has no sign.
 
-    >>> signed_number(-0.3, 0), signed_number(-12.34, 1)
+    >>> format_signed_number(-0.3, 0), format_signed_number(-12.34, 1)
     ('0', '−12.3')
     """
     return f"{round(value, digits) + 0.0:.{digits}f}".replace("-", "\N{MINUS SIGN}") if math.isfinite(value) else "?"

@@ -68,19 +68,19 @@ def log_with_legs(log: FlightLog) -> FlightLog:
 def timeline_of_legs(log: FlightLog) -> list[TimelineEntry]:
     """List the entries as `timeline` does, for a log whose legs `log_with_legs` has computed."""
     parts = _split_by_leg(log.track, log.setup.route)
-    entries = [_start_entry(log)]
-    entries += _leg_entries(log, parts)
-    entries += _turn_entries(log, parts)
-    entries += _clearance_entries(log, parts)
-    entries += _threat_entries(log)
-    entries += _throttle_entries(log.track)
+    entries = [_make_start_entry(log)]
+    entries += _list_leg_entries(log, parts)
+    entries += _list_turn_entries(log, parts)
+    entries += _list_clearance_entries(log, parts)
+    entries += _list_threat_entries(log)
+    entries += _list_throttle_entries(log.track)
     entries += [
         TimelineEntry(event.time, "event", event.text if event.level == "info" else f"{event.level}: {event.text}")
         for event in log.events
     ]
-    entries += _end_entries(log)
+    entries += _list_end_entries(log)
     clean_entries = [
-        TimelineEntry(entry.time, entry.kind, _without_control_characters(entry.text)) for entry in entries
+        TimelineEntry(entry.time, entry.kind, _replace_control_characters(entry.text)) for entry in entries
     ]
     return sorted(clean_entries, key=lambda entry: (entry.time, _ORDER.index(entry.kind)))
 
@@ -97,7 +97,7 @@ def entry_lines(entry: TimelineEntry) -> list[str]:
     )
 
 
-def _without_control_characters(text: str) -> str:
+def _replace_control_characters(text: str) -> str:
     """Replace unprintable characters with spaces, so that they cannot control the terminal."""
     return "".join(letter if letter.isprintable() else " " for letter in text)
 
@@ -130,7 +130,7 @@ def waypoint_name(route: Route, index: int) -> str:
     return f"waypoint {number}" if item < 0 else f"waypoint {number} (item {item})"
 
 
-def _start_entry(log: FlightLog) -> TimelineEntry:
+def _make_start_entry(log: FlightLog) -> TimelineEntry:
     """Return the entry on aircraft, scenario and start of the flight."""
     setup, track = log.setup, log.track
     east, north, up = track.position[0].tolist()
@@ -145,7 +145,7 @@ def _start_entry(log: FlightLog) -> TimelineEntry:
     return TimelineEntry(float(track.time[0]), "start", text.strip())
 
 
-def _leg_entries(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:
+def _list_leg_entries(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:
     """List an entry for the start of each leg, with course, length, slope and airspeed.
 
     A loiter has one entry for all its legs.
@@ -160,7 +160,7 @@ def _leg_entries(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:
         if len(group) > 1:
             item, radius = int(route.items[leg]), route.arc_radii[leg]
             item_text = f"return of item {item}" if leg in route.rtl_legs else f"loiter of item {item}"
-            text = f"{item_text}: leg {route.leg_numbers[leg]} goes on around its circle, radius {radius:.0f} m"
+            text = f"{item_text}: leg {route.leg_numbers[leg]} continues around its circle, radius {radius:.0f} m"
             entries.append(TimelineEntry(float(log.track.time[part.first]), "leg", text))
             continue
         course = round(math.degrees(courses[leg])) % 360
@@ -172,7 +172,7 @@ def _leg_entries(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:
     return entries
 
 
-def _turn_entries(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:
+def _list_turn_entries(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:
     """List an entry for each change to the next leg: the turn of the route, and the peak bank.
 
     The peak bank is the largest bank between the middles of the two legs.
@@ -196,8 +196,8 @@ def _turn_entries(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:
     return entries
 
 
-def _clearance_entries(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:
-    """List the lowest height above ground of each leg, marked if it is below the required height."""
+def _list_clearance_entries(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:
+    """List an entry for the lowest height above ground on each leg; it states if the height is too low."""
     terrain, track = log.setup.scenario.terrain, log.track
     if terrain is None:
         return [TimelineEntry(float(track.time[0]), "ground", "no terrain in the log: clearance is unknown")]
@@ -215,25 +215,25 @@ def _clearance_entries(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEn
             continue
         k = part.first + int(np.nanargmin(part_clearances))
         time = float(track.time[k] + fractions[k] * (track.time[k + 1] - track.time[k]))
-        below_text = "" if clearances[k] >= required else f", under the required {required:.0f} m"
+        below_text = "" if clearances[k] >= required else f", below the required {required:.0f} m"
         known_text = "" if np.isfinite(part_clearances).all() else ", where there is terrain data"
-        text = f"lowest of {name}: {clearances[k]:.1f} m above ground{below_text}{known_text}"
+        text = f"lowest height on {name}: {clearances[k]:.1f} m above ground{below_text}{known_text}"
         entries.append(TimelineEntry(time, "ground", text))
     return entries
 
 
-def _threat_entries(log: FlightLog) -> list[TimelineEntry]:
+def _list_threat_entries(log: FlightLog) -> list[TimelineEntry]:
     """List each entry into and exit from the range of a missile or a radar."""
     threats, track = log.setup.scenario.threats, log.track
     entries = []
     for k, name in enumerate(threats.names):
         for unit, radius in (("missile", threats.kill_radius[k]), ("radar", threats.detection_radius[k])):
             for stay in passages(track.time, track.position, threats.position[k], float(radius)):
-                entries += _stay_entries(name, unit, float(radius), stay)
+                entries += _list_stay_entries(name, unit, float(radius), stay)
     return entries
 
 
-def _stay_entries(name: str, unit: str, radius: float, stay: Passage) -> list[TimelineEntry]:
+def _list_stay_entries(name: str, unit: str, radius: float, stay: Passage) -> list[TimelineEntry]:
     """List entry and exit of one stay in a sphere, with its duration and the closest distance."""
     entry = TimelineEntry(stay.start, "threat", f"inside the {unit} range of {name} ({radius:.0f} m)")
     stay_text = f"{stay.end - stay.start:.1f} s inside, closest {stay.closest:.0f} m"
@@ -242,7 +242,7 @@ def _stay_entries(name: str, unit: str, radius: float, stay: Passage) -> list[Ti
     return [entry, TimelineEntry(stay.end, "threat", f"outside the {unit} range of {name}: {stay_text}")]
 
 
-def _throttle_entries(track: Track) -> list[TimelineEntry]:
+def _list_throttle_entries(track: Track) -> list[TimelineEntry]:
     """List the periods in which the throttle is full or closed for at least `_MIN_SATURATION_TIME_S`."""
     _, _, _, throttle = track.commands.T
     entries = []
@@ -261,7 +261,7 @@ def _throttle_entries(track: Track) -> list[TimelineEntry]:
     return entries
 
 
-def _end_entries(log: FlightLog) -> list[TimelineEntry]:
+def _list_end_entries(log: FlightLog) -> list[TimelineEntry]:
     """List the end of the flight, with time, distance and energy, and any fault of the log."""
     track = log.track
     steps = np.diff(track.position, axis=0)

@@ -92,7 +92,7 @@ def compare_logs(first: FlightLog, second: FlightLog, *, names: tuple[str, str])
         names = (f"{names[0]} (first)", f"{names[1]} (second)")
     verdicts = (_judge_log(first), _judge_log(second))
     measures = [
-        _measure_flight(log.setup, log.track) | _verdict_margins(verdict)
+        _measure_flight(log.setup, log.track) | _collect_verdict_margins(verdict)
         for log, verdict in zip((first, second), verdicts, strict=True)
     ]
     keys = list(dict.fromkeys([*measures[0], *measures[1]]))
@@ -102,12 +102,12 @@ def compare_logs(first: FlightLog, second: FlightLog, *, names: tuple[str, str])
         names,
         verdicts,
         tuple(differences),
-        (*_difference_notes(first, second, names), *_tolerance_notes(names, verdicts)),
+        (*_list_difference_notes(first, second, names), *_list_tolerance_notes(names, verdicts)),
     )
 
 
-def _tolerance_notes(names: tuple[str, str], verdicts: tuple[Verdict, Verdict]) -> Iterator[str]:
-    """Yield a note for each smallest margin that is negative, but passes within its tolerance."""
+def _list_tolerance_notes(names: tuple[str, str], verdicts: tuple[Verdict, Verdict]) -> Iterator[str]:
+    """Yield a note for each rule whose smallest margin is beyond the limit, but within the tolerance."""
     for name, verdict in zip(names, verdicts, strict=True):
         for rule, finding in verdict.closest.items():
             if finding.tolerance_note:
@@ -162,12 +162,12 @@ def _measure_flight(setup: FlightSetup, track: Track) -> dict[tuple[str, str], f
 
 
 def _reduce_finite(reduce: Callable[[Floats], Any], values: NDArray[np.floating[Any]]) -> float:
-    """Apply a reduction to the finite values; NaN if there are none."""
+    """Apply a reduction, such as a mean or a maximum, to the finite values; NaN if there are none."""
     finite = values[np.isfinite(values)].astype(np.float64)
     return float(reduce(finite)) if finite.size else math.nan
 
 
-def _verdict_margins(verdict: Verdict) -> dict[tuple[str, str], float]:
+def _collect_verdict_margins(verdict: Verdict) -> dict[tuple[str, str], float]:
     """Return the number of failed findings and the smallest margin of each rule, by (name, unit)."""
     values = {("findings that fail", ""): float(sum(finding.ok is False for finding in verdict.findings))}
     for name, rule in RULE_WORDS.items():
@@ -178,7 +178,7 @@ def _verdict_margins(verdict: Verdict) -> dict[tuple[str, str], float]:
     return values
 
 
-def _difference_notes(first: FlightLog, second: FlightLog, names: tuple[str, str]) -> list[str]:
+def _list_difference_notes(first: FlightLog, second: FlightLog, names: tuple[str, str]) -> list[str]:
     """Return sentences on the differences between the setups, and on the distance between the tracks."""
     first_setup, second_setup = first.setup, second.setup
     notes = []
@@ -187,7 +187,7 @@ def _difference_notes(first: FlightLog, second: FlightLog, names: tuple[str, str
         ("aircraft", first_setup.aircraft, second_setup.aircraft),
         ("seed", str(first_setup.seed), str(second_setup.seed)),
         ("mission", *(mission_text(setup.mission, "waypoints") for setup in (first_setup, second_setup))),
-        ("wind", _wind_text(first_setup), _wind_text(second_setup)),
+        ("wind", _describe_wind(first_setup), _describe_wind(second_setup)),
         ("guidance", first_setup.autopilot.store().guidance, second_setup.autopilot.store().guidance),
         ("navigation", first_setup.nav, second_setup.nav),
     ):
@@ -196,21 +196,21 @@ def _difference_notes(first: FlightLog, second: FlightLog, names: tuple[str, str
     for log, name in zip((first, second), names, strict=True):
         if not np.isfinite(log.track.cross_track).any():
             notes.append(
-                f"cross-track and height error: guidance's own, which the log of {name} does not "
-                "contain; planfly refly measures an imported flight against its legs"
+                f"cross-track and height error: the log of {name} does not contain these errors of the guidance; "
+                "planfly refly measures an imported flight against its legs"
             )
     if first_setup.scenario.origin == second_setup.scenario.origin:
         first_positions, second_positions = (
             log.track.position[np.isfinite(log.track.position).all(axis=1)] for log in (first, second)
         )
         if len(first_positions) and len(second_positions):
-            distances = nearest_distances(second_positions, first_positions)
+            distances = measure_nearest_distances(second_positions, first_positions)
             notes.append(
                 f"tracks: {number(float(distances.mean()))} m apart on average,"
                 f" {number(float(distances.max()))} m at most"
             )
     else:
-        notes.append("map origins differ: the tracks are not laid over each other")
+        notes.append("map origins differ: the distance between the tracks is not computed")
     return notes
 
 
@@ -218,14 +218,15 @@ def _difference_notes(first: FlightLog, second: FlightLog, names: tuple[str, str
 _BLOCK_POINTS = 32
 
 
-def nearest_distances(points: Floats, track: Floats) -> Floats:
+def measure_nearest_distances(points: Floats, track: Floats) -> Floats:
     """Return the distance (n,) from each point of one track to the nearest point of another track.
 
     Bounding boxes of successive points, which lie near each other, exclude points that cannot be the nearest.
 
     points, track: (n, 3) and (m, 3).
 
-    >>> nearest_distances(np.array([[0.0, 3.0, 4.0], [9.0, 0.0, 0.0]]), np.array([[0.0, 0.0, 0.0], [10.0, 0.0, 0.0]]))
+    >>> points = np.array([[0.0, 3.0, 4.0], [9.0, 0.0, 0.0]])
+    >>> measure_nearest_distances(points, np.array([[0.0, 0.0, 0.0], [10.0, 0.0, 0.0]]))
     array([5., 1.])
     """
     block_starts = np.arange(0, len(track), _BLOCK_POINTS)
@@ -245,7 +246,7 @@ def nearest_distances(points: Floats, track: Floats) -> Floats:
     return np.concatenate(results)
 
 
-def _wind_text(setup: FlightSetup) -> str:
+def _describe_wind(setup: FlightSetup) -> str:
     """Return wind speed, direction and turbulence as text."""
     wind = setup.scenario.wind
     direction_text = f" from {round(math.degrees(wind.from_course)) % 360:03d}°" if wind.speed else ""
@@ -254,9 +255,10 @@ def _wind_text(setup: FlightSetup) -> str:
 
 
 def difference_rows(comparison: Comparison) -> list[tuple[str, ...]]:
-    """Return the table of differences as text.
+    """Return the rows of the table of differences as text.
 
-    A row has quantity, unit, both values, and the second value minus the first.  The first row has both verdicts.
+    The first row has both verdicts.  Each other row has the quantity, its unit, the values of both flights, and the
+    second value minus the first.
     """
     first_answer, second_answer = (verdict.answer for verdict in comparison.verdicts)
     rows: list[tuple[str, ...]] = [("verdict", "", first_answer, second_answer, "")]
@@ -293,7 +295,7 @@ def difference_lines(comparison: Comparison) -> list[str]:
 
 # Name of the chart of each picture, and its description.
 _PICTURES = {
-    "compare-map": ("map", "Both flights from above, over the first one's map"),
+    "compare-map": ("map", "Both flights from above, over the map of the first flight"),
     "compare-profile": (
         "along",
         "Height, height above ground, airspeed, bank, cross-track and throttle of both flights",
@@ -326,7 +328,7 @@ def write_comparison(out_dir: Path, comparison: Comparison, *, svg: bool = False
     views = comparison_views((first, second))
     figures = {name: draw(view) for name, view in views.items()}
     files = {f"{name}.png": png_bytes(figure) for name, figure in figures.items()}
-    page = _page_html(comparison, (first, second), views, files)
+    page = _render_page(comparison, (first, second), views, files)
     if svg:
         files |= {f"{name}.svg": svg_bytes(figure) for name, figure in figures.items()}
     files["compare.html"] = page.encode("utf-8")
@@ -367,7 +369,7 @@ def comparison_data(flights: tuple[NamedFlight, NamedFlight], views: Mapping[str
     return {"scene": scene, "flight": {"flights": moments}, "charts": charts}
 
 
-def _page_html(
+def _render_page(
     comparison: Comparison, flights: tuple[NamedFlight, NamedFlight], views: Mapping[str, View], files: dict[str, bytes]
 ) -> str:
     """Return the comparison's page with its pictures, charts and scripts."""

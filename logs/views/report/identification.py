@@ -119,7 +119,7 @@ def identification_page(facts: IdentificationFacts) -> str:
     return page_template("identification.html").render(
         facts=facts,
         minutes=f"{facts.estimate.seconds / 60.0:.1f}",
-        fits=_fit_charts(facts.estimate, charts, pictures),
+        fits=_list_fit_charts(facts.estimate, charts, pictures),
         parameters=parameter_rows(facts.estimate),
         silent=facts.estimate.uninformed_lines(),
         shifts=shift_rows(facts.estimate),
@@ -136,7 +136,7 @@ def identification_page(facts: IdentificationFacts) -> str:
     )
 
 
-def _fit_charts(
+def _list_fit_charts(
     estimate: Estimate, charts: Mapping[str, Chart], pictures: Mapping[str, bytes]
 ) -> Sequence[tuple[str, str, str, str]]:
     """Return name, title, picture (data URL) and quality of fit of each equation's chart."""

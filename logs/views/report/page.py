@@ -246,7 +246,7 @@ def write_report(
     views = figure_views(subject)
     drawn_names = {entry.name for entry in FIGURES if every_picture or entry.still}
     pictures = figures.draw_pictures({name: view for name, view in views.items() if name in drawn_names}, svg=svg)
-    page = _page_html(
+    page = _render_page(
         setup, subject, views, pictures, end_reason=ended, versions=versions, command=command, events=events
     )
     out_dir.mkdir(parents=True, exist_ok=True)
@@ -256,7 +256,7 @@ def write_report(
     return [out_dir / name for name in files]
 
 
-def _page_html(
+def _render_page(
     setup: FlightSetup,
     subject: Subject,
     views: Mapping[str, View],
@@ -300,11 +300,11 @@ def _page_html(
         energy=tables.energy_facts(setup, track),
         command=command,
         reproducibility=tables.reproducibility_facts(setup, versions),
-        **_page_data(setup, track, views),
+        **_make_page_data(setup, track, views),
     )
 
 
-def _page_data(setup: FlightSetup, track: Track | None, views: Mapping[str, View]) -> dict[str, Any]:
+def _make_page_data(setup: FlightSetup, track: Track | None, views: Mapping[str, View]) -> dict[str, Any]:
     """Return the data for the scripts of the page, escaped for HTML, and the scripts."""
     script = script_text((*CHART_SCRIPTS, *VIEW_SCRIPTS))
     flight = report_flight(setup, track)

@@ -82,7 +82,7 @@ def leg_rows(setup: FlightSetup, track: Track | None, failing: frozenset[int]) -
             number(float(waypoints[leg + 1, 2]), digits=1),
             turn,
         )
-        rows.append(LegRow(planned_cells + _flown_cells(track, heights_above_ground, leg), leg in failing))
+        rows.append(LegRow(planned_cells + _make_flown_cells(track, heights_above_ground, leg), leg in failing))
     return rows
 
 
@@ -94,7 +94,7 @@ def ground_clearance(setup: FlightSetup, track: Track) -> Floats | None:
     return np.asarray(track.position[:, 2] - terrain.height(track.position[:, 0], track.position[:, 1]))
 
 
-def _flown_cells(track: Track | None, heights_above_ground: Floats | None, leg: int) -> tuple[str, ...]:
+def _make_flown_cells(track: Track | None, heights_above_ground: Floats | None, leg: int) -> tuple[str, ...]:
     """Return the flown values of a leg; dashes for a leg that was not flown."""
     rows = np.flatnonzero(track.leg == leg) if track is not None else np.zeros(0, dtype=np.intp)
     if track is None or rows.size == 0:
@@ -105,19 +105,19 @@ def _flown_cells(track: Track | None, heights_above_ground: Floats | None, leg: 
     return (
         number(float(track.time[last] - track.time[rows[0]]), digits=1),
         number(float(np.mean(track.airspeed[rows], dtype=np.float64)), digits=1),
-        number(math.degrees(_max_magnitude(roll)), digits=1),
-        number(_max_magnitude(track.cross_track[rows]), digits=2),
-        number(_max_magnitude(track.height_error[rows]), digits=2),
-        number(_min_finite(heights_above_ground[rows]) if heights_above_ground is not None else None, digits=1),
+        number(math.degrees(_find_max_magnitude(roll)), digits=1),
+        number(_find_max_magnitude(track.cross_track[rows]), digits=2),
+        number(_find_max_magnitude(track.height_error[rows]), digits=2),
+        number(_find_min_finite(heights_above_ground[rows]) if heights_above_ground is not None else None, digits=1),
         number(float(track.energy[last]) - float(track.energy[rows[0]]), digits=2),
     )
 
 
-def _judged_part_text(setup: FlightSetup) -> str:
+def _describe_judged_part(setup: FlightSetup) -> str:
     """Describe the part of a flight on whose legs the required height above ground applies in full.
 
     >>> from logs.recording.example_log import example_log
-    >>> _judged_part_text(example_log().setup)
+    >>> _describe_judged_part(example_log().setup)
     ''
     """
     phases = setup.ground_phases
@@ -138,9 +138,9 @@ def flight_sentence(setup: FlightSetup, track: Track | None) -> str:
     lowest_text = (
         NOTHING
         if heights_above_ground is None
-        else number(_min_finite(heights_above_ground[~is_ground_phase]), digits=0)
+        else number(_find_min_finite(heights_above_ground[~is_ground_phase]), digits=0)
     )
-    phase_text = _judged_part_text(setup) if is_ground_phase.any() else ""
+    phase_text = _describe_judged_part(setup) if is_ground_phase.any() else ""
     height_text = f", never less than {lowest_text} m above ground{phase_text}" if lowest_text != NOTHING else ""
     energy_used = float(track.energy[-1])
     # An imported log may contain no battery data.
@@ -152,13 +152,13 @@ def flight_sentence(setup: FlightSetup, track: Track | None) -> str:
     return f"Flown: {number(distance, digits=1)} km in {number(seconds, digits=0)} s{height_text}{energy_text}."
 
 
-def _max_magnitude(values: NDArray[np.float32]) -> float:
+def _find_max_magnitude(values: NDArray[np.float32]) -> float:
     """Return the largest finite absolute value, or NaN if there is none."""
     finite = np.abs(values[np.isfinite(values)])
     return float(finite.max()) if finite.size else math.nan
 
 
-def _min_finite(values: Floats) -> float:
+def _find_min_finite(values: Floats) -> float:
     """Return the smallest finite value, or NaN if there is none."""
     finite = values[np.isfinite(values)]
     return float(finite.min()) if finite.size else math.nan
@@ -172,7 +172,7 @@ def scenario_facts(setup: FlightSetup) -> Facts:
     if scenario.spec.description:
         facts.append(("About", scenario.spec.description))
     east, north = (float(np.ptp(axis_range)) / 1000.0 for axis_range in scenario.bounds)
-    facts.append(("Map origin", _position_text(scenario.origin.lat_deg, scenario.origin.lon_deg)))
+    facts.append(("Map origin", _format_position(scenario.origin.lat_deg, scenario.origin.lon_deg)))
     area = scenario.spec.area
     floor_text = f"from {number(scenario.floor)} " if area is not None and area.floor_amsl_m is not None else ""
     if not scenario.external:
@@ -182,7 +182,7 @@ def scenario_facts(setup: FlightSetup) -> Facts:
         ]
     for name, point in (("Start", scenario.start), ("Destination", scenario.destination)):
         lat, lon = lat_lon_of_points(scenario, point)
-        facts.append((name, f"{_position_text(float(lat), float(lon))}, {quantity(float(point[2]), 'm')} AMSL"))
+        facts.append((name, f"{_format_position(float(lat), float(lon))}, {quantity(float(point[2]), 'm')} AMSL"))
     if terrain is None:
         facts.append(("Terrain", "none was given, so the ground is not judged"))
     else:
@@ -197,21 +197,21 @@ def scenario_facts(setup: FlightSetup) -> Facts:
     facts.append(
         ("Threats", f"{len(scenario.threats)} units: {missile_count} with missiles, {radar_count} with radars")
     )
-    facts += _limit_facts(setup)
+    facts += _list_limit_facts(setup)
     return facts
 
 
-def _position_text(lat_deg: float, lon_deg: float) -> str:
+def _format_position(lat_deg: float, lon_deg: float) -> str:
     """Return latitude and longitude as text, in degrees."""
     ns, ew = "N" if lat_deg >= 0.0 else "S", "E" if lon_deg >= 0.0 else "W"
     return f"{abs(lat_deg):.6f}° {ns}, {abs(lon_deg):.6f}° {ew}"
 
 
-def _limit_facts(setup: FlightSetup) -> Facts:
+def _list_limit_facts(setup: FlightSetup) -> Facts:
     """Return facts on the scenario's limits and wind."""
     limits, wind = setup.scenario.limits, setup.scenario.wind
 
-    def angle(value: float | str) -> str:
+    def describe_angle(value: float | str) -> str:
         """Return a limit on an angle as text, or a text which states that the aircraft's limit applies."""
         return "the aircraft's" if isinstance(value, str) else quantity(value, "deg")
 
@@ -224,8 +224,8 @@ def _limit_facts(setup: FlightSetup) -> Facts:
     return [
         (
             "Limits",
-            f"turn {angle(limits.max_turn_deg)}, climb {angle(limits.max_climb_deg)}, "
-            f"dive {angle(limits.max_dive_deg)}; {quantity(limits.min_clearance_m, 'm')} above ground; "
+            f"turn {describe_angle(limits.max_turn_deg)}, climb {describe_angle(limits.max_climb_deg)}, "
+            f"dive {describe_angle(limits.max_dive_deg)}; {quantity(limits.min_clearance_m, 'm')} above ground; "
             f"within {quantity(setup.corridor, 'm')} of the legs",
         ),
         ("Wind", f"{wind_text if wind.speed else 'calm'}; turbulence: {wind.turbulence}"),
@@ -252,14 +252,16 @@ def flight_facts(setup: FlightSetup, end_reason: str) -> Facts:
         if plan.algorithm == GIVEN_WAYPOINTS:
             plan_text = "given waypoints, not searched"
         has_only_unmet_margins = bool(plan.unmet_margins) and not plan.failures
-        status = "planner's margins not met" if has_only_unmet_margins else _plan_status(plan.feasible, plan.safe)
+        status = (
+            "planner's margins not met" if has_only_unmet_margins else _describe_plan_status(plan.feasible, plan.safe)
+        )
         facts.append(("Plan", f"{plan_text}; {status}"))
     if end_reason:
         facts.append(("Flight ended", end_reason))
     return facts
 
 
-def _plan_status(feasible: bool, safe: bool) -> str:
+def _describe_plan_status(feasible: bool, safe: bool) -> str:
     """Return a clause on whether a plan is feasible, and whether it avoids every missile."""
     if safe:
         return "feasible, and outside every missile's reach"
@@ -294,7 +296,7 @@ def energy_facts(setup: FlightSetup, track: Track | None) -> Facts:
             f"{quantity(setup.battery - used_energy, 'Wh')},"
             f" {quantity(100.0 * (1.0 - used_energy / setup.battery), '%')}",
         ),
-        ("Peak current", quantity(_max_magnitude(track.current), "A")),
+        ("Peak current", quantity(_find_max_magnitude(track.current), "A")),
     ]
     if seconds > 0.0:
         facts.append(("Mean power", quantity(used_energy * 3600.0 / seconds, "W")))
@@ -362,7 +364,7 @@ def saturation_rows(setup: FlightSetup, track: Track | None) -> list[tuple[str, 
         min_command = 0.0 if name == "throttle" else -limit
         saturation_time = float(durations[saturated_rows(track, k, min_command, limit)].sum())
         scale, unit = (100.0, " %") if name == "throttle" else (180.0 / math.pi, "°")
-        peak_text = number(scale * _max_magnitude(command), digits=1)
+        peak_text = number(scale * _find_max_magnitude(command), digits=1)
         limit_text = number(scale * limit, digits=1)
         rows.append(
             (

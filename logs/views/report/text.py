@@ -93,7 +93,7 @@ def finding_rows(findings: Iterable[Finding]) -> list[FindingRow]:
     Within each state, the order of the verdict is kept.
     """
     order = ("fail", "open", "ok", "unjudged")
-    return sorted(map(_finding_row, findings), key=lambda row: order.index(row.state))
+    return sorted(map(_make_finding_row, findings), key=lambda row: order.index(row.state))
 
 
 def count_sentence(findings: Sequence[Finding]) -> str:
@@ -106,18 +106,18 @@ def count_sentence(findings: Sequence[Finding]) -> str:
     return f"{passed_text}{failed_text}{unjudged_text}."
 
 
-def _sign_and_word(state: State) -> str:
+def _describe_state(state: State) -> str:
     """Return a state as its sign and its word."""
     return f"{STATE_SIGNS[state]} {STATE_WORDS[state]}"
 
 
-def _finding_row(finding: Finding) -> FindingRow:
+def _make_finding_row(finding: Finding) -> FindingRow:
     """Return the row of one finding: its numbers and texts."""
     planned_value, flown_value, margin = (
         in_unit(value, finding.unit)[0] for value in (finding.planned, finding.flown, finding.margin)
     )
     margin_with_tolerance = None if margin is None else margin + (in_unit(finding.tolerance, finding.unit)[0] or 0.0)
-    method, digits = finding.method, _needed_decimals(finding)
+    method, digits = finding.method, _count_needed_decimals(finding)
     if finding.tolerance and method and finding.limit is not None:
         limit_text, tolerance = (quantity(value, finding.unit) for value in (finding.limit, finding.tolerance))
         method = f"{method}; limit {limit_text} with a tolerance of {tolerance}"
@@ -125,7 +125,7 @@ def _finding_row(finding: Finding) -> FindingRow:
     return FindingRow(
         finding=finding,
         state=finding.state,
-        sign=_sign_and_word(finding.state),
+        sign=_describe_state(finding.state),
         rule=finding_words(finding).word,
         planned=number(planned_value, digits=digits),
         flown=number(flown_value, digits=digits),
@@ -140,7 +140,7 @@ def _finding_row(finding: Finding) -> FindingRow:
 _MAX_DECIMALS = 6
 
 
-def _needed_decimals(finding: Finding) -> int | None:
+def _count_needed_decimals(finding: Finding) -> int | None:
     """Return the decimals needed to distinguish a value from its limit; None if the usual number suffices."""
     value, limit = (
         in_unit(quantity_value, finding.unit)[0] for quantity_value in (finding.value, finding.effective_limit)
@@ -153,21 +153,6 @@ def _needed_decimals(finding: Finding) -> int | None:
     return next(sufficient_decimals, _MAX_DECIMALS)
 
 
-def _limit_text(finding: Finding, digits: int | None) -> str:
-    """Return the values that pass as text; an en dash without a limit."""
-    text = number(in_unit(finding.effective_limit, finding.unit)[0], digits=digits)
-    return text if text == NOTHING else f"{finding.limit_sign}\u00a0{text}"
-
-
-def _missed_text(finding: Finding) -> str:
-    """Return the distance of a failed finding from the values that pass; "" if no limit decides it."""
-    if finding.ok is not False or finding.margin is None or finding.effective_limit is None:
-        return ""
-    distance = -finding.margin - (finding.tolerance or 0.0)
-    # A count has no decimals.
-    return quantity_text(distance, finding.unit) if finding.unit == "legs" else quantity(distance, finding.unit)
-
-
 def missed_text(finding: Finding) -> str:
     """Return the distance of a failed finding from the values that pass; "" if no limit decides it."""
     if finding.ok is not False or finding.margin is None or finding.effective_limit is None:
@@ -178,11 +163,11 @@ def missed_text(finding: Finding) -> str:
 
 
 def rule_row(rule: RuleFindings) -> RuleRow:
-    """Return the row of one rule: the numbers of its findings, and the finding that stands for all."""
-    head = (rule.state, _sign_and_word(rule.state), rule.words.word, rule.tally_text)
+    """Return the row of one rule: the numbers of its findings, and the values of a representative one."""
+    head = (rule.state, _describe_state(rule.state), rule.words.word, rule.tally_text)
     if rule.shown is None:
         return RuleRow(*head, "" if rule.judged else rule.findings[0].reason)
-    row = _finding_row(rule.shown)
+    row = _make_finding_row(rule.shown)
     return RuleRow(*head, rule.shown.where, row.planned, row.flown, row.limit, row.margin, row.unit)
 
 
@@ -216,21 +201,21 @@ def refly_lines(reflight: Reflight) -> list[str]:
     leg_table: list[tuple[str, ...]] = [_HEAD]
     for pair in reflight.legs:
         numbers = (pair.cross_track, pair.height_error, pair.ground_speed, pair.bank, pair.energy)
-        leg_table.append((f"leg {leg_numbers[pair.leg - reflight.first]}", *map(_pair_text, numbers)))
+        leg_table.append((f"leg {leg_numbers[pair.leg - reflight.first]}", *map(_format_pair, numbers)))
     turn_table: list[tuple[str, ...]] = [("", "overshoot (m)", "bank (deg)", "nearest pass (m)")]
     for turn in reflight.turns:
         name = f"waypoint {stops[turn.waypoint - reflight.first]} ({turn.turn:+.1f}°)"
-        turn_table.append((name, *map(_pair_text, (turn.overshoot, turn.bank, turn.passed))))
+        turn_table.append((name, *map(_format_pair, (turn.overshoot, turn.bank, turn.passed))))
     stretch = reflight.stretch
     stretch_text = f"{stretch.mode or 'the flight'} from {stretch.start:.1f} s to {stretch.end:.1f} s"
     legs_text = f", legs {leg_numbers[0]} to {leg_numbers[len(reflight.legs) - 1]}"
     lines = [f"{stretch_text}{legs_text}: flown / simulated", *format_columns(leg_table)]
     if reflight.turns:
         lines += ["", *format_columns(turn_table)]
-    return [*lines, "", trust_line(reflight)]
+    return [*lines, "", describe_model_trust(reflight)]
 
 
-def trust_line(reflight: Reflight) -> str:
+def describe_model_trust(reflight: Reflight) -> str:
     """Return one line on how well the model represents the aircraft of an imported flight."""
     model = reflight.setup.aircraft
     model_text = f"{model}, used because no aircraft was named," if reflight.stands_in else model
@@ -245,15 +230,16 @@ def trust_line(reflight: Reflight) -> str:
     wind = reflight.setup.scenario.wind
     gust_text = "no gusts" if wind.turbulence == "none" else f"{wind.turbulence} turbulence"
     wind_text = f" in {wind.speed:.1f} m/s of wind, {gust_text}"
-    return f"Model {model_text}{wind_text}, against the flight, median (95 %): {', '.join(spread_texts)}{end_text}"
+    head = f"Median difference (95 %) between the flight and model {model_text}{wind_text}"
+    return f"{head}: {', '.join(spread_texts)}{end_text}"
 
 
-def not_reflown_lines(reflights: Sequence[Reflight], stretches: Sequence[MissionStretch], max_count: int) -> list[str]:
+def list_not_reflown(reflights: Sequence[Reflight], stretches: Sequence[MissionStretch], max_count: int) -> list[str]:
     """List the stretches of an imported flight that were not simulated, with the reasons.
 
     stretches: stretches of the imported flight.  max_count: largest number of stretches to fly again.
 
-    >>> not_reflown_lines((), (MissionStretch(50.0, 60.0, "AUTO", "log"),), 9)
+    >>> list_not_reflown((), (MissionStretch(50.0, 60.0, "AUTO", "log"),), 9)
     ['Not flown again: AUTO from 50.0 s to 60.0 s: it did not pass two waypoints in order']
     """
     compared_starts = {reflight.stretch.start for reflight in reflights}
@@ -268,7 +254,7 @@ def not_reflown_lines(reflights: Sequence[Reflight], stretches: Sequence[Mission
     return lines
 
 
-def _pair_text(pair: tuple[float, float]) -> str:
+def _format_pair(pair: tuple[float, float]) -> str:
     """Return a flown and a simulated value as text; "-" for an unknown one."""
     return " / ".join("-" if math.isnan(value) else f"{value:.1f}" for value in pair)
 

@@ -8,7 +8,7 @@ from logs.importers.clean_positions import (
     MIN_LATE_ROWS,
     clean_positions,
     find_gaps,
-    metres_between,
+    measure_steps,
     remove_clock_jumps,
 )
 from logs.importers.raw_log import LogSeries
@@ -125,9 +125,9 @@ def test_a_jump_of_the_clock_is_taken_out_and_a_gap_is_not() -> None:
 
 
 def test_distances_across_the_180th_meridian_are_short() -> None:
-    assert metres_between(np.zeros(2), np.array([179.9995, -179.9995]))[0] == pytest.approx(0.001 * DEGREE_LENGTH_M)
+    assert measure_steps(np.zeros(2), np.array([179.9995, -179.9995]))[0] == pytest.approx(0.001 * DEGREE_LENGTH_M)
     lat = np.array([-33.0, -33.0])
-    assert metres_between(lat, np.array([-70.0, -70.001]))[0] == pytest.approx(
+    assert measure_steps(lat, np.array([-70.0, -70.001]))[0] == pytest.approx(
         0.001 * DEGREE_LENGTH_M * np.cos(np.radians(33))
     )
 

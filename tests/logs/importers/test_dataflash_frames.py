@@ -2,7 +2,7 @@ from pathlib import Path
 
 import numpy as np
 
-from logs.importers.dataflash_frames import PIECE_BYTES, MappedFile, index_dataflash, piece_ends
+from logs.importers.dataflash_frames import PIECE_BYTES, MappedFile, index_dataflash, iterate_piece_ends
 from tests.logs.importers.written_logs import dataflash
 
 
@@ -18,7 +18,7 @@ def test_what_was_let_go_of_is_read_anew(tmp_path: Path) -> None:
 
 def test_each_piece_is_let_go_of() -> None:
     calls: list[int] = []
-    ends = list(piece_ends(2 * PIECE_BYTES + 5, lambda: calls.append(1)))
+    ends = list(iterate_piece_ends(2 * PIECE_BYTES + 5, lambda: calls.append(1)))
     assert ends == [PIECE_BYTES, 2 * PIECE_BYTES, 2 * PIECE_BYTES + 5]
     assert len(calls) == 3
 

@@ -82,7 +82,9 @@ def test_a_log_of_an_older_release_says_the_same(tmp_path: Path) -> None:
         assert np.array_equal(new.series[name].values, old.series[name].values)
     assert old.parameters["TRIM_ARSPD_CM"] == 2500.0
     assert [item.frame for item in old.missions[0].mission.items] == [3, 3, 3]
-    assert old.missions[0].mission.warnings == ("the log states no frames: heights are taken as above home",)
+    assert old.missions[0].mission.warnings == (
+        "the log states no altitude frames: altitudes are taken as heights above home",
+    )
 
 
 @pytest.mark.parametrize(

@@ -103,7 +103,7 @@ def with_series(raw: RawLog, **series: LogSeries | None) -> RawLog:
 @pytest.mark.parametrize("vehicle", ["copter", "rover", "boat", "submarine", "tracker", "blimp"])
 def test_a_vehicle_that_is_no_aeroplane_is_refused_by_name(vehicle: Any) -> None:
     raw = replace(example_raw_log(), vehicle=vehicle, program="ArduSomething V4.5")
-    with pytest.raises(LogError, match=rf"the log of an? (antenna )?{vehicle} \(program ArduSome"):
+    with pytest.raises(LogError, match=rf"this log is from an? (antenna )?{vehicle} \(program ArduSome"):
         make_flight(raw)
 
 
@@ -111,7 +111,7 @@ def test_a_bench_log_is_refused() -> None:
     raw = example_raw_log()
     still = raw.series["position"]
     values = np.broadcast_to(still.values[0], still.values.shape)
-    with pytest.raises(LogError, match="contains no flight: in 92 s the ground speed never stayed above 6 m/s for"):
+    with pytest.raises(LogError, match="contains no flight: the ground speed never stayed above 6 m/s for"):
         make_flight(with_series(raw, position=LogSeries("POS", still.time, values)))
 
 

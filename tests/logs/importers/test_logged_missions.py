@@ -134,7 +134,7 @@ def test_a_home_that_is_not_in_the_log_is_told() -> None:
     made = made_of(WAY[1:], 4)
     assert made is not None
     assert made.missing is None
-    assert made.mission.warnings == ("item 0, which is home, of 4 is not in the log",)
+    assert made.mission.warnings == ("the log lacks item 0 (home) of the mission's 4 items",)
 
 
 def test_a_changed_item_alone_changes_the_mission() -> None:

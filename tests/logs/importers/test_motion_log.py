@@ -3,7 +3,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from logs.importers.motion import Samples, first_ground_position
+from logs.importers.motion import Samples, find_first_ground_position
 from logs.importers.motion_log import read_motion
 from tests.instrumented_flights import short_motion, write_motion
 from world.errors import LogError
@@ -60,6 +60,6 @@ def test_home_is_what_the_vehicle_had_and_nowhere_without(tmp_path: Path) -> Non
 def test_the_first_position_on_the_ground_is_where_it_stood_still() -> None:
     position = Samples(np.arange(4.0), np.array([[0, 0, 0], [48, 11, 520], [48, 11.1, 521], [48, 12, 700]], np.float64))
     taking_off = Samples(np.array([0.0, 1.0, 2.0, 3.0]), np.array([[0, 0, 0], [0.1, 0, 0], [0.2, 0, 0], [20, 0, 0.0]]))
-    assert first_ground_position(position, taking_off) == (48.0, 11.0, 520.0)
+    assert find_first_ground_position(position, taking_off) == (48.0, 11.0, 520.0)
     in_flight = Samples(taking_off.time, taking_off.values + np.array([15.0, 0.0, 0.0]))
-    assert first_ground_position(position, in_flight) is None
+    assert find_first_ground_position(position, in_flight) is None

@@ -104,6 +104,6 @@ def test_a_zipped_track_is_read_as_the_track_in_it(tmp_path: Path) -> None:
 def test_a_log_as_text_is_refused_by_name(tmp_path: Path) -> None:
     path = tmp_path / "a.log"
     path.write_text("FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns\nPARM, 1, RLL_P, 0.3\n")
-    with pytest.raises(LogError, match=r"a dataflash log converted to text; open the \.BIN from which it was made"):
+    with pytest.raises(LogError, match=r"a dataflash log converted to text; open the original \.BIN"):
         open_log(path)
     assert is_imported_log(path)

@@ -16,7 +16,7 @@ from pyulog import ULog
 from flight.mission.items import Home
 from logs.importers import px4_log
 from logs.importers.clean_positions import clean_positions
-from logs.importers.logged_missions import plane_mode, px4_mode, px4_state
+from logs.importers.logged_missions import describe_plane_mode, describe_px4_mode, describe_px4_state
 from logs.importers.open_log import open_log
 from logs.importers.px4_log import find_damage, read_px4
 from logs.importers.raw_log import example_raw_log
@@ -26,14 +26,14 @@ from world.silent_output import silence
 
 
 def test_auto_alone_follows_the_mission() -> None:
-    assert [number for number in range(30) if plane_mode(number)[1]] == [10]
-    assert plane_mode(99) == ("mode 99", False)
+    assert [number for number in range(30) if describe_plane_mode(number)[1]] == [10]
+    assert describe_plane_mode(99) == ("mode 99", False)
 
 
 def test_of_px4_the_mission_state_alone_follows_it() -> None:
-    assert [number for number in range(30) if px4_state(number)[1]] == [3]
-    assert px4_mode(4 << 24 | 4 << 16) == ("MISSION", True)
-    assert px4_mode(5 << 24 | 4 << 16) == ("RTL", False)
+    assert [number for number in range(30) if describe_px4_state(number)[1]] == [3]
+    assert describe_px4_mode(4 << 24 | 4 << 16) == ("MISSION", True)
+    assert describe_px4_mode(5 << 24 | 4 << 16) == ("RTL", False)
 
 
 def test_rows_are_what_pyulog_reads(tmp_path: Path) -> None:

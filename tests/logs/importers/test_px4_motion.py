@@ -143,7 +143,7 @@ def test_parameters_that_are_no_numbers_are_not_there(tmp_path: Path, name: str,
 
 
 def test_a_count_of_surfaces_that_is_no_number_is_none(tmp_path: Path) -> None:
-    with pytest.raises(LogError, match="no surface controls the elevator"):
+    with pytest.raises(LogError, match="no surface acts as elevator"):
         changed(tmp_path, px4_topics(short_motion()), {"CA_SV_CS_COUNT": float("nan")})
 
 
@@ -265,7 +265,7 @@ def test_the_wind_of_releases_before_1_14_is_read(tmp_path: Path, topic: str) ->
         ({"CA_SV_CS2_TYPE": 7}, "CA_SV_CS2_TYPE 7: a V-tail, whose mix is not modelled"),
         ({"CA_SV_CS3_TYPE": 10}, "CA_SV_CS3_TYPE 10: the flap moves in flight"),
         ({"CA_AIRFRAME": 3}, "CA_AIRFRAME 3: a tiltrotor; expected a plane"),
-        ({"CA_SV_CS_COUNT": 2}, "no surface controls the elevator"),
+        ({"CA_SV_CS_COUNT": 2}, "no surface acts as elevator"),
     ],
 )
 def test_mixes_that_are_not_modelled_are_named(tmp_path: Path, parameters: dict[str, float], said: str) -> None:

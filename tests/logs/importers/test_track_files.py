@@ -12,7 +12,7 @@ import pytest
 from logs.importers import track_files
 from logs.importers.imported_flight import make_flight
 from logs.importers.raw_log import example_raw_log
-from logs.importers.track_files import read_gpx, read_igc, read_kml, track_text
+from logs.importers.track_files import read_gpx, read_igc, read_kml, read_track_text
 from planfly.cli import main
 from tests.logs.importers.written_logs import BEGAN, gpx, igc, kml
 from world.errors import LogError
@@ -23,18 +23,18 @@ def test_a_document_type_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "a.gpx"
     path.write_text('<!DOCTYPE gpx [<!ENTITY a "aaaa">]><gpx>&a;</gpx>')
     with pytest.raises(LogError, match="a document type"):
-        track_text(path, xml=True)
-    assert track_text(path, xml=False).startswith("<!DOCTYPE")
+        read_track_text(path, xml=True)
+    assert read_track_text(path, xml=False).startswith("<!DOCTYPE")
 
 
 def test_a_file_may_be_as_large_as_is_said_and_no_larger(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(track_files, "MAX_BYTES", 10)
     path = tmp_path / "a.igc"
     path.write_bytes(b"x" * 10)
-    assert track_text(path, xml=False) == "x" * 10
+    assert read_track_text(path, xml=False) == "x" * 10
     path.write_bytes(b"x" * 11)
     with pytest.raises(LogError, match="too large: 11 bytes; the limit for a track is 10 bytes"):
-        track_text(path, xml=False)
+        read_track_text(path, xml=False)
 
 
 def zipped(path: Path, **entries: str) -> Path:
@@ -46,18 +46,18 @@ def zipped(path: Path, **entries: str) -> Path:
 
 def test_of_a_zipped_file_the_first_kml_is_read(tmp_path: Path) -> None:
     path = zipped(tmp_path / "a.kmz", image_png="x", doc_kml="<kml>é</kml>", more_kml="<kml/>")
-    assert track_text(path, xml=True) == "<kml>é</kml>"
+    assert read_track_text(path, xml=True) == "<kml>é</kml>"
 
 
 def test_a_zipped_file_that_is_none_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(LogError, match=r"a zipped file without a \.kml in it"):
-        track_text(zipped(tmp_path / "a.kmz", image_png="x"), xml=True)
+    with pytest.raises(LogError, match=r"the zipped file contains no \.kml"):
+        read_track_text(zipped(tmp_path / "a.kmz", image_png="x"), xml=True)
     path = zipped(tmp_path / "b.kmz", doc_kml="<kml>" + "0123456789" * 100 + "</kml>")
     data = bytearray(path.read_bytes())
     data[50] ^= 0xFF
     path.write_bytes(bytes(data))
-    with pytest.raises(LogError, match="an unreadable zipped file"):
-        track_text(path, xml=True)
+    with pytest.raises(LogError, match="the zipped file cannot be unpacked"):
+        read_track_text(path, xml=True)
 
 
 @pytest.mark.parametrize("method", [zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
@@ -74,21 +74,21 @@ def test_a_zipped_file_is_refused_in_one_line_whatever_packed_it(
         path.write_bytes(data[:at] + bytes([data[at] ^ 0xFF]) + data[at + 1 :])
         # A changed bit of padding changes nothing.
         with contextlib.suppress(LogError):
-            assert track_text(path, xml=True) == text
+            assert read_track_text(path, xml=True) == text
     path.write_bytes(data[:begins] + bytes(size) + data[begins + size :])
     assert main(["check", str(path)]) == 2
     told = capsys.readouterr().err
-    assert told.startswith(f"planfly: {path}: an unreadable zipped file: ")
+    assert told.startswith(f"planfly: {path}: the zipped file cannot be unpacked: ")
     assert told.count("\n") == 1
 
 
 def test_what_unpacks_to_more_than_is_read_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = zipped(tmp_path / "a.kmz", doc_kml="0" * 5000)
     monkeypatch.setattr(track_files, "MAX_BYTES", 5000)
-    assert len(track_text(path, xml=True)) == 5000
+    assert len(read_track_text(path, xml=True)) == 5000
     monkeypatch.setattr(track_files, "MAX_BYTES", 4999)
     with pytest.raises(LogError, match="more than 4,999 bytes when unpacked"):
-        track_text(path, xml=True)
+        read_track_text(path, xml=True)
 
 
 # ----------------------------------------------------------------------
@@ -303,6 +303,6 @@ def test_as_many_times_as_places_are_expected(tmp_path: Path) -> None:
     path = kml(tmp_path / "a.kml")
     path.write_text(re.sub("<when>[^<]*10:00:10Z</when>", "", path.read_text()))
     with pytest.raises(
-        LogError, match=r"a track of \d+ times \(when\) and \d+ positions \(gx:coord\): expected equal numbers"
+        LogError, match=r"a track has \d+ times \(when\) and \d+ positions \(gx:coord\): expected equal numbers"
     ):
         read_kml(path)

@@ -18,7 +18,7 @@ from logs.verdict.rules.registry import RULES
 from logs.verdict.verdict import Verdict, verdict_json
 from logs.views.failures import failures
 from logs.views.report.text import rule_row
-from logs.views.turns import place_values
+from logs.views.turns import list_place_values
 from planfly.workflow.tighten_plan import tighten_limits
 from tests.mission_lines import setup_of, wp
 from tests.synthetic import bump, edited, fly_path, make_setup
@@ -65,7 +65,7 @@ def used(verdict: Verdict, setup: FlightSetup) -> list[Any]:
     shown = verdict.present()
     rows = [(row.state, row.rule, row.counts, row.planned, row.flown, row.margin) for row in map(rule_row, shown.rules)]
     tighter, changes = tighten_limits(setup.scenario, verdict)
-    values = [place_values(verdict.findings, rule) for rule in RULES]
+    values = [list_place_values(verdict.findings, rule) for rule in RULES]
     return [
         failures(verdict, len(setup.route.points)),
         values,

@@ -7,7 +7,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from logs.views.charts import Chart, Layer, Panel, chart_json, nice_step, numbers, outline_rows, screen_decimals
+from logs.views.charts import Chart, Layer, Panel, chart_json, find_outline_rows, nice_step, numbers, screen_decimals
 
 
 def test_numbers_are_rounded_and_what_is_none_is_null() -> None:
@@ -41,7 +41,7 @@ def test_layers_without_values_and_limits_that_are_none_are_left_out() -> None:
 @given(st.lists(st.floats(-1e6, 1e6) | st.just(float("nan")), min_size=1, max_size=400), st.integers(1, 40))
 def test_thinning_keeps_the_extremes(values: list[float], count: int) -> None:
     series = np.array(values)
-    rows = outline_rows(series, count)
+    rows = find_outline_rows(series, count)
     assert (np.diff(rows) > 0).all()
     assert len(rows) <= max(2 * count + 2, 1)
     assert rows[0] == 0

@@ -13,9 +13,9 @@ from logs.verdict.places import Place
 from logs.views.drawing import new_figure
 from logs.views.failures import (
     Failures,
-    fail_labels,
     failures,
-    inside_threats,
+    find_rows_inside_threats,
+    make_fail_labels,
     paths_differ,
     route_distance,
     threat_radius,
@@ -226,10 +226,10 @@ def test_a_sphere_is_the_one_that_the_place_names() -> None:
     assert threat_radius(both, MISSILE) == 250.0
     assert threat_radius(both, Place("radar", 0)) == 700.0
     track, inside = inside_rows()
-    assert inside_threats(failures(ENTERED, 4), both, track).tolist() == inside.tolist()
-    assert not inside_threats(Failures({}, {}), both, track).any()
+    assert find_rows_inside_threats(failures(ENTERED, 4), both, track).tolist() == inside.tolist()
+    assert not find_rows_inside_threats(Failures({}, {}), both, track).any()
 
 
 def test_threats_without_a_place_in_the_picture_get_no_label() -> None:
-    labels = fail_labels(failures(ENTERED, 4), ROUTE[:, :2], {})
+    labels = make_fail_labels(failures(ENTERED, 4), ROUTE[:, :2], {})
     assert [label.text for label in labels] == ["leg 1, to item 9: slope"]

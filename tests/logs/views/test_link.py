@@ -12,7 +12,7 @@ from logs.verdict.judge_geometry import judge_geometry
 from logs.verdict.measures.link_coverage import FlightHeight, LinkCoverage
 from logs.verdict.measures.link_outages import LinkAlongPath, Outage
 from logs.views.figures import figure_views, make_subject
-from logs.views.link import WEAK_MARGIN_DB, DrawnLink, draw_scenario_link, link_chart, link_map, link_quality
+from logs.views.link import WEAK_MARGIN_DB, DrawnLink, compute_scenario_link, link_chart, link_map, link_quality
 from world.radio import LinkPoints
 from world.scenario import with_link
 
@@ -73,7 +73,7 @@ def test_the_map_shows_where_the_link_is_weak_or_lost_or_in_the_ground() -> None
     }
     assert set(areas) == {"coverage-weak", "coverage-lost", "coverage-ground"}
     name, x, y = areas["coverage-weak"]
-    assert name == "at 120 m above ground: less than 6 dB left"
+    assert name == "at 120 m above ground: less than 6 dB above the fade margin"
     assert (x.min(), x.max(), y.min(), y.max()) == (-200.0, -100.0, 0.0, 100.0)
     _, x, y = areas["coverage-ground"]
     assert (x.min(), x.max(), y.min(), y.max()) == (-200.0, -100.0, 100.0, 200.0)
@@ -104,11 +104,11 @@ def test_a_report_has_the_link_only_where_the_scenario_has_one() -> None:
 
 def test_a_plan_is_drawn_along_its_path_and_a_flight_along_its_track() -> None:
     log, setup = example_log(), linked_setup()
-    plan, flight = draw_scenario_link(setup, None), draw_scenario_link(setup, log.track)
+    plan, flight = compute_scenario_link(setup, None), compute_scenario_link(setup, log.track)
     assert plan is not None
     assert flight is not None
     assert (plan.is_flown, flight.is_flown) == (False, True)
     assert flight.along.time[-1] == log.track.time[-1]
     assert plan.along.positions[-1] == pytest.approx(setup.route.positions[-1])
     nowhere = setup.in_scenario(replace(setup.scenario, terrain=None))
-    assert draw_scenario_link(nowhere, log.track) is None
+    assert compute_scenario_link(nowhere, log.track) is None

@@ -10,7 +10,7 @@ from logs import theme
 from logs.verdict.places import Place
 from logs.views.charts import Layer, legend_entries
 from logs.views.draw_map import draw_compass, draw_ground, draw_map
-from logs.views.drawing import WIDTH, draw_legend, legend_handle, new_figure
+from logs.views.drawing import WIDTH, draw_legend, make_legend_handle, new_figure
 from logs.views.map import NamedWind, end_labels, flight_map, map_json
 from tests.logs.views.figure_data import ALL, FAILED, ROUTE, drawn_map, make_scenario, make_track, make_verdict
 from world.wind import Wind
@@ -126,7 +126,7 @@ def test_a_wind_from_just_west_of_north_is_no_360() -> None:
 def test_the_legend_stands_where_it_is_put() -> None:
     figure = new_figure(6.0)
     chart = flight_map(make_scenario(), **ALL, track=None, verdict=FAILED)
-    draw_legend(figure, [legend_handle(entry) for entry in legend_entries([chart.panel])], 0.8, 0.3)
+    draw_legend(figure, [make_legend_handle(entry) for entry in legend_entries([chart.panel])], 0.8, 0.3)
     figure.canvas.draw()
     box = figure.legends[0].get_window_extent()
     assert box.y1 == pytest.approx(0.3 * figure.bbox.height, abs=1.0)

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from logs.views.charts import Chart, Layer, Panel, leg_marks, saturation_band, series
+from logs.views.charts import Chart, Layer, Panel, make_leg_marks, make_saturation_band, series
 from logs.views.drawing import draw_chart
 from tests.logs.views.figure_data import make_track
 
@@ -44,7 +44,7 @@ def test_a_quiet_series_is_not_blown_up() -> None:
 
 def test_rows_at_a_limit_are_shaded() -> None:
     panel = one("throttle", ALONG)
-    band = saturation_band((ALONG > 20.0) & (ALONG < 40.0), ALONG, panel.shown_span())
+    band = make_saturation_band((ALONG > 20.0) & (ALONG < 40.0), ALONG, panel.shown_span())
     shaded, plain = drawn(replace(panel, layers=(band, *panel.layers)), panel).axes
     (area,) = shaded.collections
     corners = area.get_paths()[0].vertices
@@ -56,7 +56,7 @@ def test_rows_at_a_limit_are_shaded() -> None:
 def test_legs_are_parted_where_they_change_and_numbered_once() -> None:
     track = make_track()
     panels = [Panel(name, "", (series("x", "flown", track.time, track.airspeed),)) for name in ("upper", "lower")]
-    upper, lower = drawn(*panels, marks=leg_marks(track.leg, track.time)).axes
+    upper, lower = drawn(*panels, marks=make_leg_marks(track.leg, track.time)).axes
     changes = track.time[1:][np.diff(track.leg) > 0]
     for axes in (upper, lower):
         uprights = [line.get_xdata()[0] for line in axes.lines if len(set(line.get_xdata())) == 1]

@@ -18,7 +18,7 @@ from logs.verdict.returns.returns_text import segment_text
 from logs.views.charts import Layer, legend_entries
 from logs.views.figures import return_views, view_json
 from logs.views.glides import glide_chart
-from logs.views.returns import judged_path, return_heights_chart, returns_map, worst_returns_chart
+from logs.views.returns import return_heights_chart, returns_map, split_judged_path, worst_returns_chart
 from tests.logs.made_flight import make_setup, make_track
 from tests.logs.verdict.returns.hill import hill_drawn, hill_setup
 
@@ -164,7 +164,7 @@ def test_a_flown_path_is_drawn_where_it_was_flown() -> None:
     circle = 100.0 * np.column_stack([np.sin(angle), np.cos(angle), np.full(len(track), 3.0)])
     flown = replace(track, position=circle)
     ends = [float(track.time[0]), float(track.time[-1])]
-    (first, first_points), (second, second_points) = judged_path(setup, flown, ends, lambda time: time, str)
+    (first, first_points), (second, second_points) = split_judged_path(setup, flown, ends, lambda time: time, str)
     assert (first, second) == (str(ends[0]), str(ends[1]))
     for points in (first_points, second_points):
         positions = np.array([point.position for point in points])

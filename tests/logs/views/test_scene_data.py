@@ -14,12 +14,12 @@ from logs.views.scene import (
     MAX_GROUND,
     MISSING,
     SceneView,
-    drawn_rows,
     exaggeration,
     ground_grid,
     scene_bounds,
     scene_data,
     script_json,
+    select_drawn_rows,
 )
 from tests.logs.made_flight import make_setup, make_track
 
@@ -73,11 +73,11 @@ def test_the_track_is_thinned_to_both_its_ends() -> None:
     track = make_track()
     position = track.position.copy()
     position[100:110] = np.nan
-    rows = position[drawn_rows(replace(track, position=position), 50)]
+    rows = position[select_drawn_rows(replace(track, position=position), 50)]
     assert len(rows) == 50
     assert np.isfinite(rows).all()
     np.testing.assert_array_equal(rows[[0, -1]], track.position[[0, -1]])
-    assert drawn_rows(replace(track, position=np.full_like(position, np.nan)), 50).shape == (0,)
+    assert select_drawn_rows(replace(track, position=np.full_like(position, np.nan)), 50).shape == (0,)
 
 
 def test_the_text_holds_the_scene_and_ends_no_script() -> None:

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from logs.views.charts import Label, Layer
 from logs.views.threats_and_zones import (
     PathPlane,
+    cut_sphere,
     outline_label_position,
-    sphere_cuts,
     zone_bands,
     zone_labels,
     zone_shapes,
@@ -26,7 +26,7 @@ from world.airspace.zones import Cylinder, Zone, ZoneLevel, make_polygon
 def test_cuts_lie_on_the_sphere(points_below: list[tuple[float, float]], radius: float, up: float) -> None:
     centre = np.array([120.0, -40.0, up])
     points = np.array([[east, north, 0.0] for east, north in points_below])
-    lower, upper = sphere_cuts(centre, radius, points)
+    lower, upper = cut_sphere(centre, radius, points)
     for (east, north), low, high in zip(points_below, lower, upper, strict=True):
         beside = np.hypot(east - 120.0, north + 40.0)
         assert np.isnan(low) == np.isnan(high) == (beside**2 > radius**2) or beside == pytest.approx(radius)
@@ -39,7 +39,7 @@ def test_a_name_touches_the_top_the_foot_or_the_left_edge_that_is_in_the_picture
     """A sphere of 300 m at 500 m, cut through its middle from 1 km to 1.6 km."""
     kilometres = np.linspace(0.0, 3.0, 3001)
     points = np.column_stack([1000.0 * kilometres, np.zeros(3001), np.zeros(3001)])
-    cut = kilometres, *sphere_cuts(np.array([1300.0, 0.0, 500.0]), 300.0, points)
+    cut = kilometres, *cut_sphere(np.array([1300.0, 0.0, 500.0]), 300.0, points)
 
     def anchor(low: float, high: float) -> tuple[float, float, tuple[int, int]] | None:
         return outline_label_position(*cut, np.full(3001, low), high)
@@ -60,7 +60,7 @@ def test_no_name_stands_under_the_ground() -> None:
     """The sphere reaches out of the picture above, and its foot, at 200 m, is under a hill of 250 m."""
     kilometres = np.linspace(0.0, 3.0, 3001)
     points = np.column_stack([1000.0 * kilometres, np.zeros(3001), np.zeros(3001)])
-    cut = kilometres, *sphere_cuts(np.array([1300.0, 0.0, 500.0]), 300.0, points)
+    cut = kilometres, *cut_sphere(np.array([1300.0, 0.0, 500.0]), 300.0, points)
     ground = np.where(np.abs(kilometres - 1.3) < 0.2, 250.0, 0.0)
     (_, amsl, side) = outline_label_position(*cut, ground, 700.0) or (0.0, 0.0, (0, 0))
     assert (amsl, side) == (pytest.approx(672.0, abs=6.0), (1, 0))

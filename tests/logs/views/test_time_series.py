@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from logs.views.charts import Chart, Layer, Panel
-from logs.views.time_series import control_chart, energy_chart, exposure_chart, exposure_rates, time_chart
+from logs.views.time_series import compute_exposure_rates, control_chart, energy_chart, exposure_chart, time_chart
 from tests.logs.views.report.report_data import make_setup, make_track
 
 SETUP, TRACK = make_setup(), make_track()
@@ -99,7 +99,7 @@ def test_an_aircraft_without_a_battery_shows_the_heat_of_its_fuel_in_kilowatt_ho
 def test_exposure_is_that_of_the_segments() -> None:
     # Past a unit at 100 m with scale 100: (100/d)^4 inside 300 m, integrated over s in closed form.
     position = np.column_stack([np.linspace(-500.0, 500.0, 401), np.full(401, 100.0), np.zeros(401)])
-    rate = exposure_rates(position, np.zeros((1, 3)), np.array([300.0]), np.array([100.0]))
+    rate = compute_exposure_rates(position, np.zeros((1, 3)), np.array([300.0]), np.array([100.0]))
     far = math.sqrt(300.0**2 - 100.0**2)
     exact = 100.0**4 * (far / (1e4 * 300.0**2) + math.atan(far / 100.0) / 1e6)
     assert float(rate.sum() * 2.5) == pytest.approx(exact, rel=1e-9)

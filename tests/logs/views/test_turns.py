@@ -11,7 +11,7 @@ from logs.verdict.findings import Finding
 from logs.verdict.places import FLIGHT, Place
 from logs.verdict.verdict import Verdict
 from logs.views.drawing import draw_chart
-from logs.views.turns import place_values, turn_chart
+from logs.views.turns import list_place_values, turn_chart
 
 
 def slope(leg: int, planned: float, flown: float | None, ok: bool | None) -> Finding:
@@ -28,20 +28,20 @@ FINDINGS = (
 
 
 def test_values_are_in_the_order_of_their_places_and_the_flights_own_are_left_out() -> None:
-    values = place_values(FINDINGS, "slope")
+    values = list_place_values(FINDINGS, "slope")
     assert [value.number for value in values] == [0, 1, 2]
     assert [value.planned for value in values] == [4.0, 6.0, 7.0]
     assert [value.flown for value in values[:2]] == [4.5, 9.0]
     assert math.isnan(values[2].flown)
     assert [value.ok for value in values] == [True, False, None]
-    assert [value.number for value in place_values(FINDINGS, "turn")] == [1]
-    assert place_values(FINDINGS, "threat") == []
+    assert [value.number for value in list_place_values(FINDINGS, "turn")] == [1]
+    assert list_place_values(FINDINGS, "threat") == []
 
 
 def test_places_have_the_numbers_of_the_texts() -> None:
     """Leg 7 of a route with a loiter is what the texts call leg 2."""
     place = Place("leg", 7, to_item=5, number=2)
-    (value,) = place_values([replace(slope(7, 4.0, 4.5, True), place=place)], "slope")
+    (value,) = list_place_values([replace(slope(7, 4.0, 4.5, True), place=place)], "slope")
     assert value.number == 2
 
 

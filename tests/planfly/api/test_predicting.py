@@ -17,13 +17,13 @@ from world.errors import LogError, PlanflyError
 THOR = Path(__file__).parents[3] / "examples" / "real" / "thor75" / "thor_flight75.columns.toml"
 # Number of flights in a test of everything but the bands.
 _FEW = 3
-_drawn_flights = predicting.drawn_flights
+_drawn_flights = predicting.draw_flight_variations
 
 
 @pytest.fixture
 def few_draws(monkeypatch: pytest.MonkeyPatch) -> None:
     """Fly few draws."""
-    monkeypatch.setattr(predicting, "drawn_flights", lambda aircraft: _drawn_flights(aircraft, _FEW))
+    monkeypatch.setattr(predicting, "draw_flight_variations", lambda aircraft: _drawn_flights(aircraft, _FEW))
 
 
 def _with_posterior(aircraft: Aircraft, folder: Path, log: str) -> Aircraft:
@@ -50,7 +50,7 @@ def test_a_real_flight_by_its_controls(tmp_path: Path) -> None:
 
 def test_draws_differ_in_all_that_is_not_known() -> None:
     """Aircraft, wind, turbulence and the error of logged positions differ, and the winds have the stated deviation."""
-    draws = predicting.drawn_flights(load_aircraft("aerosonde"))
+    draws = predicting.draw_flight_variations(load_aircraft("aerosonde"))
     assert len(draws) == 40
     assert {draw.turbulence for draw in draws} == {"none", "light", "moderate"}
     assert len({draw.variation.drag for draw in draws}) == 40
@@ -67,15 +67,15 @@ def test_the_part_that_identified_the_aircraft_is_not_judged(tmp_path: Path) -> 
     entry = f'[[log]]\nfile = "x"\nsha256 = "{motion.sha256}"\n'
     aircraft = load_aircraft("ultrastick25e")
     used = _with_posterior(aircraft, tmp_path, f"{entry}until_s = 400.0\n")
-    assert predicting._judged_start(motion, used, [], None) == 400.0
-    assert predicting._judged_start(motion, used, [], 450.0) == 450.0
+    assert predicting._choose_judged_start(motion, used, [], None) == 400.0
+    assert predicting._choose_judged_start(motion, used, [], 450.0) == 450.0
     with pytest.raises(PlanflyError, match=r"399.*at least 400"):
-        predicting._judged_start(motion, used, [], 399.0)
+        predicting._choose_judged_start(motion, used, [], 399.0)
     whole = _with_posterior(aircraft, tmp_path, entry)
     with pytest.raises(LogError, match=r"identified from the whole log.*--until"):
-        predicting._judged_start(motion, whole, [], 450.0)
+        predicting._choose_judged_start(motion, whole, [], 450.0)
     other = _with_posterior(aircraft, tmp_path, '[[log]]\nfile = "y"\nsha256 = "0"\n')
-    assert predicting._judged_start(motion, other, [], 300.0) == 300.0
+    assert predicting._choose_judged_start(motion, other, [], 300.0) == 300.0
 
 
 def test_the_part_that_identified_the_aircraft_is_recognised_in_another_span_of_the_same_data(tmp_path: Path) -> None:
@@ -90,8 +90,8 @@ def test_the_part_that_identified_the_aircraft_is_recognised_in_another_span_of_
     entry = f'[[log]]\nfile = "x"\nsha256 = "{read_motion(THOR).sha256}"\nuntil_s = 400.0\n'
     used = _with_posterior(load_aircraft("ultrastick25e"), tmp_path, entry)
     with pytest.raises(PlanflyError, match=r"399.*at least 400"):
-        predicting._judged_start(parts["[30.0, 696.0]"], used, [], 399.0)
-    assert predicting._judged_start(parts["[450.0, 696.0]"], used, [], 460.0) == 460.0
+        predicting._choose_judged_start(parts["[30.0, 696.0]"], used, [], 399.0)
+    assert predicting._choose_judged_start(parts["[450.0, 696.0]"], used, [], 460.0) == 460.0
 
 
 @pytest.mark.parametrize(

@@ -75,7 +75,7 @@ def repeated_options(args: argparse.Namespace) -> dict[str, object]:
     base = SimpleNamespace(seed=args.seed)
     flown = {name: getattr(args, name) for name in FLOWN}
     options = {"scenario": args.scenario, "terrain": args.terrain, "fence": args.fence, "seed": args.seed, **flown}
-    return campaigns._command_line_options(base, options, args.spread, Path())  # type: ignore[arg-type]
+    return campaigns._list_command_line_options(base, options, args.spread, Path())  # type: ignore[arg-type]
 
 
 def test_every_option_that_decides_what_is_flown_is_repeated() -> None:

@@ -16,7 +16,7 @@ from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from flight.mission.items import Mission, MissionItem
 from flight.mission_files.formats import mission_text, read_mission
 from logs.recording.reader import read_log
-from planfly.api.exporting import judging_parameters_text
+from planfly.api.exporting import format_judging_parameters
 from planfly.cli import main
 from planner.plan import plan_json
 from tests.mission_lines import a_plan
@@ -86,7 +86,7 @@ def test_the_cruise_speed_of_a_plan_file_is_that_of_the_mission_or_the_aircraft(
     for source, more, speed, words in (
         ("m.waypoints", [], 25.0, "from the default aircraft aerosonde; name yours with --aircraft"),
         ("m.waypoints", ["--aircraft", "x8"], x8, "from x8"),
-        ("slow.waypoints", [], 19.0, "the mission's"),
+        ("slow.waypoints", [], 19.0, "from the mission"),
         ("m.waypoints", ["--scenario", "x8.toml"], x8, "from x8"),
         (str(log_file), [], 25.0, "from aerosonde"),
     ):
@@ -147,7 +147,7 @@ def test_the_parameters_that_a_plan_is_judged_with(plan_file: Path, tmp_path: Pa
 
 def test_planflys_own_guidance_has_none_of_these_parameters() -> None:
     with pytest.raises(MissionError, match=r"^a\.waypoints: .* has no parameters of take-off, landing and returns$"):
-        judging_parameters_text(Mission(None, (), source="a.waypoints"), PlanflyGuidance())
+        format_judging_parameters(Mission(None, (), source="a.waypoints"), PlanflyGuidance())
 
 
 LANDING = """QGC WPL 110
@@ -164,7 +164,7 @@ def test_the_parameters_of_a_mission_are_defaults_unless_a_file_states_them(tmp_
     mission.write_text(LANDING, encoding="ascii")
     mine.write_text("RTL_AUTOLAND,2\nTKOFF_THR_MINACC,15\n", encoding="ascii")
     assert main(["export", str(mission), str(target)]) == 0
-    assert "by planfly's defaults for this mission; a parameter file of your own wins" in target.read_text()
+    assert "by planfly's defaults for this mission; name your own parameter file" in target.read_text()
     # With 0 ArduPlane does not arm.
     assert read_parameter_file(target)["RTL_AUTOLAND"].value == 1.0
     assert main(["export", str(mission), str(target), "--params", str(mine), "--overwrite"]) == 0
@@ -180,7 +180,7 @@ def test_a_value_with_which_the_autopilot_does_not_arm_is_not_written(
     mission.write_text(LANDING, encoding="ascii")
     mine.write_text("RTL_AUTOLAND,0\n", encoding="ascii")
     assert main(["export", str(mission), str(target), "--params", str(mine)]) == 0
-    assert "without RTL_AUTOLAND 0, because it does not arm with that value" in capsys.readouterr().out
+    assert "without RTL_AUTOLAND 0, because the autopilot does not arm with that value" in capsys.readouterr().out
     assert "RTL_AUTOLAND" not in read_parameter_file(target)
 
 
@@ -291,7 +291,7 @@ def test_rally_points_of_a_plan_are_kept_and_those_of_a_fence_are_not_taken(
     assert (len(again.fences), len(again.rally), again.autopilot) == (3, 1, "px4")
     assert "rally" not in capsys.readouterr().err
     assert main(["export", "a.waypoints", "bare.plan", "--fence", "full.plan", "--autopilot", "px4"]) == 0
-    assert "full.plan: its rally points (1) are not taken: --fence reads only the fence" in capsys.readouterr().err
+    assert "full.plan: 1 rally point not exported: --fence reads only the fence" in capsys.readouterr().err
     assert read_mission(Path("bare.plan")).rally == ()
 
 

@@ -16,9 +16,9 @@ from flight.dynamics.fdm import Fdm
 from logs.importers.motion import MotionLog, Samples
 from logs.views.report import identification
 from planfly.api import identifying
-from planfly.api.identifying import slow_logs, without_current
+from planfly.api.identifying import find_logs_without_current, find_slow_logs
 from planfly.cli import main
-from planfly.identification.records import MIN_HZ, slowest_log_rate
+from planfly.identification.records import MIN_HZ, find_slowest_log_rate
 from tests.aircraft.identification.flown_truth import TRUTH, flown_truth
 from tests.instrumented_flights import PX4_PARAMETERS, px4_topics, short_motion, write_motion, write_px4
 from tests.soak import SOAK
@@ -122,8 +122,7 @@ def test_a_log_becomes_a_folder_that_flies(
         ),
         (
             ["--identify", "a.BIN", *ARGUMENTS, "--out", "./mine"],
-            "0 s are usable wing-borne flight: at least 180 s are needed to identify an aircraft, and"
-            " 30 s to check one",
+            "0 s of usable wing-borne flight: at least 180 s are needed to identify an aircraft, and 30 s to check one",
         ),
         (["aerosonde", "--check", "a.BIN"], "only with --identify"),
         (["--new", "./mine", "--mass", "2", "--until", "20"], "only with --identify"),
@@ -180,7 +179,7 @@ def test_only_the_rows_before_until_are_used(
     # Rows are 0.02 s apart.
     assert end - 0.05 < last < end
     message = refused(["--identify", "a.BIN", *ARGUMENTS, "--until", "100", "--out", "./mine"], capsys)
-    assert "s before 100 s are usable wing-borne flight: at least 180 s" in message
+    assert "s of usable wing-borne flight before 100 s: at least 180 s" in message
 
 
 @pytest.mark.parametrize("again", [["--identify", "a.BIN", "b.BIN"], ["--identify", "a.BIN", "--check", "b.BIN"]])
@@ -188,7 +187,7 @@ def test_the_same_log_twice_is_refused(again: list[str], capsys: pytest.CaptureF
     write_motion(Path("a.BIN"), short_motion())
     shutil.copy("a.BIN", "b.BIN")
     said = refused([*again, *ARGUMENTS, "--out", "./mine"], capsys)
-    assert "b.BIN: the same bytes as a.BIN: name each log only once" in said
+    assert "b.BIN: has the same bytes as a.BIN: name each log only once" in said
 
 
 def test_logs_without_current_among_others_are_named() -> None:
@@ -200,8 +199,8 @@ def test_logs_without_current_among_others_are_named() -> None:
         )
 
     known, unknown = record("a.BIN", 3.0), record("b.BIN", np.nan)
-    assert without_current([known, unknown, unknown]) == ("b.BIN",)
-    assert without_current([known, known]) == without_current([unknown, unknown]) == ()
+    assert find_logs_without_current([known, unknown, unknown]) == ("b.BIN",)
+    assert find_logs_without_current([known, known]) == find_logs_without_current([unknown, unknown]) == ()
 
 
 def test_logs_with_few_rows_are_named_with_what_records_more() -> None:
@@ -210,16 +209,16 @@ def test_logs_with_few_rows_are_named_with_what_records_more() -> None:
     time = np.arange(0.0, 4.0, 0.1003)
     few = Samples(time, np.zeros((len(time), 4)))
     px4 = replace(log, source="b.ulg", program_kind="px4", controls=few)
-    assert slow_logs([log]) == ()
-    (slow,) = slow_logs([log, px4])
+    assert find_slow_logs([log]) == ()
+    (slow,) = find_slow_logs([log, px4])
     assert (slow.source, slow.setting) == ("b.ulg", "SDLOG_PROFILE 17")
     assert slow.hertz == pytest.approx(9.97, abs=0.01)
     assert slow.hertz >= MIN_HZ
     thin = replace(log, outputs=Samples(log.outputs.time[::4], log.outputs.values[::4]))
-    (slow,) = slow_logs([thin])
+    (slow,) = find_slow_logs([thin])
     assert slow.setting == "LOG_BITMASK 65535"
     assert slow.hertz == pytest.approx(6.25)
-    assert slowest_log_rate(thin) < MIN_HZ
+    assert find_slowest_log_rate(thin) < MIN_HZ
 
 
 @pytest.mark.parametrize(("hertz", "dynamics"), [(50.0, True), (10.0, True), (9.6, True), (9.4, False)])

@@ -291,7 +291,7 @@ def test_tables_pictures_and_a_log_of_the_models_flight(tmp_path: Path, capsys: 
     assert main(["refly", str(flight)]) == 0
     out = capsys.readouterr().out
     assert "AUTO from 20.0 s to 111.8 s, legs 0 to 1: flown / simulated" in out
-    blown = "Model aerosonde in 3.0 m/s of wind, no gusts, against the flight, median (95 %): cross-track"
+    blown = "Median difference (95 %) between the flight and model aerosonde in 3.0 m/s of wind, no gusts: cross-track"
     assert blown in out
     files = sorted(path.name for path in (tmp_path / "a-refly").iterdir())
     assert files == [

@@ -16,7 +16,7 @@ from aircraft.identification.performance import performance
 from flight.dynamics.fdm import Fdm
 from flight.dynamics.trim import steady_flight
 from planfly.identification.base_numbers import base_model, is_flying_wing, scale_base_model
-from planfly.identification.model_text import identified_xml
+from planfly.identification.model_text import format_identified_model
 from tests.instrumented_flights import Truth, changed_aerosonde
 
 # Beard and McLain, Small Unmanned Aircraft, second edition, appendix E.2.
@@ -117,7 +117,7 @@ def test_an_identified_ultra_stick_without_a_log_flies_as_its_base(tmp_path: Pat
     base = load_aircraft("ultrastick25e")
     folder = tmp_path / "own"
     shutil.copytree(base.folder, folder)
-    text = identified_xml(base, "own", base_model(base), prior_means())
+    text = format_identified_model(base, "own", base_model(base), prior_means())
     (folder / "ultrastick25e.xml").unlink()
     (folder / "own.xml").write_text(text, encoding="utf-8")
     (folder / "ultrastick25e.toml").rename(folder / "own.toml")
@@ -191,7 +191,9 @@ def test_a_flying_wing_from_a_data_sheet_is_a_base_without_the_propellers_torque
     assert base_model(load_aircraft("aerosonde")).has_torque_reaction
     # The model that an estimate makes of it has none either, and flies level as the wing does.
     (tmp_path / "mine").mkdir()
-    (tmp_path / "mine" / "mine.xml").write_text(identified_xml(wing, "mine", numbers, prior_means()), encoding="utf-8")
+    (tmp_path / "mine" / "mine.xml").write_text(
+        format_identified_model(wing, "mine", numbers, prior_means()), encoding="utf-8"
+    )
     shutil.copy(wing.folder / "foam.toml", tmp_path / "mine" / "mine.toml")
     before, after = (steady_flight(Fdm(one), 15.0, 500.0) for one in (wing, read_aircraft(tmp_path / "mine")))
     assert before is not None
@@ -221,5 +223,5 @@ def test_the_battery_power_of_a_data_sheet_is_kept(tmp_path: Path) -> None:
     shutil.copytree(sheet.folder, folder)
     (folder / "foam.toml").rename(folder / "mine.toml")
     (folder / "foam.xml").unlink()
-    (folder / "mine.xml").write_text(identified_xml(sheet, "mine", numbers, prior_means()), encoding="utf-8")
+    (folder / "mine.xml").write_text(format_identified_model(sheet, "mine", numbers, prior_means()), encoding="utf-8")
     assert power(read_aircraft(folder)) == pytest.approx(power(sheet), rel=0.02)

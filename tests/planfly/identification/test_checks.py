@@ -12,7 +12,7 @@ from planfly.identification.checks import (
     check_commands,
     check_estimate,
     check_power,
-    mass_change,
+    estimate_mass_change,
 )
 from planfly.identification.records import flight_records
 from planfly.identification.servos import read_servos
@@ -114,12 +114,12 @@ def test_a_mass_that_changes_within_the_logs_is_refused() -> None:
     share = np.linspace(0.0, -0.3, len(lift.predicted))
     lighter = replace(lift, measured=lift.predicted + share * (lift.predicted - zero))
     changing = replace(estimate, equations=(lighter, *others))
-    change, sd = mass_change(changing, base)
+    change, sd = estimate_mass_change(changing, base)
     assert change == pytest.approx(-0.3, abs=0.02)
     assert sd < 0.01
     assert "the mass seems to change by -29 % within the logs" in refused(changing)
     # This log of five and a half minutes tells no change of its own mass.
-    change, sd = mass_change(estimate, base)
+    change, sd = estimate_mass_change(estimate, base)
     assert abs(change) < 4.0 * sd
 
 

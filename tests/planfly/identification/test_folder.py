@@ -19,10 +19,10 @@ from logs.importers.motion import MotionLog
 from planfly.identification.base_numbers import base_model
 from planfly.identification.folder import (
     Identified,
-    flown_parameters,
-    folder_files,
+    format_posterior,
+    make_folder_files,
     make_identification,
-    posterior_text,
+    select_flown_parameters,
 )
 from planfly.identification.records import log_outputs
 from tests.instrumented_flights import PARAMETERS, Truth, changed_aerosonde, short_motion
@@ -50,11 +50,11 @@ def found(log: MotionLog) -> Identified:
 
 
 def files(log: MotionLog) -> dict[str, str]:
-    return folder_files(found(log), "mine", (BASE.battery_voltage, BASE.battery_energy))
+    return make_folder_files(found(log), "mine", (BASE.battery_voltage, BASE.battery_energy))
 
 
 def test_parameters_of_an_old_release_count_by_their_present_names() -> None:
-    stated = flown_parameters(flown(OLD))
+    stated = select_flown_parameters(flown(OLD))
     assert (stated["AIRSPEED_CRUISE"], stated["AIRSPEED_MIN"], stated["AIRSPEED_MAX"]) == (24.0, 17.0, 30.0)
     assert (stated["ROLL_LIMIT_DEG"], stated["NAVL1_PERIOD"]) == (42.0, 15.0)
     assert not (set(OLD) - {"NAVL1_PERIOD"}) & set(stated)
@@ -100,7 +100,7 @@ def test_power_is_as_uncertain_as_torque_and_drive(with_current: bool, power_sd:
     estimate = Estimate(prior_means(), covariance, (), (), with_current=with_current, airspeed=(1.02, 0.003))
     log = flown({})
     found = make_identification(BASE, base_model(BASE), estimate, [log], log_outputs(log, BASE))
-    table = tomllib.loads(posterior_text(found))
+    table = tomllib.loads(format_posterior(found))
     assert table["power_sd"] == pytest.approx(power_sd, rel=0.3 if with_current else 0.1)
     assert (table["airspeed_factor"], table["airspeed_factor_sd"]) == (1.02, 0.003)
     names = [quantity["property"] for quantity in table["quantity"]]
@@ -124,6 +124,6 @@ def test_the_fastest_is_as_sure_as_the_drag(tmp_path: Path) -> None:
     estimate = Estimate(prior_means(), np.diag(np.square(sds)), (), ())
     log = flown({})
     table = tomllib.loads(
-        posterior_text(make_identification(BASE, base_model(BASE), estimate, [log], log_outputs(log, BASE)))
+        format_posterior(make_identification(BASE, base_model(BASE), estimate, [log], log_outputs(log, BASE)))
     )
     assert table["fastest_sd_mps"] == pytest.approx(0.5 * (tops[0] - tops[1]), rel=0.15)

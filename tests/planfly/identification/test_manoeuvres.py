@@ -7,12 +7,14 @@ from aircraft.catalog import load_aircraft
 from flight.dynamics.envelope_tables import load_envelope
 from flight.mission.items import Command
 from flight.mission_files.wpl import waypoints_text
-from planfly.identification.manoeuvres import identification_mission
+from planfly.identification.manoeuvres import make_identification_mission
 
 
 def test_the_mission_can_be_flown_and_shows_what_it_is_for(tmp_path: Path) -> None:
     aircraft = load_aircraft("aerosonde")
-    mission = identification_mission(aircraft, load_envelope(aircraft), 36.2578, -84.1401, 335.0, max_rates=(5.6, 5.6))
+    mission = make_identification_mission(
+        aircraft, load_envelope(aircraft), 36.2578, -84.1401, 335.0, max_rates=(5.6, 5.6)
+    )
     speeds = {item.params[1] for item in mission.items if item.command == Command.DO_CHANGE_SPEED}
     assert len(speeds) >= 4
     file = tmp_path / "identify.waypoints"

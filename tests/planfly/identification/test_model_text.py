@@ -11,7 +11,7 @@ from aircraft.identification.parameters import INDEX, PARAMETERS, prior_means
 from flight.dynamics.fdm import Fdm
 from flight.dynamics.trim import steady_flight
 from planfly.identification.base_numbers import _Probe, base_model, scale_base_model
-from planfly.identification.model_text import check_base, identified_xml
+from planfly.identification.model_text import check_base, format_identified_model
 from tests.instrumented_flights import Truth, changed_aerosonde
 from tests.instrumented_wings import MASS, changed_wing
 from world.errors import FlightError
@@ -40,7 +40,7 @@ def written(place: Path, values: np.ndarray, mass: float = 11.0, area: float = B
     folder = place / "mine"
     folder.mkdir()
     numbers = scale_base_model(base_model(BASE), mass, BASE.wing_span, area)
-    (folder / "mine.xml").write_text(identified_xml(BASE, "mine", numbers, values), encoding="utf-8")
+    (folder / "mine.xml").write_text(format_identified_model(BASE, "mine", numbers, values), encoding="utf-8")
     text = (BASE.folder / "aerosonde.toml").read_text(encoding="utf-8").replace("mass_kg = 11.0", f"mass_kg = {mass}")
     text = text.replace("wing_area_m2 = 0.55", f"wing_area_m2 = {area}")
     (folder / "mine.toml").write_text(text, encoding="utf-8")
@@ -110,7 +110,7 @@ def test_a_wing_is_the_wing_edited_by_hand(tmp_path: Path, name: str) -> None:
     numbers = scale_base_model(base_model(base), edited.mass, base.wing_span, base.wing_area)
     folder = tmp_path / "mine"
     folder.mkdir()
-    (folder / "mine.xml").write_text(identified_xml(base, "mine", numbers, values), encoding="utf-8")
+    (folder / "mine.xml").write_text(format_identified_model(base, "mine", numbers, values), encoding="utf-8")
     (folder / "mine.toml").write_text((edited.folder / "edited.toml").read_text(encoding="utf-8"), encoding="utf-8")
     for climb in (0.0, 0.05):
         trims = []

@@ -28,7 +28,10 @@ def changed(parameters: Mapping[str, float] = {}, **fields: Any) -> MotionLog:
 @pytest.mark.parametrize(
     ("log", "said"),
     [
-        (lambda: changed(inertial=NONE), "no IMU, the inertial sensors: LOG_BITMASK 65535 records them (it is 65535)"),
+        (
+            lambda: changed(inertial=NONE),
+            "no IMU, the inertial sensors: LOG_BITMASK 65535 records them (the log has 65535)",
+        ),
         (lambda: changed(outputs=NONE), "no RCOU, the servo outputs: LOG_BITMASK 65535"),
         (lambda: changed(attitude=NONE), "no ATT"),
         (lambda: changed(airspeed=NONE), "no ARSP of a sensor in use (U = 1), the airspeed"),
@@ -102,7 +105,7 @@ def test_a_blocked_airspeed_sensor_is_not_used() -> None:
     before, after = flight_records(blocked(150.0, 190.0), PRIOR)
     assert 149.0 < before.time[-1] < 152.0
     assert 188.0 < after.time[0] < 191.0
-    with pytest.raises(LogError, match=r"airspeed: hardly varies for 1\d\d s of \d+ s of flight: ground velocity"):
+    with pytest.raises(LogError, match=r"airspeed: hardly varies for 1\d\d s of \d+ s of flight: the ground velocity"):
         flight_records(blocked(100.0, 280.0), PRIOR)
 
 

@@ -16,6 +16,6 @@ from world.errors import FlightError
 def test_a_bad_table_is_one_line(tmp_path: Path, text: str) -> None:
     file = tmp_path / "ardupilot.toml"
     file.write_text(text, encoding="utf-8")
-    with pytest.raises(FlightError, match="no table of servo outputs") as refused:
+    with pytest.raises(FlightError, match="not a table of servo outputs") as refused:
         read_servos(file)
     assert "\n" not in str(refused.value)

@@ -24,7 +24,7 @@ from logs.verdict.findings import Finding
 from logs.verdict.places import FLIGHT, DecidingParameter, Place
 from logs.verdict.verdict import Verdict
 from planfly.live import served_flights
-from planfly.live.served_flights import ServedFlights, ServeOptions, load_served_scenario, verdict_texts
+from planfly.live.served_flights import ServedFlights, ServeOptions, describe_verdict, load_served_scenario
 from tests.logs.made_flight import make_track
 from tests.planfly.conftest import FIELD
 from tests.setups import waypoint_mission
@@ -38,25 +38,25 @@ def failing(leg: int) -> Finding:
 
 def test_of_a_verdict_the_worst_comes_first_and_the_rest_is_counted() -> None:
     verdict = Verdict(tuple(failing(k) for k in range(6)), False, True, ("not flyable",), "geometry")
-    texts = verdict_texts("geometry", verdict)
+    texts = describe_verdict("geometry", verdict)
     assert texts[0] == ("verdict (geometry): NOT FLYABLE", WARNING)
     assert [text.text for text in texts[1:5]] == [f"slope at leg {k}: too steep" for k in range(4)]
     assert texts[5:] == (("and 2 more findings", WARNING),)
     late = DecidingParameter("TECS_HDEM_TCONST", 3.0, 1.2, "s", "clearance", Place("leg", 4), -8.2)
-    decided = verdict_texts("flown", replace(verdict, deciding=late))
+    decided = describe_verdict("flown", replace(verdict, deciding=late))
     assert decided[1] == (
         "with TECS_HDEM_TCONST 3 s the aircraft is 8 m too low on leg 4; with 1.2 s the flight would pass",
         WARNING,
     )
     assert decided[2:] == texts[1:]
     clean = Verdict((), True, True, ("flyable",), "flown")
-    assert verdict_texts("flown", clean) == (("verdict (flown): FLYABLE", INFO),)
+    assert describe_verdict("flown", clean) == (("verdict (flown): FLYABLE", INFO),)
 
 
 def test_a_station_reads_the_words_of_the_terminal() -> None:
     lost = Finding("departure", FLIGHT, 0.0, 80.0, 75.0, "check", 0.0, -5.0, "deg", "every row", False, "bank 80°")
     verdict = Verdict((lost,), False, True, ("not flyable",), "flown")
-    assert verdict_texts("flown", verdict)[1] == ("loss of control: bank 80°", WARNING)
+    assert describe_verdict("flown", verdict)[1] == ("loss of control: bank 80°", WARNING)
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from cryptography import x509
 
-from planfly.replays.certificates import Certificate, temporary_certificate
+from planfly.replays.certificates import Certificate, make_temporary_certificate
 
 
 def context(kind: int, held: Certificate, trusted: Certificate, folder: Path) -> ssl.SSLContext:
@@ -45,7 +45,7 @@ def greeted(server: ssl.SSLContext, client: ssl.SSLContext) -> bytes:
 
 
 def test_who_holds_it_is_known_and_who_does_not_is_refused(tmp_path: Path) -> None:
-    ours, other = temporary_certificate(), temporary_certificate()
+    ours, other = make_temporary_certificate(), make_temporary_certificate()
     server = context(ssl.PROTOCOL_TLS_SERVER, ours, ours, tmp_path)
     assert greeted(server, context(ssl.PROTOCOL_TLS_CLIENT, ours, ours, tmp_path)) == b"welcome"
     with pytest.raises(OSError, match=r"(?i)alert|certificate|reset"):
@@ -56,6 +56,6 @@ def test_who_holds_it_is_known_and_who_does_not_is_refused(tmp_path: Path) -> No
 
 def test_no_clock_makes_it_invalid() -> None:
     """A clock that is set back or on by decades during a run."""
-    made = x509.load_pem_x509_certificate(temporary_certificate().certificate.encode())
+    made = x509.load_pem_x509_certificate(make_temporary_certificate().certificate.encode())
     assert made.not_valid_before_utc <= datetime(1970, 1, 1, tzinfo=UTC)
     assert made.not_valid_after_utc >= datetime(2200, 1, 1, tzinfo=UTC)

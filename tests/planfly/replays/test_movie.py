@@ -79,7 +79,7 @@ def test_a_folder_takes_the_frames(log_path: Path, tmp_path: Path) -> None:
         ("film.avi", (), "expected .gif, .mp4 or a folder"),
         ("film.mp4", (), "film.mp4: an .mp4 needs ffmpeg (a .gif or a folder does not), or the extra 'films'"),
         ("none/film.gif", (), "does not exist"),
-        ("film.gif", ("--speed", "0.001"), "frames: at most 5,000; raise --speed"),
+        ("film.gif", ("--speed", "0.001"), "frames: at most 5,000 are allowed; raise --speed"),
         ("film.gif", ("--foxglove",), "expected only one of them"),
         ("film.gif", ("--to", "127.0.0.1:9"), "expected only one of them"),
     ],

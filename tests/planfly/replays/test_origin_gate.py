@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from planfly.replays.certificates import temporary_certificate
-from planfly.replays.origin_gate import VIEWERS, OriginGate, refusal_reason
+from planfly.replays.certificates import make_temporary_certificate
+from planfly.replays.origin_gate import VIEWERS, OriginGate, find_refusal_reason
 
 
 def asked(*headers: str) -> bytes:
@@ -32,7 +32,7 @@ LOCAL = "Host: 127.0.0.1:8765"
     ],
 )
 def test_viewers_and_programs_are_let_in(headers: tuple[str, ...]) -> None:
-    assert refusal_reason(asked(*headers), 8765, VIEWERS) == ""
+    assert find_refusal_reason(asked(*headers), 8765, VIEWERS) == ""
 
 
 @pytest.mark.parametrize(
@@ -55,13 +55,13 @@ def test_viewers_and_programs_are_let_in(headers: tuple[str, ...]) -> None:
     ],
 )
 def test_pages_of_others_and_other_hosts_are_refused(headers: tuple[str, ...], why: str) -> None:
-    assert refusal_reason(asked(*headers), 8765, VIEWERS) == why
+    assert find_refusal_reason(asked(*headers), 8765, VIEWERS) == why
 
 
 @contextlib.contextmanager
 def gated(folder: Path) -> Iterator[tuple[OriginGate, list[str]]]:
     """A gate before a server that sends back, through TLS, all that comes to it."""
-    certificate = temporary_certificate()
+    certificate = make_temporary_certificate()
     (folder / "cert").write_text(certificate.certificate)
     (folder / "key").write_text(certificate.key)
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)

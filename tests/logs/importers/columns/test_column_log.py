@@ -47,7 +47,7 @@ def said(path: Path, read: Callable[[Path], object] = read_motion) -> str:
         ('column = "vn",', 'colum = "vn",', "columns.velocity_north.colum: unknown key: did you mean 'column'"),
         ('file = "flight.csv"', 'file = "other.csv"', "other.csv: no such file"),
         ('file = "flight.csv"', 'file = "flight.xlsx"', "suffix: .xlsx: expected .csv, .mat"),
-        ('file = "flight.csv"', "", "file: missing; it names the data file"),
+        ('file = "flight.csv"', "", "file: missing; expected the path of the data file"),
         ("\n[columns]", "rate = 50.0\n[columns]", "clocks.main.rate: 50 Hz: the times in t have 20 rows a second"),
         ('unit = "s"', 'unit = "fortnights"', "clocks.main.unit: fortnights: expected s, ms"),
         ('column = "t"', 'column = "tt"', "clocks.main.column: tt: no such column in flight.csv"),
@@ -55,9 +55,9 @@ def said(path: Path, read: Callable[[Path], object] = read_motion) -> str:
         (
             "file =",
             "span_s = [9e3, 9e4]\nfile =",
-            "span_s: 9000 to 90000 s: no rows of velocity_north, .* 239.95 s",
+            "span_s: 9000 to 90000 s: velocity_north has no rows in this span, .* 239.95 s",
         ),
-        ('"volt", unit = "V"', '"volt", unit = "V", rate = 1.0', "columns.voltage.rate: 1 Hz: it changes"),
+        ('"volt", unit = "V"', '"volt", unit = "V", rate = 1.0', "columns.voltage.rate: 1 Hz: the value changes"),
         # The motion contradicts itself.
         (
             '"r", unit = "deg/s"',
@@ -102,13 +102,13 @@ def said(path: Path, read: Callable[[Path], object] = read_motion) -> str:
         (
             "airspeed =",
             'wind_north = { value = 0.0, unit = "m/s" }\nwind_east = { value = -4.0, unit = "m/s" }\nairspeed =',
-            "wind_north: wind_north states -1 times the wind of airspeed, .* check unit and frame",
+            "wind_north: wind_north states -1 times the wind that follows from airspeed, .* check unit and frame",
         ),
         (
             "airspeed =",
             'wind_speed = { value = 4, unit = "kt", scale = 1.944 }\nwind_direction = { value = 90, unit = "deg" }\n'
             "airspeed =",
-            "wind_direction: wind_direction states -1 times the wind of airspeed",
+            "wind_direction: wind_direction states -1 times the wind that follows from airspeed",
         ),
         (
             '"thr", unit = "%"',
@@ -149,7 +149,7 @@ def late(name: str, delay: float) -> np.ndarray:
     ("columns", "expected"),
     [
         (with_cell("t", -1, 604_801.0), "flight.csv: t: 604801 s: expected at most 604800 s from the first row"),
-        (with_cell("t", 40, 1.5), r"flight.csv: t\[40\]: 1.5 s: after 1.95 s: expected rising times"),
+        (with_cell("t", 40, 1.5), r"flight.csv: t\[40\]: 1.5 s: after 1.95 s:expected increasing times"),
         (with_cell("t", 40, np.nan), r"flight.csv: t\[40\]: nan: expected a time in every row"),
         (with_cell("roll", 7, "n/a?"), r"flight.csv: roll\[7\]: 'n/a\?': expected a number"),
         ({"t": 0.0 * TIME}, "flight.csv: t: 4800: expected at least two rows at different times"),
@@ -162,8 +162,8 @@ def late(name: str, delay: float) -> np.ndarray:
         ),
         ({"tas": 0.0 * TIME + 18.0}, r"airspeed: tas is stuck at one value from 0 to 239.5 s, in flight"),
         ({"r": frozen("r", 50.0, 80.0)}, "yaw_rate: r is stuck at one value from 50 to 80 s, in flight"),
-        ({"vn": late("vn", 1.0)}, "velocity_north: vn comes 1 s after the change of latitude: check its clock"),
-        ({"lat": late("lat", 2.0)}, "velocity_north: vn comes 2 s before the change of latitude: check its clock"),
+        ({"vn": late("vn", 1.0)}, "velocity_north: vn lags the change of latitude by 1 s: check its clock"),
+        ({"lat": late("lat", 2.0)}, "velocity_north: vn leads the change of latitude by 2 s: check its clock"),
     ],
 )
 def test_a_file_that_is_wrong_is_refused_in_one_line(
@@ -227,7 +227,7 @@ def test_clocks_that_do_not_correlate_are_refused(tmp_path: Path) -> None:
 def test_a_clock_is_not_aligned_with_its_own_quantity(tmp_path: Path) -> None:
     table = write_motor(tmp_path, shift=0.0)
     table.write_text(table.read_text().replace('with = "throttle"', 'with = "current"'))
-    assert "clocks.motor.align.with: expected a quantity whose clock has no `align` of its own" in said(table)
+    assert "clocks.motor.align.with: expected a quantity whose clock has no `align`" in said(table)
 
 
 def test_clocks_without_a_common_time_are_refused(tmp_path: Path) -> None:
@@ -243,7 +243,7 @@ def test_a_column_of_another_length_is_refused(tmp_path: Path) -> None:
     columns["roll"] = columns["roll"][:-5]
     savemat(tmp_path / "flight.mat", columns)
     table = write_log(tmp_path, TABLE.replace("flight.csv", "flight.mat"))
-    assert "columns.roll.column: roll: 4795 rows, and the clock main has 4800: expected as many" in said(table)
+    assert "columns.roll.column: roll: 4795 rows, but the clock main has 4800: expected equal numbers" in said(table)
 
 
 def test_a_data_file_without_a_table_names_the_command_that_writes_one(tmp_path: Path) -> None:

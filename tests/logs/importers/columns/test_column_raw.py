@@ -38,7 +38,9 @@ def test_a_log_is_read_as_others_are(tmp_path: Path) -> None:
 @pytest.mark.parametrize("without", ["latitude", "longitude"])
 def test_a_flight_without_positions_is_refused(tmp_path: Path, without: str) -> None:
     lines = [line for line in TABLE.splitlines() if not line.startswith(f"{without} =")]
-    with pytest.raises(LogError, match=f"columns.{without}: missing: a flight is judged by its positions"):
+    with pytest.raises(
+        LogError, match=f"columns.{without}: missing: expected a column, because a flight is judged by its positions"
+    ):
         open_log(write_log(tmp_path, "\n".join(lines)))
 
 

@@ -116,7 +116,7 @@ def test_a_replay_tells_the_way_back_as_a_return(tmp_path: Path) -> None:
     assert (log.setup.route.rtl_start, log.setup.route.rtl_loiter) == (1, setup.route.rtl_loiter)
     texts = [entry.text for entry in timeline(log) if entry.kind == "leg"]
     assert not [text for text in texts if text.startswith("loiter")]
-    assert len([text for text in texts if text.startswith("return of item 3: leg 1 goes on around its circle")]) == 2
+    assert len([text for text in texts if text.startswith("return of item 3: leg 1 continues around its circle")]) == 2
 
 
 @pytest.mark.parametrize("parameters", [{}, {"RTL_ALTITUDE": 20.0}])

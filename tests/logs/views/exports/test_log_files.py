@@ -21,9 +21,9 @@ from logs.importers.telemetry_log import read_telemetry
 from logs.recording.example_log import example_log
 from logs.recording.reader import FlightLog, read_log
 from logs.views.exports.log_files import (
-    attitude_quaternion,
+    compute_attitude_quaternion,
     csv_text,
-    flight_columns,
+    make_flight_columns,
     parquet_bytes,
     px4_log_bytes,
 )
@@ -48,7 +48,7 @@ def test_csv_reads_back_to_the_logged_numbers(log_file: Path) -> None:
 def test_parquet_keeps_types_and_says_what_it_is(log_file: Path) -> None:
     log = read_log(log_file)
     table = pyarrow.parquet.read_table(io.BytesIO(parquet_bytes(log)))
-    assert table.column_names == list(flight_columns(log))
+    assert table.column_names == list(make_flight_columns(log))
     assert (str(table.schema.field("time_s").type), str(table.schema.field("roll_rad").type)) == ("double", "float")
     assert table["airspeed_mps"].to_numpy().tobytes() == log.track.airspeed.tobytes()
     # A track alone has no origin for a latitude and a longitude.
@@ -237,7 +237,7 @@ def test_the_attitude_is_scipys_quaternion(found: ULog, small_log: FlightLog) ->
 def test_any_attitude_is_the_rotation_it_names() -> None:
     angles = np.random.default_rng(5).uniform(-3.0, 3.0, (200, 3)) * np.array([1.0, 0.5, 1.0])
     wanted = Rotation.from_euler("ZYX", angles[:, ::-1])
-    given = Rotation.from_quat(attitude_quaternion(angles)[:, [1, 2, 3, 0]])
+    given = Rotation.from_quat(compute_attitude_quaternion(angles)[:, [1, 2, 3, 0]])
     assert (given * wanted.inv()).magnitude() == pytest.approx(0.0, abs=1e-7)
 
 

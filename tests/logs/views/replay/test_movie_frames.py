@@ -8,7 +8,7 @@ import pytest
 
 from logs import theme
 from logs.recording.reader import FlightLog, read_log
-from logs.views.replay.movie_frames import MovieFrames, signed_number
+from logs.views.replay.movie_frames import MovieFrames, format_signed_number
 
 AIRCRAFT = [round(255 * part) for part in theme.rgb(theme.colour("aircraft"))]
 
@@ -18,7 +18,7 @@ AIRCRAFT = [round(255 * part) for part in theme.rgb(theme.colour("aircraft"))]
     [(-0.4, 0, "0"), (0.4, 0, "0"), (-0.6, 0, "−1"), (-0.04, 1, "0.0"), (-0.06, 1, "−0.1"), (float("nan"), 0, "?")],
 )
 def test_nothing_is_written_as_less_than_nought(value: float, digits: int, text: str) -> None:
-    assert signed_number(value, digits) == text
+    assert format_signed_number(value, digits) == text
 
 
 @pytest.fixture(scope="module")

@@ -64,7 +64,7 @@ def test_the_lowest_clearance_of_each_leg_is_that_of_a_fine_sampling(log: Flight
     leg = legs[np.searchsorted(log.track.time, fine, side="right") - 1]
     for k, entry in enumerate(sorted(entries, key=lambda item: item.text)):
         lowest = float(height[leg == k].min())
-        assert entry.text.startswith(f"lowest of leg {k}: {lowest:.1f} m above ground")
+        assert entry.text.startswith(f"lowest height on leg {k}: {lowest:.1f} m above ground")
     # The recorded clearance, 999 m, is not believed.
     assert not any("999" in entry.text for entry in entries)
 
@@ -72,7 +72,7 @@ def test_the_lowest_clearance_of_each_leg_is_that_of_a_fine_sampling(log: Flight
 def test_a_leg_below_the_required_clearance_is_marked(log: FlightLog) -> None:
     lowered = dataclasses.replace(log.track, position=log.track.position - np.array([0.0, 0.0, 60.0]))
     found = texts(timeline(dataclasses.replace(log, track=lowered)), "ground")
-    assert any("49.4 m above ground, under the required 60 m" in text for text in found)
+    assert any("49.4 m above ground, below the required 60 m" in text for text in found)
 
 
 def test_a_threat_is_entered_and_left(log: FlightLog) -> None:

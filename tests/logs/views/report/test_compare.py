@@ -22,7 +22,7 @@ from logs.views.report.compare import (
     comparison_data,
     comparison_views,
     difference_lines,
-    nearest_distances,
+    measure_nearest_distances,
     write_comparison,
 )
 from tests.soak import SOAK
@@ -151,4 +151,4 @@ def test_the_nearest_of_a_track_is_that_of_a_tree(apart: float) -> None:
     track = np.cumsum(np.column_stack([6.0 * np.sin(course), 6.0 * np.cos(course), 0.3 + 0.0 * time]), axis=0)
     points = track[100:1333] + np.random.default_rng(2).normal(0.0, 4.0, (1233, 3)) + np.array([apart, 0.0, 0.0])
     wanted = KDTree(track).query(points)[0]
-    assert nearest_distances(points, track) == pytest.approx(wanted, abs=1e-9)
+    assert measure_nearest_distances(points, track) == pytest.approx(wanted, abs=1e-9)

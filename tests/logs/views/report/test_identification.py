@@ -67,5 +67,5 @@ def test_the_page_says_what_was_found_and_what_was_not(monkeypatch: pytest.Monke
     assert "http" not in page.partition('<script type="application/json"')[0].replace("http-equiv", "")
     bare = replace(facts(), check=None, estimate=replace(facts().estimate, dynamics=False))
     shown = identification_page(bare)
-    assert "of the logs that the estimate was made from" in shown
+    assert "of the logs from which the estimate was made" in shown
     assert "Performance only" in shown

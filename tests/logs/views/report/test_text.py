@@ -17,14 +17,14 @@ from logs.verdict.presentation import findings_by_rule
 from logs.verdict.verdict import Verdict
 from logs.verdict.wording import place_text, suggestions_text
 from logs.views.report.text import (
+    describe_model_trust,
     finding_rows,
+    list_not_reflown,
     missed_text,
-    not_reflown_lines,
     number,
     quantity,
     refly_lines,
     rule_row,
-    trust_line,
 )
 from tests.logs.views.report.report_data import FINDINGS, finding
 from world.scenario import with_wind
@@ -171,23 +171,23 @@ def test_what_is_not_known_is_a_dash() -> None:
 
 def test_the_trust_is_a_line_with_medians() -> None:
     spread = (Spread("cross_track", "m", 0.5, 2.0),)
-    line = trust_line(replace(AGAIN, spreads=spread))
-    blown = "Model aerosonde in 0.0 m/s of wind, no gusts, against the flight"
-    assert line == f"{blown}, median (95 %): cross-track 0.50 m (2.00 m)"
+    line = describe_model_trust(replace(AGAIN, spreads=spread))
+    blown = "Median difference (95 %) between the flight and model aerosonde in 0.0 m/s of wind, no gusts: "
+    assert line == f"{blown}cross-track 0.50 m (2.00 m)"
     scenario = with_wind(AGAIN.setup.scenario, 4.0, 0.0, "light")
     gusty = replace(AGAIN, setup=replace(AGAIN.setup, scenario=scenario))
-    assert "in 4.0 m/s of wind, light turbulence, against" in trust_line(gusty)
-    assert "used because no aircraft was named" in trust_line(replace(AGAIN, stands_in=True))
-    assert "ended early: departure" in trust_line(replace(AGAIN, ended="departure"))
-    assert "no part in common" in trust_line(replace(AGAIN, spreads=()))
+    assert "in 4.0 m/s of wind, light turbulence: cross-track" in describe_model_trust(gusty)
+    assert "used because no aircraft was named" in describe_model_trust(replace(AGAIN, stands_in=True))
+    assert "ended early: departure" in describe_model_trust(replace(AGAIN, ended="departure"))
+    assert "no part in common" in describe_model_trust(replace(AGAIN, spreads=()))
 
 
 def test_what_was_not_flown_again_is_named_with_its_reason() -> None:
     other = MissionStretch(50.0, 60.0, "AUTO", "log")
-    assert not_reflown_lines((AGAIN,), (AGAIN.stretch,), 9) == []
-    (line,) = not_reflown_lines((AGAIN,), (AGAIN.stretch, other), 9)
+    assert list_not_reflown((AGAIN,), (AGAIN.stretch,), 9) == []
+    (line,) = list_not_reflown((AGAIN,), (AGAIN.stretch, other), 9)
     assert line == "Not flown again: AUTO from 50.0 s to 60.0 s: it did not pass two waypoints in order"
-    (line,) = not_reflown_lines((AGAIN,), (AGAIN.stretch, other), 1)
+    (line,) = list_not_reflown((AGAIN,), (AGAIN.stretch, other), 1)
     assert line.endswith("in order, or 1 longer stretches were flown again")
 
 
