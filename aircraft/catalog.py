@@ -203,7 +203,7 @@ def read_aircraft(folder: Path) -> Aircraft:
         raise FlightError.from_error(error, file) from None
     if not values["stall_speed"] <= values["airspeed_min"] <= values["airspeed"] <= values["airspeed_max"]:
         raise FlightError(
-            f"{file}: stall_speed_mps <= airspeed_min_mps <= airspeed_mps <= airspeed_max_mps does not hold:"
+            f"{file}: expected stall_speed_mps <= airspeed_min_mps <= airspeed_mps <= airspeed_max_mps, found"
             f" {values['stall_speed']}, {values['airspeed_min']}, {values['airspeed']}, {values['airspeed_max']}",
             file=file,
             field="airspeed_mps",
@@ -317,7 +317,7 @@ def copy_aircraft_folder(
     1124.9
     """
     target = check_new_folder(folder, overwrite=overwrite)
-    files = _copied_files(source, target.name, model or {})
+    files = _collect_copied_files(source, target.name, model or {})
     write_aircraft_folder(target, files)
     return tuple(sorted(files))
 
@@ -356,7 +356,7 @@ def check_new_folder(folder: Path, *, overwrite: bool = False) -> Path:
     return target
 
 
-def _copied_files(source: Aircraft, name: str, model: Mapping[str, bytes]) -> dict[str, bytes]:
+def _collect_copied_files(source: Aircraft, name: str, model: Mapping[str, bytes]) -> dict[str, bytes]:
     """Return the contents of the files of an aircraft's copy, by their paths in the new folder.
 
     name: name of the copy. The metadata, and files that are named after the aircraft, get this name.

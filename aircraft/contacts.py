@@ -67,8 +67,8 @@ def default_contacts(aircraft: Aircraft, gear: Gear) -> tuple[Contact, ...]:
     """Return default ground contacts, scaled by the wing span, for an aircraft whose model has none.
 
     >>> from aircraft.catalog import load_aircraft
-    >>> made = default_contacts(load_aircraft("aerosonde"), "belly")
-    >>> len(made), made[0].name, round(made[0].down, 2), made[-1].is_support
+    >>> contacts = default_contacts(load_aircraft("aerosonde"), "belly")
+    >>> len(contacts), contacts[0].name, round(contacts[0].down, 2), contacts[-1].is_support
     (7, 'belly front left', 0.2, False)
     """
     span, standing_points = aircraft.wing_span, _WHEEL_POINTS if gear == "wheels" else _BELLY_POINTS
@@ -118,7 +118,7 @@ def _contact_xml(contact: Contact, aircraft: Aircraft, contacts: tuple[Contact, 
 
     Positions in the XML, and the centre, are in meters aft, right and up from the model's reference point.
     """
-    standing_count = sum(other.is_support for other in contacts)
+    standing_count = sum(any_contact.is_support for any_contact in contacts)
     stiffness = aircraft.mass * GRAVITY / (_SAG_SPANS * aircraft.wing_span) / standing_count
     damping = 2.0 * _DAMPING_RATIO * math.sqrt(stiffness * aircraft.mass / standing_count)
     aft, right, up = centre + np.array([-contact.forward, contact.right, -contact.down])

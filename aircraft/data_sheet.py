@@ -83,7 +83,7 @@ RANGES = {
     "top": ("top", "m/s", 9.0, 70.0, 1.0),
     "bank": ("bank", "degrees", 15.0, 60.0, math.pi / 180.0),
     "climb": ("climb", "degrees", 2.0, 35.0, math.pi / 180.0),
-    "motor": ("motor", "rpm a volt", 20.0, 5000.0, 1.0),
+    "motor": ("motor", "rpm per volt", 20.0, 5000.0, 1.0),
     "fuel": ("fuel", "kg", 0.05, 12.0, 1.0),
 }
 # Rounding tolerance for a conversion of units, as a ratio.
@@ -297,7 +297,7 @@ def check_sheet(sheet: DataSheet) -> DataSheet:
         areas = f"{lift / LIFT_RANGE[1] * area:.3g}..{lift / LIFT_RANGE[0] * area:.3g} m2 at this stall speed"
         allowed = (
             f"allowed {min_stall:.3g}..{max_stall:.3g}"
-            f" m/s without flaps for {sheet.mass:g} kg on {area:g} m2, or {areas}"
+            f" m/s without flaps for {sheet.mass:g} kg on {area:g} m2, or a wing area of {areas}"
         )
         raise _range_error("stall", sheet.stall, allowed, "m/s")
     aspect = sheet.span**2 / area
@@ -348,7 +348,7 @@ def _wing_area(sheet: DataSheet) -> float:
 
 def _area_source(sheet: DataSheet) -> str:
     """Return a phrase on the source of the wing area, for a message."""
-    return "as stated" if sheet.area else "that carries this mass at this stall speed; state the area if you know it"
+    return "as stated" if sheet.area else "the area for this mass and stall speed; state the area if you know it"
 
 
 @dataclass(frozen=True, slots=True)
@@ -377,8 +377,8 @@ def size_aircraft(
     Raises FlightError for a stall speed or a sink rate out of range, and if no propeller gives the stated climb and top
     speed.
 
-    >>> made = size_aircraft(check_sheet(DataSheet(2.1, 1.6, 15.0, 10.0)))
-    >>> round(made.numbers.area, 3), made.guessed
+    >>> aircraft = size_aircraft(check_sheet(DataSheet(2.1, 1.6, 15.0, 10.0)))
+    >>> round(aircraft.numbers.area, 3), aircraft.guessed
     (0.269, ('area', 'top', 'bank', 'climb', 'volts', 'energy'))
     """
     aircraft_class = CLASSES[sheet.layout] if aircraft_class is None else aircraft_class
@@ -789,7 +789,7 @@ def _solve_engine(sheet: DataSheet, drag: Drag, target_fields: list[str]) -> tup
 
 
 def _thrust_error(motor: Motor, sheet: DataSheet, drag: Drag, field: str) -> float:
-    """Return the excess of a motor's thrust over the thrust that a field requires, relative to the latter.
+    """Return the relative thrust error of a motor: thrust divided by the thrust that a field requires, minus 1.
 
     field: field of the sheet. "top" requires its thrust at full throttle, "climb" at `DataSheet.climb_throttle`, and
         "trim_throttle" requires the drag at that throttle.
@@ -810,9 +810,11 @@ def _solve_for_factors(errors: Callable[[Sequence[float]], list[float]], count: 
     if not count:
         return []
     for size in (1.0, 0.6, 1.7):
-        x = _solve_by_newton(lambda x: np.array(errors(np.exp(x).tolist())), np.log([size, 1.0 / size][:count]))
-        if x is not None:
-            return np.exp(x).tolist()
+        solution = _solve_by_newton(
+            lambda logarithms: np.array(errors(np.exp(logarithms).tolist())), np.log([size, 1.0 / size][:count])
+        )
+        if solution is not None:
+            return np.exp(solution).tolist()
     raise _NoPropellerError
 
 
@@ -829,8 +831,8 @@ _THRUST_TOLERANCE_RATIO = 1e-7
 def _solve_by_newton(errors: Callable[[Floats], Floats], x: Floats) -> Floats | None:
     """Find a zero of the errors by Newton's method; return None if it does not converge.
 
-    errors: function that returns the errors for some numbers.
-    x: first guess of the numbers, which stay within `_SEARCH_BOUND`.
+    errors: function that returns n errors for n numbers.
+    x: first guess, (n,). The numbers stay between -`_SEARCH_BOUND` and `_SEARCH_BOUND`.
 
     A step that does not reduce the errors is halved.
     """
@@ -863,27 +865,27 @@ def _no_propeller_error(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -
     field = next((name for name in ("climb", "top", "motor") if getattr(stated_sheet, name)), "")
     if not field:
         reason = "no propeller of this size and pitch" if stated_sheet.propeller[0] else "no propeller"
-        allowed = f"{reason} carries {sheet.mass:g} kg at {sheet.cruise:g} m/s; state the climb, the top speed or both"
+        allowed = f"{reason} can fly {sheet.mass:g} kg at {sheet.cruise:g} m/s; state the climb, the top speed or both"
         return FlightError.of_argument("prop" if stated_sheet.propeller[0] else "cruise", None, allowed, shown="")
     option, unit, min_value, max_value, factor = RANGES[field]
     if field == "top":
         min_value, max_value = (ratio * sheet.cruise for ratio in TOP_RATIO_RANGE)
     feasible_values = []
     for value in np.geomspace(min_value, max_value, _RANGE_STEP_COUNT).tolist():
-        changed = {field: value * factor}
+        changed_field = {field: value * factor}
         with contextlib.suppress(_NoPropellerError):
-            _size_any_motor(replace(stated_sheet, **changed), replace(sheet, **changed), drag)
+            _size_any_motor(replace(stated_sheet, **changed_field), replace(sheet, **changed_field), drag)
             feasible_values.append(value)
-    others = [
+    other_conditions = [
         f"{title} of {getattr(stated_sheet, name) / RANGES[name][4]:.3g} {RANGES[name][1]}"
         for name, title in (("top", "a top speed"), ("motor", "a motor"))
         if name != field and getattr(stated_sheet, name)
     ]
-    condition = " and ".join([f"at {sheet.cruise:g} m/s", *others])
+    condition = " and ".join([f"at {sheet.cruise:g} m/s", *other_conditions])
     allowed = (
         f"allowed about {min(feasible_values):.3g}..{max(feasible_values):.3g} {unit} {condition}"
         if feasible_values
-        else f"no propeller {condition}"
+        else f"no propeller reaches it {condition}"
     )
     value = getattr(stated_sheet, field) / factor
     return FlightError.of_argument(option, value, allowed, shown=f"{value:.3g} {unit}")

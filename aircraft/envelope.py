@@ -94,9 +94,9 @@ class Envelope:
 
         >>> tables = {name: np.full((1, 1), 0.2) for name in ("climb", "descent")}
         >>> edges = dict.fromkeys(("airspeed", "amsl", "level_speed_min", "level_speed_max"), np.ones(1))
-        >>> made = Envelope("mine", "", False, max_bank=0.5, climb_sd=0.1, descent_sd=0.2, **edges, **tables)
-        >>> made = made.with_margin()
-        >>> round(float(made.climb[0, 0]), 4), float(made.descent[0, 0]), made.climb_sd
+        >>> envelope = Envelope("mine", "", False, max_bank=0.5, climb_sd=0.1, descent_sd=0.2, **edges, **tables)
+        >>> envelope = envelope.with_margin()
+        >>> round(float(envelope.climb[0, 0]), 4), float(envelope.descent[0, 0]), envelope.climb_sd
         (0.0355, 0.0, 0.0)
         """
         if not (self.climb_sd or self.descent_sd or self.fastest_sd):
@@ -151,8 +151,12 @@ class Envelope:
         )
         sine = math.sin(air_angle)
         min_sine, max_sine = -math.sin(descent), math.sin(climb)
-        if sine >= max_sine or sine <= min_sine or not min_sine < 0.0 < max_sine:
-            return full_throttle if sine >= max_sine else idle if sine <= min_sine else math.nan
+        if sine >= max_sine:
+            return full_throttle
+        if sine <= min_sine:
+            return idle
+        if not min_sine < 0.0 < max_sine:
+            return math.nan
         return (
             idle * sine * (sine - max_sine) / (min_sine * (min_sine - max_sine))
             + level * (sine - min_sine) * (sine - max_sine) / (min_sine * max_sine)
@@ -172,6 +176,9 @@ def ground_slope(air_angle: float, airspeed: float, tailwind: float, crosswind: 
     """Convert a climb angle relative to the air to the path angle over the ground, rad.
 
     The result is NaN if the aircraft cannot make progress over the ground.
+
+    air_angle: rad.
+    airspeed, tailwind, crosswind: m/s.
     """
     speed_over_ground = ground_speed(airspeed * math.cos(air_angle), tailwind, crosswind)
     return math.atan2(airspeed * math.sin(air_angle), speed_over_ground)
@@ -179,9 +186,12 @@ def ground_slope(air_angle: float, airspeed: float, tailwind: float, crosswind: 
 
 @compiled
 def ground_speed(airspeed: float, tailwind: float, crosswind: float) -> float:
-    """Return the ground speed along a course in wind, m/s; NaN if the course cannot be held."""
-    speed2 = airspeed**2 - crosswind**2
-    speed_over_ground = math.sqrt(speed2) + tailwind if speed2 > 0.0 else -1.0
+    """Return the ground speed along a course in wind, m/s; NaN if the course cannot be held.
+
+    airspeed, tailwind, crosswind: m/s.
+    """
+    speed_along_2 = airspeed**2 - crosswind**2
+    speed_over_ground = math.sqrt(speed_along_2) + tailwind if speed_along_2 > 0.0 else -1.0
     return speed_over_ground if speed_over_ground > 0.0 else math.nan
 
 

@@ -79,9 +79,9 @@ def read_model(table: object, aircraft: str) -> Model:
 
     Raises FlightError, whose message begins with the key, for an unknown, missing or invalid entry.
     """
-    table = _checked_table(table, "model", ("shipped_by_jsbsim", "engine_settles", "command", "reading"))
-    commands = _checked_table(table.get("command", {}), "model.command", _COMMANDS)
-    readings = _checked_table(table.get("reading", {}), "model.reading", _READINGS)
+    table = _check_table(table, "model", ("shipped_by_jsbsim", "engine_settles", "command", "reading"))
+    commands = _check_table(table.get("command", {}), "model.command", _COMMANDS)
+    readings = _check_table(table.get("reading", {}), "model.reading", _READINGS)
     command_properties = []
     for name, default in zip(_COMMANDS, DEFAULT_MODEL.commands, strict=True):
         if name not in commands:
@@ -99,14 +99,14 @@ def read_model(table: object, aircraft: str) -> Model:
             property_name, factor = _read_entry(readings[name], f"model.reading.{name}", 1)
             reading_properties.append(Reading(property_name, factor))
     return Model(
-        _shipped_model(table, aircraft),
+        _shipped_model_name(table, aircraft),
         _read_flag(table, "engine_settles"),
         tuple(command_properties),
         tuple(reading_properties),
     )
 
 
-def _checked_table(value: object, key: str, known_keys: tuple[str, ...]) -> dict[str, Any]:
+def _check_table(value: object, key: str, known_keys: tuple[str, ...]) -> dict[str, Any]:
     """Return a value if it is a table that has only known keys. Raises FlightError otherwise."""
     if not isinstance(value, dict):
         raise FlightError(f"{key} = {value!r} is not a table", field=key, value=value)
@@ -116,7 +116,7 @@ def _checked_table(value: object, key: str, known_keys: tuple[str, ...]) -> dict
     return value
 
 
-def _shipped_model(table: dict[str, Any], aircraft: str) -> str:
+def _shipped_model_name(table: dict[str, Any], aircraft: str) -> str:
     """Return the name of the model if JSBSim ships it, otherwise "".
 
     The name must not lead outside JSBSim's folder, because it is also the name of a folder. Raises FlightError for an
@@ -126,7 +126,7 @@ def _shipped_model(table: dict[str, Any], aircraft: str) -> str:
     if isinstance(value, bool):
         return aircraft if value else ""
     if not isinstance(value, str) or _MODEL_NAME.fullmatch(value) is None:
-        field, allowed = "model.shipped_by_jsbsim", "true, false or the name of a model of JSBSim's"
+        field, allowed = "model.shipped_by_jsbsim", "true, false or the name of a model that JSBSim ships"
         raise FlightError(f"{field} = {value!r} is not {allowed}", field=field, value=value, allowed=allowed)
     return value
 
@@ -155,6 +155,6 @@ def _read_entry(value: object, key: str, factor_count: int) -> tuple[Any, ...]:
             for factor in value[1:]
         )
     if not is_valid or not isinstance(value, list):
-        allowed = f"a property and {factor_count} number(s) other than 0"
+        allowed = f"a property name and {factor_count} number(s) other than 0"
         raise FlightError(f"{key} = {value!r} is not {allowed}", field=key, value=value, allowed=allowed)
     return (value[0], *(float(factor) for factor in value[1:]))

@@ -18,11 +18,11 @@ Layout = Literal["tail", "wing", "vtail"]
 
 # Settable factors of the model, with the quantities that they multiply.
 FACTORS = {
-    "zero-lift-drag": "least drag coefficient",
+    "zero-lift-drag": "minimum drag coefficient",
     "induced-drag": "drag due to lift",
     "thrust": "thrust at a given propeller speed",
-    "motor-speed": "motor speed per volt (of an engine: the root of its torque)",
-    "windmill-drag": "drag of the propeller that the air turns",
+    "motor-speed": "motor speed per volt (for an engine: square root of its torque)",
+    "windmill-drag": "drag of a windmilling propeller",
     "lift-slope": "lift curve slope",
     "pitch-stiffness": "pitching moment per angle of attack",
     "pitch-damping": "pitching moment per pitch rate",
@@ -32,7 +32,7 @@ FACTORS = {
 }
 # Factors of a model with an electric motor or an engine whose power is guessed.
 POWER_FACTORS = {
-    "drive-power": "battery power or heat of the fuel for a power of the shaft",
+    "drive-power": "battery power, or heat of the fuel, for a given shaft power",
     "avionics-power": "power of autopilot, radios and servos",
 }
 # Ratio of the stops of elevons and ruddervators to the larger stop of the two commands that they mix.
@@ -461,6 +461,9 @@ def _separation_table(stall_alpha: float, sharpness: float) -> str:
     """Return the rows of a JSBSim table of the separated fraction of the flow by angle of attack (rad).
 
     The fraction follows Beard and McLain, eq. 4.10, and is exactly 0 in attached flow.
+
+    stall_alpha: angle of attack of the stall, rad.
+    sharpness: M of the textbook; a larger value gives a sharper stall.
     """
     width = 10.0 / sharpness
     steps = [stall_alpha - width + 0.02 * k for k in range(math.ceil(2.0 * width / 0.02) + 1)]

@@ -241,7 +241,10 @@ def _read_only(values: Floats) -> Floats:
 
 @inlined
 def wind_speed_at(table: PerformanceTable, amsl: float) -> float:
-    """Return the mean wind speed at an altitude, m/s."""
+    """Return the mean wind speed at an altitude, m/s.
+
+    amsl: altitude, m.
+    """
     return mean_wind_speed(table.wind_speed, table.wind_gradient, table.wind_reference_amsl, amsl)
 
 
@@ -383,11 +386,14 @@ def corner_tangent(
 
 @compiled_inline
 def arc_slope(tan_in: float, tan_out: float, tangent: float, radius: float) -> float:
-    """Return the tangent of the slope along a fly-by arc.
+    """Return the tangent of the slope along a fly-by arc with the turn angle theta.
 
-    It is the difference in altitude between the arc's tangent points, divided by the length of the arc. tan_in,
-    tan_out: tangents of the legs' slopes. tangent: length of the tangent, radius x tan(theta/2), m. The arc, radius x
-    theta, is shorter than its two tangents. Therefore it is steeper than they are, by a factor of 1.27 at 90 degrees.
+    It is the difference in altitude between the arc's tangent points, divided by the length of the arc.
+
+    tan_in, tan_out: tangents of the slopes of the legs before and after the arc.
+    tangent: tangent length, radius x tan(theta/2), m.
+    The arc, radius x theta, is shorter than its two tangents. Therefore it is steeper than the legs, by a factor of
+    1.27 at 90 degrees.
     """
     if tangent <= 0.0 or radius <= 0.0 or math.isinf(tangent):
         return 0.0

@@ -132,10 +132,10 @@ class ElectricMotor:
         """Return the propeller speed, rad/s."""
         square, linear, constant = self.propeller.torque_parabola(airspeed, rho)
         k, r = self.emf, self.resistance
-        driven = larger_root(
+        driven_speed = larger_root(
             square, linear + k * k / r, constant + k * self.idle_current - k * self.volts * throttle / r
         )
-        return max(0.0, driven, larger_root(square, linear, constant + k * self.idle_current))
+        return max(0.0, driven_speed, larger_root(square, linear, constant + k * self.idle_current))
 
     def thrust(self, throttle: float, airspeed: float, rho: float) -> float:
         """Return the thrust, N."""
@@ -219,8 +219,8 @@ class FuelEngine:
     def speed(self, throttle: float, airspeed: float, rho: float) -> float:
         """Return the propeller speed, rad/s."""
         square, linear, constant = self.propeller.torque_parabola(airspeed, rho)
-        driving = throttle * self.torque * rho / _SEA_LEVEL_DENSITY
-        return max(0.0, larger_root(square, linear, constant + self.friction - driving))
+        engine_torque = throttle * self.torque * rho / _SEA_LEVEL_DENSITY
+        return max(0.0, larger_root(square, linear, constant + self.friction - engine_torque))
 
     def thrust(self, throttle: float, airspeed: float, rho: float) -> float:
         """Return the thrust, N."""

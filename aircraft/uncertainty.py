@@ -185,21 +185,21 @@ def _check_name(name: object, file: str, key: str, error: type[PlanflyError] = F
 def uncertainty_text(uncertainty: Uncertainty) -> str:
     """Return an uncertainty as the text of an ``uncertainty.toml``."""
     lines = [
-        "# What is not known of this aircraft.  Each property is a factor in the model, 1 for the estimate.",
+        "# Uncertain properties of this aircraft.  Each property is a factor in the model; 1 is the estimate.",
         "",
         f'source = "{uncertainty.source}"',
         f"climb_sd_deg = {math.degrees(uncertainty.climb_sd):.2f}    # of the steepest climb at cruise, one standard"
         " deviation",
         f"descent_sd_deg = {math.degrees(uncertainty.descent_sd):.2f}  # of the steepest descent",
         f"fastest_sd_mps = {uncertainty.max_speed_sd:.2f}  # of the fastest level flight",
-        f"power_sd = {uncertainty.power_sd:.3g}  # of the logarithm of the power that flight takes",
+        f"power_sd = {uncertainty.power_sd:.3g}  # of the logarithm of the power in flight",
     ]
     if uncertainty.climb_guessed:
         lines.append("climb_guessed = true  # state the true value with --climb")
     if uncertainty.bank_guessed:
         lines.append("bank_guessed = true  # of max_bank_deg; state the true value with --bank")
     if uncertainty.battery_guessed:
-        lines.append("battery_guessed = true  # no energy is judged until battery_wh is stated and this line is gone")
+        lines.append("battery_guessed = true  # to judge energy, state battery_wh and remove this line")
     for quantity in uncertainty.quantities:
         reason = quantity.reason.replace("\\", "/").replace('"', "'")
         lines += [

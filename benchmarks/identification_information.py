@@ -34,7 +34,7 @@ from aircraft.identification.drag import (
 )
 from aircraft.identification.draws import draw_aircraft
 from aircraft.identification.electric_motor import ElectricMotor
-from aircraft.identification.estimate import Estimate, aligned_signals, estimate_model
+from aircraft.identification.estimate import Estimate, estimate_model, make_aligned_signals
 from aircraft.identification.flight_record import GRID_HZ
 from aircraft.identification.flow import flow_from_forces
 from aircraft.identification.parameters import PARAMETERS
@@ -173,7 +173,7 @@ def one_seed(seed: int) -> dict[str, Any]:
         servos = read_servos(prior.folder / "ardupilot.toml")
         records = [record for log in logs for record in flight_records(log, prior, servos)]
     estimate = estimate_model(records, base)
-    signals = aligned_signals(records, estimate.clocks, base)
+    signals = make_aligned_signals(records, estimate.clocks, base)
     forces = forward_forces(signals, base, values, flow_from_forces(signals, base, values), AlphaUncertainty())
     _, sds = drag_priors(with_current=False)
     unknown = np.concatenate([values[_IS_DRAG_PARAMETER], np.zeros(len(NUISANCES))])

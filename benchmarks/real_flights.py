@@ -65,8 +65,8 @@ def predict_thor(folder: Path) -> tuple[dict[str, object], Path]:
     numbers = scale_base_model(base_model(sheet), 1.959, 1.27, 0.3097, 11.1)
     motion = read_motion(THOR)
     records = flight_records(motion, sheet)
-    earlier = [record.between(0.0, THOR_UNTIL_S) for record in records]
-    judged = [record.between(THOR_UNTIL_S, np.inf) for record in records]
+    earlier = [record.part_between(0.0, THOR_UNTIL_S) for record in records]
+    judged = [record.part_between(THOR_UNTIL_S, np.inf) for record in records]
     wind_tunnel = base_model(find_aircraft(WIND_TUNNEL))
     unknown = [replace(record, current=np.full_like(record.current, np.nan)) for record in records]
     without_current = estimate_model(unknown, numbers)

@@ -1,12 +1,12 @@
-"""Every colour, line width and dash of planfly's pictures, pages and scenes: the one file that holds any.
+"""Define the colours, line widths and dashes of all pictures, pages and scenes; no other file states any.
 
-A role ("missile", "planned") has one look, in a light and a dark variant.  PNG and SVG, which are printed, use the
-light one; the pages switch between both by the reader's preference; the scenes of Foxglove and Rerun, on black, use the
-dark one.  Charts name roles, never colours.
+A role ("missile", "planned") has one look, in a light and a dark variant.  PNG and SVG files use the light variant.
+Pages switch between both by the reader's preference.  Scenes of Foxglove and Rerun are black and use the dark variant.
+Charts name roles, never colours.
 
-Colours of the data are those of Okabe and Ito, "Color Universal Design" (2008), which people with any of the common
-colour vision deficiencies tell apart, and ColorBrewer's violet for limits; dashes, markers or hatches make each
-distinction a second time.
+The colours of the data come from Okabe and Ito, "Color Universal Design" (2008), so that people with any of the common
+colour vision deficiencies can tell them apart.  Limits have ColorBrewer's violet.  Dashes, markers or hatches repeat
+each distinction.
 """
 
 import re
@@ -33,11 +33,11 @@ class Look:
     dash: lengths of strokes and gaps in the same unit, () for a solid line.
     fill: opacity of its areas.
     size: size of its dots; 0 without dots.
-    face: role of the colour inside its dots, "" for its own.
-    edge: role of the colour around its areas, "" for its own.
+    face: role of the colour inside its dots; "" for the same colour.
+    edge: role of the colour around its areas; "" for the same colour.
     marker: shape of its dots: "circle", "triangle", "star" or "cross".
     hatch: hatch of its areas in print, in matplotlib's notation.
-    halo: True if its lines have a pale rim in print, because they lie on coloured ground.
+    halo: True if its lines have a pale rim in print, because they cross coloured ground.
     """
 
     light: str
@@ -178,11 +178,11 @@ PAGE = {
 # Size of a label by its rank, points, and gap between the label and its position, pixels.
 LABELS = {"fail": (7.0, 16.0), "end": (8.0, 12.0), "number": (7.5, 8.0), "name": (6.2, 4.0)}
 
-# Rises in lightness from valley to summit, so that height reads without colour.
+# Colours of the ground from valley to summit.  The lightness increases, so that heights are readable without colour.
 GROUND = ("#9fbfa5", "#cfd8b0", "#efe7c8", "#f6efe2", "#ffffff")
 GROUND_DARK = ("#2b3a31", "#3f4737", "#565341", "#6d6758", "#8c877f")
 
-# Colours of several lines of one kind, from dark to light.
+# Colours of several lines of the same kind, from dark to light.
 SHADES = (_FLOWN.light, _BLUE, _GREEN, _ORANGE, _PURPLE)
 # Colours of the algorithms in a figure of the paper.
 SERIES = (_BLUE, _PURPLE, "#1d1d1f", _ORANGE, _SKY, "#5c5c61")
@@ -238,9 +238,9 @@ def palette_colours() -> tuple[str, ...]:
 
 
 def css_variables() -> str:
-    """Return the theme's colours as CSS variables, such as ``--missile``.
+    """Return the theme's colours as the text of CSS rules with variables such as ``--missile``.
 
-    The light colours are replaced by the dark ones on screens that prefer a dark scheme.
+    Screens that prefer a dark scheme get the dark colours instead of the light ones.
 
     >>> "--missile: #" in css_variables()
     True
@@ -261,8 +261,8 @@ _HEX = re.compile(r"#[0-9a-f]{6}\b")
 def replace_colours_by_css_variables(svg: str) -> str:
     """Replace the light colours in an SVG's text by the variables of `css_variables`.
 
-    If several roles share a light colour, the variable of the first role is used; the roles of the page come before the
-    roles of the data.
+    If several roles share a light colour, the variable of the first role is used.  Roles of the page come before roles
+    of the data.
 
     >>> replace_colours_by_css_variables("fill: #1d1d1f; stroke: #123456")
     'fill: var(--ink); stroke: #123456'
@@ -278,8 +278,9 @@ def replace_colours_by_css_variables(svg: str) -> str:
     return _HEX.sub(replace_colour, svg)
 
 
-# Pixels of a page to a point of print, and plotly.js' names of markers.
+# Pixels of a page per point of print.
 _PIXELS = 1.25
+# plotly.js' names of the markers.
 _SYMBOLS = {"circle": "circle", "triangle": "triangle-up", "star": "star", "cross": "x-thin"}
 
 

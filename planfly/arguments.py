@@ -121,17 +121,17 @@ CHOICES: Mapping[str, tuple[Any, ...]] = {
 }
 
 
-def check_arguments(**given: Any) -> None:
+def check_arguments(**arguments: Any) -> None:
     """Raise ArgumentError for the first argument that is outside its range or not an allowed word.
 
-    given: value of each argument, keyed by its name in `RANGES` or `CHOICES`; None if it was not given.
+    arguments: value of each argument, keyed by its name in `RANGES` or `CHOICES`; None if it was not given.
 
     >>> check_arguments(seed=3, log_hz=60, max_hours=None)
     >>> check_arguments(directions=3)
     Traceback (most recent call last):
     world.errors.ArgumentError: directions 3: expected a whole number from 4 to 72
     """
-    for name, value in given.items():
+    for name, value in arguments.items():
         if value is None:
             continue
         if name in CHOICES:

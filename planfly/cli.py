@@ -58,9 +58,9 @@ _REPORTED_ERRORS = (PlanflyError, OSError, MemoryError, KeyboardInterrupt)
 
 
 def _run_and_report(argv: Sequence[str] | None) -> int:
-    """Run one command, report bad input, errors of the machine and interruptions in one line.
+    """Run one command.
 
-    Returns the exit code.
+    Report bad input, errors of the machine and interruptions in one line.  Return the exit code.
     """
     try:
         with safe_streams():

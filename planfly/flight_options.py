@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Annotated, Literal, TypedDict, cast, get_type_hints
 
 from aircraft.catalog import find_aircraft, model_hash
-from flight.autopilots.catalog import program_class_for
+from flight.autopilots.catalog import find_program_class
 from flight.autopilots.parameter_origin import ARDUPILOT, PX4, TITLES, other_autopilot_error, read_origin
 from flight.mission.fences import fence_zones, number_items
 from flight.mission.items import Mission, MissionItem
@@ -458,7 +458,7 @@ def flight_entries(options: FlightOptions, program: Path | None = None) -> dict[
         allowed = "cannot be combined with `sitl`: a real autopilot flies by its own control laws"
         raise ArgumentError.of_argument("autopilot", autopilot, allowed)
     autopilot_name, _, version = (autopilot or "").partition("-")
-    program_name = None if program is None else program_class_for(program).name
+    program_name = None if program is None else find_program_class(program).name
     return {
         # A `Path` is a folder; its absolute path marks it as a folder instead of a name.
         "aircraft": str(aircraft.resolve()) if isinstance(aircraft, Path) else aircraft,

@@ -13,23 +13,23 @@ _BAD_USAGE_CODE = 2
 class HiddenPackage(NamedTuple):
     """Package of planfly that another module hides.
 
-    found: file of the other module.  own: file of the package.
+    hiding_file: file of the other module.  package_file: file of the package.
     """
 
-    found: str
-    own: str
+    hiding_file: str
+    package_file: str
 
 
 def find_hidden_package(home: Path) -> HiddenPackage | None:
-    """Find a module that Python would import in place of a package of planfly, or return None.
+    """Find a module that Python would import in place of a package of planfly, without importing it.
 
-    Nothing is imported.
+    Return None if there is none.
 
     home: the folder of planfly and its packages.
 
     >>> find_hidden_package(Path(__file__).parents[1]) is None
     True
-    >>> find_hidden_package(Path("/elsewhere")).own
+    >>> find_hidden_package(Path("/elsewhere")).package_file
     '/elsewhere/aircraft/__init__.py'
     """
     for name in PACKAGES:
@@ -69,13 +69,13 @@ def check_hidden_packages() -> None:
     if hidden is None:
         return
     message = (
-        f"{hidden.found}: hides {hidden.own}, a package of planfly: rename it, or remove its folder from Python's path"
-        " (python -P leaves out the current folder)"
+        f"{hidden.hiding_file}: hides {hidden.package_file}, a package of planfly: rename it, or remove its folder from"
+        " Python's path (python -P leaves out the current folder)"
     )
     if _is_command():
         sys.stderr.write(f"planfly: {message}\n")
         raise SystemExit(_BAD_USAGE_CODE)
-    raise ImportError(message, name="planfly", path=hidden.found)
+    raise ImportError(message, name="planfly", path=hidden.hiding_file)
 
 
 def _is_command() -> bool:

@@ -14,7 +14,7 @@ from world.scenario_tables import SCALE_RATIOS
 GivenThreats = Mapping[str, ArrayLike] | Sequence[Mapping[str, Any]] | ArrayLike
 # Keys of the columns of an array of threats.
 _ARRAY_COLUMNS = ("east_m", "north_m", "kill_radius_m", "detection_radius_m")
-_NAN_ALLOWED = "expected a number: 0 for no such zone, None for a value that is not stated"
+_NAN_ALLOWED = "expected a number: 0 for a threat without this radius, None for a missing value"
 _EXPECTED = (
     "expected a data frame or a mapping of columns named as the keys of [[threats]], a list of mappings with these"
     " keys, or an array (n, 4) of east, north, kill radius and detection radius, m"

@@ -65,10 +65,9 @@ class Objectives(NamedTuple):
     """Objectives of a path in the order of `Objective`: length ratio, and three sums over its points.
 
     length_ratio: length / straight line.
-    kill_exposure, detection_exposure: sums over the points inside the spheres of (scale / distance)^4, without unit and
-    without time; the exposure of a verdict is the integral of the same ratio over the time inside, s.
-    height_sum: sum of the heights above ground, divided by the six points per leg (eq. 11): the sum over the legs of
-    their mean height, m.
+    kill_exposure, detection_exposure: sums of (scale / distance)^4 over the points inside the threats' spheres, without
+    unit.  (The exposure of a verdict is the integral of the same ratio over the time inside, s.)
+    height_sum: sum over the legs of their mean height above ground, m (eq. 11).
     """
 
     length_ratio: float
@@ -177,9 +176,9 @@ class Plan:
     procedures: DepartureAndApproach | None = None
 
     def __post_init__(self) -> None:
-        """Lock the arrays, and name the four scores.
+        """Make the arrays read-only, and convert the scores, which may be any four numbers, to named tuples.
 
-        The scores may be given as any four numbers. Raises ArgumentError if the certificate belongs to other waypoints.
+        Raises ArgumentError if the certificate belongs to other waypoints.
         """
         for name in ("waypoints", "history"):
             array = np.array(getattr(self, name), dtype=np.float64)
@@ -249,15 +248,18 @@ class Plan:
         """Problems of the certificate, or without such problems the violations at the paper's points."""
         if self.certificate.problems or not any(self.violations):
             return self.certificate.problems
-        return ("it violates constraints at its sampled points",)
+        return ("the path violates constraints at its sampled points",)
 
     def __hash__(self) -> int:
+        """Return the hash of the plan's file, so that equal plans have equal hashes."""
         return hash(plan_json(self))
 
     def __eq__(self, other: object) -> bool:
+        """Return True if the other object is a plan with the same file."""
         return plan_json(self) == plan_json(other) if isinstance(other, Plan) else NotImplemented
 
     def __repr__(self) -> str:
+        """Describe the plan in a line: scenario, number of waypoints, state and length."""
         ratio = self.objectives.length_ratio
         return f"<Plan {self.scenario.name}: {len(self.waypoints)} waypoints, {self.state}, {ratio:.4f} times straight>"
 
@@ -437,8 +439,6 @@ def read_plan(path: Path, *, terrain: str | None = None) -> Plan:
 
     terrain: file that replaces the scenario's terrain.
 
-    Raises MissionError or the scenario's errors.
-
     >>> read_plan(Path("missing.json"))
     Traceback (most recent call last):
     world.errors.MissionError: missing.json: cannot be read: No such file or directory
@@ -474,16 +474,19 @@ def plan_html(plan: Plan) -> str:
     rows = [
         ("waypoints", len(plan.waypoints)),
         ("length / straight line", f"{plan.objectives.length_ratio:.4f}"),
-        ("clearance to spare, at least", f"{certificate.clearance:.1f} m"),
+        ("smallest margin of the clearance", f"{certificate.clearance:.1f} m"),
         (
-            "outside missiles' reach by at least",
+            "smallest distance from a kill zone",
             f"{certificate.kill_distance:.0f} m" if math.isfinite(certificate.kill_distance) else "none",
         ),
         (
-            "lengths of legs to spare",
+            "smallest margin of a leg's length",
             f"{certificate.available_length:.0f} m" if math.isfinite(certificate.available_length) else "none",
         ),
-        ("turns and slopes to spare", f"{math.degrees(certificate.turn):.1f}°, {math.degrees(certificate.slope):.2f}°"),
+        (
+            "margins of turns and slopes",
+            f"{math.degrees(certificate.turn):.1f}°, {math.degrees(certificate.slope):.2f}°",
+        ),
         ("algorithm, seed", f"{plan.algorithm}, {plan.seed}"),
         *(("fails", problem) for problem in certificate.problems),
     ]

@@ -74,10 +74,7 @@ class DepartureAndApproach:
 
 
 def _lock_arrays(procedure: ClimbOut | Descent, *names: str) -> None:
-    """Replace the named arrays of a departure or approach by read-only copies.
-
-    Paths get the shape (n, 3).
-    """
+    """Replace the named arrays of a departure or approach by read-only copies; waypoints get the shape (n, 3)."""
     for name in names:
         array = np.array(getattr(procedure, name), dtype=np.float64)
         array = array.reshape(-1, 3) if name in ("waypoints", "final_waypoints") else array

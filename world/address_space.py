@@ -20,7 +20,7 @@ class AddressSpaceError(MemoryError):
 
 
 def has_address_space(size: int) -> bool:
-    """Return True if ``size`` bytes of memory can be mapped; the test mapping is released at once.
+    """Return True if ``size`` bytes of address space are free; a test mapping is made and released.
 
     >>> has_address_space(2**20)
     True
@@ -33,20 +33,19 @@ def has_address_space(size: int) -> bool:
 
 
 class AddressSpaceGuard:
-    """Import hook that refuses imports if there is too little address space.
+    """Import hook at the head of ``sys.meta_path``; it refuses imports if there is too little address space.
 
     limit: address space of this process, bytes.
-
-    It belongs at the head of ``sys.meta_path``.
     """
 
     def __init__(self, limit: int) -> None:
         self._limit = limit
 
     def find_spec(self, name: str, path: object = None, target: object = None) -> None:
-        """Find no module; raise AddressSpaceError if too little address space is left."""
-        room = LLVM_MIN_FREE_BYTES if name.startswith("llvmlite") else MIN_FREE_BYTES
-        if not has_address_space(room):
+        """Leave the search for a module to other hooks; raise AddressSpaceError if too little address space is free."""
+        required_bytes = LLVM_MIN_FREE_BYTES if name.startswith("llvmlite") else MIN_FREE_BYTES
+        if not has_address_space(required_bytes):
             limit = f"{self._limit // 1024:,} kB of address space (ulimit -v)"
             library = name.partition(".")[0]
-            raise AddressSpaceError(f"the limit of {limit} leaves less than {room // 2**20} MB to import {library}")
+            required_text = f"{required_bytes // 2**20} MB"
+            raise AddressSpaceError(f"the limit of {limit} leaves less than {required_text} to import {library}")

@@ -231,10 +231,12 @@ def make_return_requirements(
 ) -> ReturnRequirements | None:
     """Convert a scenario's [returns] table to RTL requirements; None without a table.
 
-    allows_underground: True accepts a rally point in the ground, which may differ from the one of the scenario's file.
+    source: name of the file in messages.
+    ground: terrain; None if unknown.
+    allows_underground: True to accept rally points below the ground, for terrain other than the scenario's.
 
-    Raises ScenarioError for another rally point that is not above the ground, and for a height above ground at a
-    position with unknown ground.
+    Raises ScenarioError for a rally point that is not above the ground, and for a height above ground at a position
+    with unknown ground.
     """
     if table is None:
         return None
@@ -255,7 +257,13 @@ def _position_on_ground(
     bounds: Floats,
     origin: GeoOrigin,
 ) -> Floats:
-    """Return a position with its ground height added, (3,) m. Raises ScenarioError as `make_home` does."""
+    """Return a position with the altitude of the ground there, (3,) m.
+
+    key: name of the scenario's table in messages.
+    bounds: area of the scenario, (2, 2) m.
+
+    Raises ScenarioError if the position is outside the area, or if the ground there is unknown.
+    """
     check_in_area(key, np.array(position), source, bounds, origin)
     ground_height = float(ground.height(*position)) if ground is not None else math.nan
     if math.isnan(ground_height):

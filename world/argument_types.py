@@ -41,11 +41,11 @@ def checks_types(function: Callable[_Parameters, _Result]) -> Callable[_Paramete
 def check_types(
     signature: inspect.Signature, args: tuple[Any, ...], keywords: dict[str, Any]
 ) -> tuple[tuple[Any, ...], dict[str, Any]]:
-    """Return the arguments of a call with plain Python numbers, and check their types.
+    """Check the types of a call's arguments, and return the arguments with plain Python numbers.
 
     Numbers of numpy, and whole numbers such as 2.0 where integers are expected, are converted. Raises ArgumentError for
-    the first argument of a wrong type, if a text, path, list or function is allowed there. Other arguments are numbers,
-    words or data, which the called function itself checks.
+    the first argument of a wrong type. Only arguments that may be a text, path, list, function or data class are
+    checked; the called function itself checks its numbers.
 
     signature: signature of the called function.
     args, keywords: arguments of the call.
@@ -69,7 +69,7 @@ def check_types(
 
 
 def _python_number(value: Any, annotation: Any) -> Any:
-    """Return a number as the integer or float that an annotation requires; other values unchanged.
+    """Convert a number to the integer or float that an annotation requires; other values are unchanged.
 
     A number that is not whole is unchanged if only integers are allowed.
     """
@@ -79,12 +79,15 @@ def _python_number(value: Any, annotation: Any) -> Any:
     if float in members:
         return float(value)
     number = float(value)
-    takes_integers = int in members or all(isinstance(one, int) for one in members)
+    takes_integers = int in members or all(isinstance(member, int) for member in members)
     return int(number) if takes_integers and number.is_integer() else value
 
 
 def _expected_type(value: Any, annotation: Any) -> str | None:
-    """Return the types that an annotation allows, as text, if a value has none of them; otherwise None."""
+    """Return None if a value fits an annotation, otherwise a text that names the allowed types.
+
+    Also returns None for an annotation that is not checked here, such as float.
+    """
     classes, item_classes = _allowed_classes(annotation)
     if classes:
         is_allowed = isinstance(value, classes) or _is_sequence_of(value, item_classes)
@@ -104,15 +107,15 @@ def _expected_type(value: Any, annotation: Any) -> str | None:
 
 
 def _hint(value: Any, classes: tuple[type, ...]) -> str:
-    """Return a clause on how to proceed with a scenario where only a plan is allowed; "" for anything else."""
-    is_scenario_for_plan = type(value).__name__ == "Scenario" and "Plan" in {one.__name__ for one in classes}
+    """Return the remedy for a scenario where only a plan is allowed, as the end of a message; "" otherwise."""
+    is_scenario_for_plan = type(value).__name__ == "Scenario" and "Plan" in {allowed.__name__ for allowed in classes}
     return (
         "; planfly.plan makes a plan of a scenario, and planfly.plan_then_fly flies it" if is_scenario_for_plan else ""
     )
 
 
 def _is_sequence_of(value: Any, classes: tuple[type, ...]) -> bool:
-    """Return True if a value is a sequence of instances of some classes; text and bytes do not count."""
+    """Return True if a value is a sequence of instances of some classes, and is neither text nor bytes."""
     is_sequence = isinstance(value, Sequence) and not isinstance(value, str | bytes)
     return bool(classes) and is_sequence and all(isinstance(item, classes) for item in value)
 
@@ -125,14 +128,14 @@ def _allowed_classes(annotation: Any) -> tuple[tuple[type, ...], tuple[type, ...
 
     >>> _allowed_classes(str | None), _allowed_classes(float | None)
     (((<class 'str'>, <class 'NoneType'>), ()), ((), ()))
-    >>> [one.__name__ for one in _allowed_classes(Path | str)[0]]
+    >>> [allowed.__name__ for allowed in _allowed_classes(Path | str)[0]]
     ['str', 'Path', 'PathLike']
     """
     members = get_args(annotation) or (annotation,)
     sequences = [member for member in members if get_origin(member) is Sequence]
     classes = tuple(member for member in members if isinstance(member, type) and member not in sequences)
     # The cache does not distinguish `str | Path` from `Path | str`.
-    classes = tuple(sorted(classes, key=lambda one: (one is NoneType, one is Path, one is str, one.__name__)))
+    classes = tuple(sorted(classes, key=lambda cls: (cls is NoneType, cls is Path, cls is str, cls.__name__)))
     if get_origin(annotation) is Sequence or len(classes) + len(sequences) != len(members) or str not in classes:
         return (), ()
     item_classes = _allowed_classes(get_args(sequences[0])[0])[0] if sequences else ()
@@ -140,8 +143,8 @@ def _allowed_classes(annotation: Any) -> tuple[tuple[type, ...], tuple[type, ...
 
 
 def _classes_text(classes: Sequence[type], item_classes: Sequence[type]) -> str:
-    """Return the names of classes as a part of a message, such as "a Plan, text or a path"."""
+    """List the names of classes for a message, such as "a Plan, text or a path"."""
     words: dict[type, str] = {str: "text", Path: "a path"}
-    names = [words.get(one, f"a {one.__name__}") for one in classes if one not in (NoneType, os.PathLike)]
+    names = [words.get(cls, f"a {cls.__name__}") for cls in classes if cls not in (NoneType, os.PathLike)]
     names += ["a list of these"] if item_classes else []
     return " or ".join([*([", ".join(names[:-1])] if names[1:] else []), names[-1]])

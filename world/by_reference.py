@@ -47,7 +47,11 @@ class Reference(types.Type):
 
 
 class _Layout(NamedTuple):
-    """Type of an instance, and its fields in memory; made once per instance."""
+    """Memory layout of an instance, which is made once.
+
+    reference: numba's type of the pointer to it.
+    memory: ctypes data with its fields.
+    """
 
     reference: Reference
     memory: Any
@@ -56,8 +60,9 @@ class _Layout(NamedTuple):
 def by_reference(cls: _Class) -> _Class:
     """Decorate a `typing.NamedTuple` class so that kernels take its instances as one pointer.
 
-    The fields must be numbers, arrays, records or named tuples of these. Kernels read the fields through the pointer.
-    Records are copied when an instance is first passed to a kernel. Returns a subclass.
+    A kernel is a function that numba compiles. It reads the fields through the pointer. The fields must be numbers,
+    arrays, records or named tuples of these. Records are copied when an instance is first passed to a kernel. Returns a
+    subclass.
 
     >>> import numba
     >>> from world.airspace.zone_kernels import zone_records
@@ -102,15 +107,17 @@ def _replace_references(numba_type: Any) -> Any:
 
 
 def _is_named_tuple(numba_type: Any) -> bool:
+    """Return True for numba's type of a named tuple."""
     return isinstance(numba_type, types.BaseNamedTuple)
 
 
 def _is_tuple(numba_type: Any) -> bool:
+    """Return True for numba's type of a tuple, named or not."""
     return isinstance(numba_type, types.BaseTuple)
 
 
 def _lay_out_in_memory(numba_type: Any, value: Any) -> Any:
-    """Lay out a value of a numba type in memory; return ctypes data that has an address."""
+    """Lay out a value in memory as kernels expect it for its numba type; return it as ctypes data."""
     if isinstance(numba_type, types.Array):
         # Numba's array structure: two owner pointers, both null, then these fields.
         array_fields = [0, 0, value.size, value.itemsize, value.ctypes.data, *value.shape, *value.strides]
@@ -129,7 +136,7 @@ def _lay_out_in_memory(numba_type: Any, value: Any) -> Any:
 
 
 def _find_field(reference: Reference, name: str) -> tuple[int, Any]:
-    """Return the index and the numba type of a field.
+    """Return the index and the numba type of a field of the named tuple that a reference points to.
 
     The type is a `Reference` if the field's class is marked `by_reference`.
     """
@@ -170,7 +177,11 @@ def _read_field(context: Any, builder: Any, reference: Reference, pointer: Any, 
 
 @unbox(Reference)
 def _unbox_reference(kind: Reference, value: Any, c: Any) -> Any:
-    """Generate the code that converts a Python instance to the pointer that a kernel takes."""
+    """Generate the code that converts a Python instance to the pointer that a kernel takes.
+
+    kind: numba's type of the pointer.
+    value, c: the instance and numba's context in the generated code.
+    """
     pointer_type = c.context.get_value_type(kind)
     pointer = cgutils.alloca_once_value(c.builder, ir.Constant(pointer_type, None))
     address = c.pyapi.object_getattr_string(value, "_address")

@@ -58,6 +58,6 @@ COMPILE_TIMER = CompileTimer()
 
 
 def announce_compilation() -> None:
-    """Call the innermost callback, because a kernel that is not in the cache will be compiled."""
+    """Call the innermost callback of `notify_before_compiling`: a kernel will be compiled."""
     if _callbacks:
         _callbacks[-1]()

@@ -48,7 +48,10 @@ def tile_files(path: Path) -> list[Path] | None:
 
 
 def _virtual_files(path: Path) -> list[Path]:
-    """Return the files of a virtual raster, which must be in its folder or in folders below it."""
+    """Return the files that a virtual raster (.vrt) joins, sorted by name.
+
+    Raises TerrainError for an invalid .vrt, for one that computes heights, and for files outside its folder.
+    """
     try:
         if path.stat().st_size > _MAX_BYTES:
             raise TerrainError(f"{path}: a virtual raster has at most {_MAX_BYTES:,} bytes", file=path)
@@ -103,7 +106,7 @@ def join_tiles(tiles: Sequence[RasterFile], name: str) -> RasterFile:
     offsets = [(row - top, col - left) for row, col in positions]
 
     def read(r0: int, r1: int, c0: int, c1: int) -> NDArray[np.float32]:
-        """Return the heights of a window of rows and columns; each pixel is from the first tile with data."""
+        """Return the heights of rows r0 to r1 - 1 and columns c0 to c1 - 1, each from the first tile with data."""
         block = np.full((r1 - r0, c1 - c0), np.nan, dtype=np.float32)
         for (row, col), tile in zip(offsets, tiles, strict=True):
             first_row, last_row = max(r0, row), min(r1, row + tile.shape[0])
@@ -135,7 +138,7 @@ def join_tiles(tiles: Sequence[RasterFile], name: str) -> RasterFile:
 def _shift_pixels(
     pixels: tuple[NDArray[np.float64], NDArray[np.float64]], cols: int, rows: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return pixel coordinates shifted by columns and rows."""
+    """Return pixel coordinates (columns, rows) shifted by numbers of columns and rows."""
     return pixels[0] + cols, pixels[1] + rows
 
 

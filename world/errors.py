@@ -87,14 +87,11 @@ class PlanflyError(Exception):
     def from_error(cls, error: "PlanflyError", file: str | Path = "", field: str = "", value: Any = None) -> Self:
         """Convert an error to this class, with the location of the value that caused it.
 
-        The message is "file: field: " and the message of the error; an empty file or field is left out. `allowed` is
-        copied from the error. The source of the other attributes depends on the fields that are named:
+        file, field, value: location of the value that caused the error.
 
-        - The error has no field, and the argument `field` is not empty: file, field and value are the arguments.
-        - All other cases: field and value are copied from the error. So is the file, unless the error has none; then it
-          is the argument `file`.
-
-        file, field, value: location of the value that led to the error.
+        The message is "file: field: " and the message of the error; an empty file or field is left out. The attributes
+        of the result are those of the error, if the error has a field. Otherwise file, field and value are the
+        arguments. `allowed` is always copied from the error.
 
         >>> inner = FlightError("mine.toml: mass_kg = -1", file="mine.toml", field="mass_kg", value=-1)
         >>> found = ScenarioError.from_error(inner, "tight", "flight.aircraft", "./mine")
@@ -153,7 +150,7 @@ class StartError(FlightError):
         self.reason = reason
 
     def __reduce__(self) -> tuple[type["StartError"], tuple[str, str], dict[str, Any]]:
-        """Pickle with the arguments of the constructor, for other processes."""
+        """Pickle the error by the arguments of its constructor, so that it can be sent to another process."""
         return type(self), (self.file, self.reason), vars(self)
 
 

@@ -87,7 +87,8 @@ EXTRAS = {
 def require_extra(name: str, needs: str = "") -> None:
     """Raise MissingExtraError, in one line, if a module of an optional extra is not installed.
 
-    needs: beginning of the line, which names the feature; the extra's own `needs` by default.
+    name: name of the extra.
+    needs: beginning of the line, which names the feature, such as ".parquet needs"; "" for the text of the extra.
 
     >>> require_extra("campaigns")
     >>> print(missing_extra(EXTRAS["tables"], "pandas", ".parquet needs"))
@@ -117,7 +118,7 @@ def missing_extra(extra: Extra, module: str, needs: str = "") -> MissingExtraErr
 
 
 def requires_extra(name: str, needs: str = "") -> Callable[[Callable[Arguments, Result]], Callable[Arguments, Result]]:
-    """Return a decorator that makes a function call `require_extra` first."""
+    """Return a decorator that makes a function call `require_extra` first; arguments as for `require_extra`."""
 
     def decorate(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
         """Return the function with the check before each call."""

@@ -49,7 +49,7 @@ def read_small_file(path: Path, max_bytes: int, kind: str, error: type[PlanflyEr
     """Return the bytes of a file of at most ``max_bytes`` bytes.
 
     kind: kind of the file in messages, such as "mission".
-    Raises ``error``, in one line, for a file that is missing, too large or not readable.
+    error: class of the error that is raised, in one line, for a file that is missing, too large or not readable.
 
     >>> from world.errors import MissionError
     >>> read_small_file(Path("missing.plan"), 100, "mission", MissionError)
@@ -76,7 +76,7 @@ _FOLDER_COMMANDS = {
 
 
 def missing_text(path: Path) -> str:
-    """Return why a path is not a file: nothing is there, or it is a folder; name the folder's contents.
+    """Describe why a path is not a file: it does not exist, or it is a folder with certain contents.
 
     >>> missing_text(Path("missing.plan")), missing_text(Path("/proc/self/task"))
     ('no such file', 'is a folder')
@@ -168,7 +168,7 @@ def toml_table(text: str) -> dict[str, Any]:
 
 
 def toml_text(table: Mapping[str, Any]) -> str:
-    """Return a table as TOML text, which `toml_table` reads.
+    """Format a table as TOML text, which `toml_table` reads.
 
     The values are texts, numbers, True, False, lists and tables.
 
@@ -186,9 +186,9 @@ def toml_text(table: Mapping[str, Any]) -> str:
 
 
 def _toml_lines(table: Mapping[str, Any], path: tuple[str, ...]) -> Iterator[str]:
-    """Yield the lines of a table: first its values, then the tables that it contains.
+    """Yield the lines of a table in TOML: first its values, then the tables that it contains.
 
-    path: keys of the table, () for the whole text.
+    path: keys that lead to the table; () for the whole text.
     """
     subtables = {key: value for key, value in table.items() if isinstance(value, Mapping) or _is_list_of_tables(value)}
     for key, value in table.items():
@@ -214,17 +214,17 @@ def _toml_key(key: str) -> str:
 
 
 def _toml_value(value: Any) -> str:
-    """Return a text, a number, True, False or a list of these in TOML syntax."""
+    """Format a text, a number, True, False or a list of these in TOML syntax."""
     if isinstance(value, list):
         return f"[{', '.join(map(_toml_value, value))}]"
-    # JSON's texts, numbers, true and false are TOML's, but for the control character that JSON leaves as it is.
+    # JSON and TOML write these values alike, except for one control character that JSON does not escape.
     return json.dumps(value, ensure_ascii=False, allow_nan=False).replace("\x7f", "\\u007f")
 
 
 def utf8_text(data: bytes, path: Path, error: type[PlanflyError]) -> str:
     r"""Decode a file's bytes to text without a byte order mark.
 
-    Raises ``error``, with line and byte, if the bytes are not UTF-8.
+    error: class of the error that is raised, with line and byte, if the bytes are not UTF-8.
 
     >>> from world.errors import MissionError
     >>> utf8_text("\ufeffWind 3 m/s".encode(), Path("a.txt"), MissionError)
@@ -250,11 +250,11 @@ def did_you_mean(name: str, known_names: Iterable[str], folder: Path | None = No
     >>> did_you_mean("speed", ["seed", "speed_mps"])
     ": did you mean 'speed_mps'?"
     """
-    # Imported here, as most runs report no fault.
+    # Imported here, because most runs report no unknown name.
     from difflib import get_close_matches
 
     names_by_folded_name = {candidate.casefold(): candidate for candidate in known_names}
-    # A key without its unit is meant more likely than a key of similar letters.
+    # A missing unit, as in "speed" for "speed_mps", is more likely than a typing error.
     matches = [candidate for candidate in names_by_folded_name if candidate.startswith(f"{name.casefold()}_")]
     matches = matches or get_close_matches(name.casefold(), names_by_folded_name, n=1)
     if not matches:
@@ -282,7 +282,7 @@ def write_atomically(path: Path, data: str | bytes) -> None:
     content = data.encode("utf-8") if isinstance(data, str) else data
     try:
         target = _resolve_link(path) if path.is_symlink() else path
-        # Cut by bytes, as a name may have 255 bytes and a letter may take up to four.
+        # Limit the name by bytes: a file name has at most 255 bytes, and a letter takes up to four.
         name = target.name.encode()[:200].decode("utf-8", "ignore")
         temporary_path = target.with_name(f".{name}.{os.getpid()}-{os.urandom(4).hex()}")
         with delay_signals(), remove_at_end(temporary_path):
@@ -301,6 +301,7 @@ def write_folder(path: Path, files: Mapping[str, bytes], kept_names: Iterable[st
 
     files: content of each file, by its path within the folder.
     kept_names: entries of an existing folder to keep when the folder is replaced; None to refuse an existing folder.
+
     Raises OSError, which names the folder; no partly written folder is left.
 
     >>> from tempfile import TemporaryDirectory
@@ -353,9 +354,7 @@ def temporary_folder(prefix: str) -> Iterator[Path]:
 
 
 def remove_temporary_folders(process_id: int) -> bool:
-    """Remove the temporary folders of a killed process; return True if there are none left.
-
-    They are folders that the process made by `temporary_folder`.
+    """Remove the folders that a killed process made by `temporary_folder`; return True if none was left.
 
     >>> with temporary_folder("planfly-") as folder:
     ...     remove_temporary_folders(os.getpid()), folder.exists()

@@ -85,7 +85,7 @@ def to_geo(origin: GeoOrigin, east: ArrayLike, north: ArrayLike) -> tuple[Floats
 def to_equal_area(origin: GeoOrigin, lat_deg: Floats, lon_deg: Floats) -> tuple[Floats, Floats]:
     """Convert latitudes and longitudes in degrees to a plane in which areas equal those on WGS84.
 
-    The results are x and y, m.
+    Returns x and y, m.
 
     >>> x, y = to_equal_area(GeoOrigin(0.0, 8.0), np.array([0.0, 90.0]), np.array([188.0, 8.0]))
     >>> bool(abs(4.0 * abs(x[0] * y[1]) / 5.10065621724e14 - 1.0) < 1e-9)
@@ -97,9 +97,9 @@ def to_equal_area(origin: GeoOrigin, lat_deg: Floats, lon_deg: Floats) -> tuple[
 
 
 def transform_points(transform: Callable[..., Any], x: Floats, y: Floats) -> tuple[Floats, Floats]:
-    """Transform the coordinates of points with pyproj without changing their shape.
+    """Call a transformation of pyproj with the coordinates of points, and return results of the same shape.
 
-    With NumPy before 2.4, pyproj treats an array of one point as a scalar, so its shape is lost and NumPy warns.
+    For one point, pyproj would lose the shape of the array, and NumPy before 2.4 would warn.
 
     >>> transform_points(lambda x, y: (x + 1.0, y), np.array([1.0]), np.array([2.0]))
     (array([2.]), array([2.]))
@@ -139,7 +139,8 @@ def height_unit(crs: str) -> tuple[str, float]:
     except ProjError as error:
         raise ValueError(str(error)) from error
     return next(
-        ((a.unit_name, a.unit_conversion_factor) for a in axes if a.direction in ("up", "down")), ("metre", 1.0)
+        ((axis.unit_name, axis.unit_conversion_factor) for axis in axes if axis.direction in ("up", "down")),
+        ("metre", 1.0),
     )
 
 
@@ -191,8 +192,8 @@ class PolyMap:
     def to_rows(self) -> Floats:
         """Return the polynomial as rows of numbers, (2 + 2n, n), as a log stores it; `from_rows` reads them.
 
-        Row 0 starts with the centre, and row 1 with the half-widths. Then come the n rows of the coefficients of u, and
-        those of v.
+        Row 0 starts with the centre, and row 1 with the half-widths. The next n rows are the coefficients of the first
+        component u, and the last n rows are the coefficients of the second component v.
         """
         record, size = self.record, int(self.record["size"])
         rows = np.zeros((2 + 2 * size, size))
@@ -209,8 +210,9 @@ class PolyMap:
 
 
 def _make_record(centre: Floats, half_widths: Floats, u: Floats, v: Floats) -> PolyMapRecord:
-    """Make a record of `POLYMAP`.
+    """Make a record of `POLYMAP`, a polynomial map over a rectangle.
 
+    centre, half_widths: of the rectangle, (2,).
     u, v: coefficients of the two components of the map, (n, n) each.
     """
     size = len(u)
@@ -281,7 +283,7 @@ def fit_polymap(
 def polymap(record: PolyMapRecord, x: float, y: float) -> tuple[float, float]:
     """Evaluate both components of a polynomial map at one point (x, y), by Horner's scheme.
 
-    record: see `PolyMap`.
+    record: a record of `POLYMAP`.
     """
     a = (x - record.centre_x) / record.half_x
     b = (y - record.centre_y) / record.half_y

@@ -45,29 +45,29 @@ _HORIZONTAL_TAG = re.compile(r"horiz|linear|planar|xy", re.IGNORECASE)
 
 
 def open_geotiff(file: Path, _name: str) -> RasterFile:
-    """Open a GeoTIFF in any reference system, with heights in metres. Raises TerrainError."""
+    """Open a GeoTIFF of heights in metres, in any reference system. Raises TerrainError for any other file."""
     return _open_raster_file(file, "GTiff", "not a readable GeoTIFF file")
 
 
 def open_hgt(file: Path, _name: str) -> RasterFile:
-    """Open an SRTM tile, whose file name gives its position. Raises TerrainError."""
+    """Open an SRTM tile, whose file name states its position. Raises TerrainError for any other file."""
     expected = "expected a name such as N46E008.hgt and the bytes of 1201 x 1201 or 3601 x 3601 heights"
     return _open_raster_file(file, "SRTMHGT", f"not a readable SRTM tile; {expected}")
 
 
 def open_dataset(file: Path, driver: str) -> Any:
-    """Open a file in GDAL with one driver, within the options `GUARD`."""
+    """Open a file in GDAL with one driver only; call it within an environment of the options `GUARD`."""
     import rasterio
 
     return rasterio.open(os.fspath(file.resolve()), driver=driver)
 
 
 def _open_raster_file(file: Path, driver: str, failure_text: str) -> RasterFile:
-    """Open a file with one GDAL driver, and check it.
+    """Open an elevation file with one GDAL driver, and check its layout, position and unit.
 
     failure_text: beginning of the message if GDAL cannot open the file.
 
-    Raises TerrainError.
+    Raises TerrainError for a file that cannot be opened or used.
     """
     import rasterio
     from rasterio.errors import NotGeoreferencedWarning, RasterioError
@@ -102,10 +102,7 @@ def _open_raster_file(file: Path, driver: str, failure_text: str) -> RasterFile:
 
 
 def first_error_line(error: BaseException) -> str:
-    """Return the first error in a chain of causes, in one line.
-
-    Later errors only refer to earlier ones.
-    """
+    """Return the text of the original error in a chain of causes, in one line."""
     while error.__cause__ is not None:
         error = error.__cause__
     return one_line(error)
@@ -135,7 +132,11 @@ def _raise_unplaced(file: Path) -> NoReturn:
 
 
 def _read_crs(file: Path, driver: str, source: Any) -> str | None:
-    """Read the reference system of an open file as WKT; None if the file states none."""
+    """Read the reference system of an open file as WKT, with its height axis; None if the file states none.
+
+    driver: GDAL driver of the file.
+    source: the open file.
+    """
     import rasterio
 
     if source.crs is None:
@@ -166,9 +167,14 @@ def _stated_height_unit(unit: str, tags: Iterable[tuple[str, str]]) -> str:
 def _make_raster_file(
     file: Path, shape: tuple[int, int], grid: Grid, crs: str | None, unit: str, read: Any
 ) -> RasterFile:
-    """Make a raster file from an open file's georeferencing.
+    """Make a raster file from the georeferencing of an elevation file.
 
-    Raises TerrainError, also if the heights are not in metres.
+    shape: number of rows and columns.
+    grid: coefficients of the transformation from pixels to coordinates of the reference system.
+    unit: stated unit of the heights, "" if none is stated.
+    read: function that reads a window of heights.
+
+    Raises TerrainError without a usable position on Earth, or if the heights are not in metres.
     """
     a, b, c, d, e, f = grid
     determinant = a * e - b * d
@@ -218,7 +224,8 @@ def _make_raster_file(
 def _read_strips(source: Any, window: tuple[int, int, int, int], scale: float, offset: float) -> NDArray[np.float32]:
     """Read the heights of a window in strips of rows; NaN for missing data.
 
-    window: top, bottom, left, right, in rows and columns.
+    window: first row, end row, first column, end column; the ends are not included.
+    scale, offset: factor and addend that convert the file's numbers to heights.
     """
     top, bottom, left, right = window
     heights = np.empty((bottom - top, right - left), dtype=np.float32)
@@ -233,11 +240,12 @@ def _read_strips(source: Any, window: tuple[int, int, int, int], scale: float, o
 
 
 def clear_unwritten(source: Any, heights: NDArray[np.float32], top: int, left: int) -> None:
-    """Set heights to NaN in those blocks that a GeoTIFF omits.
+    """Set heights to NaN, in place, in the blocks that a GeoTIFF omits.
 
-    top, left: first row and column of ``heights`` in the file.
+    source: the open file.
+    top, left: row and column of the file at which ``heights`` starts.
 
-    GDAL reads 0 in an omitted block if the file states no nodata value.
+    GDAL returns 0 for an omitted block if the file states no nodata value.
     """
     rows, cols = source.block_shapes[0]
     bottom, right = top + len(heights), left + heights.shape[1]
@@ -261,7 +269,7 @@ def _block_bytes(source: Any, block_row: int, block_column: int) -> tuple[int, i
 def block_spans(file: Path, window: tuple[int, int, int, int]) -> Iterator[tuple[int, int]]:
     """Yield the bytes [begin, end) that each block of a window occupies in a GeoTIFF.
 
-    window: top, bottom, left, right.
+    window: first row, end row, first column, end column; the ends are not included.
     """
     import rasterio
 
@@ -284,7 +292,9 @@ def geotiff_bytes(values: NDArray[np.float32], grid: Grid, crs: str, nodata: flo
     """Return a GeoTIFF of heights or other values as bytes, compressed with deflate.
 
     values: (rows, columns), rows from north to south.
-    crs: a definition that PROJ accepts.
+    grid: coefficients of the transformation from pixels to coordinates of the reference system.
+    crs: reference system, in a form that PROJ accepts.
+    nodata: number that stands for missing data.
     unit: unit of the values.
     """
     import rasterio

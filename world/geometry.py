@@ -20,6 +20,7 @@ def turning_angles(waypoints: ArrayLike) -> Floats:
     """Return the course change at each inner waypoint, rad in [0, pi], (..., w - 2) (paper eq. 1).
 
     waypoints: (..., w, 3) metres; altitudes are ignored.
+
     A leg with no horizontal length has no course and gives no turn.
 
     >>> turning_angles([[0, 0, 100], [1000, 0, 100], [1000, 1000, 200]]).round(4).tolist()
@@ -97,7 +98,7 @@ def path_length(waypoints: ArrayLike) -> Floats:
 
 
 def tangent_length(turn: float, radius: float) -> float:
-    """Return the distance from the waypoint at which a fly-by arc leaves its leg, R tan(turn / 2), m.
+    """Return the distance from a waypoint at which its fly-by arc leaves the first leg, R tan(turn / 2), m.
 
     turn: rad, from 0 to below pi.
     radius: m.
@@ -130,7 +131,10 @@ def wrap(angle: float) -> float:
 
 @inlined
 def turning_angle(ax: float, ay: float, bx: float, by: float, cx: float, cy: float) -> float:
-    """Return the course change at b on the path a, b, c, rad in [0, pi] (paper eq. 1, by atan2)."""
+    """Return the course change at b on the path a, b, c, rad in [0, pi] (paper eq. 1, by atan2).
+
+    ax, ay, bx, by, cx, cy: east and north of the three points, m.
+    """
     ux = bx - ax
     uy = by - ay
     vx = cx - bx
@@ -173,7 +177,11 @@ def sphere_window(a: Floats, b: Floats, centre: Floats, radius: float) -> tuple[
 
 @inlined
 def segment_exposure(a: Floats, b: Floats, centre: Floats, radius: float, scale: float) -> tuple[float, float]:
-    """Return the fraction of the segment a-b that is inside a sphere, and the segment's exposure.
+    """Return the fraction of the segment a-b that is inside a threat's sphere, and the segment's exposure.
+
+    a, b, centre: (3,) m.
+    radius: radius of the sphere, m.
+    scale: distance at which the exposure density is 1, m.
 
     The exposure is the mean of (scale/d)^4 over the whole segment, where d is the distance from the centre and the
     value is 0 outside the sphere. It follows the paper's eq. 9 and 10, but as a density along the path instead of a sum
@@ -201,12 +209,13 @@ def segment_exposure(a: Floats, b: Floats, centre: Floats, radius: float, scale:
 def window_exposure(
     begin_fraction: float, end_fraction: float, length2: float, dot: float, start2: float, scale: float
 ) -> float:
-    """Return the exposure of a part of a segment, averaged over the whole segment.
+    """Return the exposure of a part of a segment, averaged over the whole segment; see `segment_exposure`.
 
+    begin_fraction, end_fraction: limits of the part, as fractions of the segment.
     length2: squared length of the segment, m^2.
     dot: dot product of the segment's vector and the vector from the centre to the segment's start.
     start2: squared distance of the start from the centre, m^2.
-    scale: see `segment_exposure`, which also states the formula.
+    scale: distance at which the exposure density is 1, m.
     """
     if length2 < 1e-12:
         return (end_fraction - begin_fraction) * scale**4 / max(start2, MIN_RANGE_M * MIN_RANGE_M) ** 2
@@ -214,7 +223,7 @@ def window_exposure(
     mid_fraction = -dot / length2
     closest = math.sqrt(max(MIN_RANGE_M * MIN_RANGE_M, start2 - mid_fraction * mid_fraction * length2))
     begin_distance, end_distance = (begin_fraction - mid_fraction) * length, (end_fraction - mid_fraction) * length
-    # Closed form of the difference, as on a short, distant segment the values at the ends agree in nearly all digits.
+    # Closed form of the difference: on a short, distant segment the values at its ends agree in nearly all digits.
     part_length = end_distance - begin_distance
     rational_part = (
         part_length

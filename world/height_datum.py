@@ -56,7 +56,7 @@ def is_above_ellipsoid(crs: str) -> bool:
 
 
 def height_datum(crs: str | None, stated_datum: StatedDatum | None) -> HeightDatum:
-    """Determine the vertical datum of a file.
+    """Determine the vertical datum of an elevation file, and its conversion to mean sea level.
 
     crs: the file's reference system, or None if unknown.
     stated_datum: datum stated by the user, a `NamedDatum` or a number, which overrides the file's; None if not stated.
@@ -82,14 +82,14 @@ def height_datum(crs: str | None, stated_datum: StatedDatum | None) -> HeightDat
 
 
 def _constant_sea_level(height: float) -> Callable[[Floats, Floats], Floats]:
-    """Make a function that returns the same height of mean sea level, m, everywhere."""
+    """Make a function of longitudes and latitudes that returns the same height of mean sea level, m, everywhere."""
     return lambda lon, _: np.full(np.shape(lon), height)
 
 
 def _make_sea_level_function(transformer: Any) -> Callable[[Floats, Floats], Floats]:
-    """Make a function that returns the geoid's height above the ellipsoid.
+    """Make a function of longitudes and latitudes (deg) that returns the geoid's height above the ellipsoid, m.
 
-    transformer: conversion of heights above the ellipsoid to heights above the geoid.
+    transformer: pyproj transformer of heights above the ellipsoid to heights above the geoid.
     """
 
     def heights(lon: Floats, lat: Floats) -> Floats:
@@ -112,7 +112,7 @@ def _find_geoid() -> tuple[str, Any]:
     for name, code in GEOIDS.items():
         target = f"EPSG:4326+{code}"
         with warnings.catch_warnings():
-            # PROJ warns of a missing grid, which is exactly the question here.
+            # PROJ warns of a missing grid, but this loop only looks for an installed one.
             warnings.simplefilter("ignore", UserWarning)
             if TransformerGroup("EPSG:4979", target, always_xy=True).best_available:
                 return name, Transformer.from_crs("EPSG:4979", target, always_xy=True, only_best=True)

@@ -38,9 +38,10 @@ def highest_in_cells(terrain: Terrain, west: float, south: float, cell_side: flo
 def _fill_cells(
     heights: Heights, to_pixel: PolyMapRecord, west: float, south: float, cell_side: float, max_heights: Floats
 ) -> None:
-    """Set `max_heights` to the highest ground of each cell.
+    """Set `max_heights` to the highest ground of each cell: on the sides of the cell, and at the pixels inside it.
 
-    It is the highest ground on the sides of a cell and at the pixels inside it.
+    heights, to_pixel: heights of the terrain, and the map from positions to its pixels.
+    west, south, cell_side: outer corner of the first cell, and side of a cell, m.
     """
     rows, columns = max_heights.shape
     start, end = np.zeros(3), np.zeros(3)
@@ -84,9 +85,13 @@ def _raise_cell(max_heights: Floats, i: int, j: int, height: float) -> None:
 
 @inner
 def _highest_pixel(heights: Heights, to_pixel: PolyMapRecord, west: float, south: float, cell_side: float) -> float:
-    """Return the height of the highest pixel in a cell whose sides are straight in pixel coordinates.
+    """Return the height of the highest pixel in a cell, m.
 
-    Returns -inf for a cell without a pixel, and NaN if a pixel has no data.
+    heights, to_pixel: heights of the terrain, and the map from positions to its pixels.
+    west, south, cell_side: corner and side of the cell, m.
+
+    The sides of the cell are taken as straight in pixel coordinates. Returns -inf for a cell without a pixel, and NaN
+    if a pixel has no data.
     """
     col, row = polymap(to_pixel, west, south)
     east_col, east_row = polymap(to_pixel, west + cell_side, south)

@@ -137,17 +137,17 @@ def _remove_path(path: Path) -> bool:
 
 @contextlib.contextmanager
 def children_ignore_sigint() -> Iterator[None]:
-    """Block SIGINT in the child processes that are started in this block.
+    """Start child processes within this block so that they ignore Ctrl-C (SIGINT).
 
     Ctrl-C also reaches child processes, but their parent has to end them. If a SIGINT arrives during the block, this
-    process receives it at the end of the block. Use `delay_signals` around this block, because a child whose start is
-    interrupted by another signal waits for its task and ends with a traceback.
+    process receives it at the end of the block. Use `delay_signals` around this block: another signal during the start
+    of a child would leave the child waiting for its task.
 
     >>> from multiprocessing import Process
     >>> with children_ignore_sigint():
     ...     child = Process(target=print)
     """
-    # Imported here, as few commands have children and --help must answer at once.
+    # Imported here, because few commands have children, and --help must answer at once.
     from multiprocessing import resource_tracker
 
     if not hasattr(signal, "pthread_sigmask"):
@@ -156,7 +156,7 @@ def children_ignore_sigint() -> Iterator[None]:
         return
     if _TRACKER_OPTION not in sys.warnoptions:
         sys.warnoptions.append(_TRACKER_OPTION)
-    # Started now, because the resource tracker unblocks the signal when it starts.
+    # Start the resource tracker before the signal is blocked, because the tracker unblocks the signal when it starts.
     resource_tracker.ensure_running()
     previous_mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
@@ -166,16 +166,14 @@ def children_ignore_sigint() -> Iterator[None]:
 
 
 def end_with_parent(detects_parent_end: threading.Event | None = None) -> None:
-    """Make this child process end at once on SIGTERM, and when its parent ends.
+    """Make this child process end at once, and remove its temporary files, on SIGTERM and when its parent ends.
 
-    Its temporary files are then removed.
-
-    detects_parent_end: event that becomes set once the process detects by itself that its parent has ended.
+    detects_parent_end: event that the process sets when it handles the end of its parent itself; it is then not ended.
 
     >>> import multiprocessing
     >>> child = multiprocessing.get_context("spawn").Process(target=end_with_parent)
     """
-    # Imported here, as few processes are children and --help must answer at once.
+    # Imported here, because few processes are children, and --help must answer at once.
     import multiprocessing
 
     signal.signal(signal.SIGTERM, _end_process)

@@ -26,7 +26,9 @@ _IMPORT = re.compile(rb"((?:" + "|".join(PACKAGES).encode() + rb")[\w.]*) import
 
 
 def kernel_sources(root: Path) -> dict[str, bytes]:
-    """Return the contents of all source files that define kernels, by path below the packages' folder.
+    """Return the contents of all source files that define kernels or are imported by them, by path below ``root``.
+
+    root: folder of the packages.
 
     >>> files = kernel_sources(Path(__file__).parents[1])
     >>> "world/terrain.py" in files, "logs/views/report/page.py" in files
@@ -45,10 +47,7 @@ def kernel_sources(root: Path) -> dict[str, bytes]:
 
 
 def _imported_paths(content: bytes) -> list[str]:
-    """Return the paths of modules that a source may import.
-
-    An imported name may be a module, too.
-    """
+    """Return the paths of the planfly modules that a source may import; an imported name may be a module, too."""
     paths = []
     # Splitting takes a tenth of the time of a search for lines that begin with "from".
     for match in filter(None, map(_IMPORT.match, (b"\n" + content).split(b"\nfrom ")[1:])):
@@ -59,7 +58,7 @@ def _imported_paths(content: bytes) -> list[str]:
 
 
 def sources_digest(root: Path) -> str:
-    """Return a digest of the source files of kernels, 16 hexadecimal digits.
+    """Return a digest of the sources of all kernels below ``root``, 16 hexadecimal digits.
 
     >>> len(sources_digest(Path(__file__).parents[1]))
     16

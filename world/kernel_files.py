@@ -19,9 +19,10 @@ _DIGEST_BYTES = 32
 
 
 class CheckedCacheFiles(IndexDataCacheFile):
-    """Index and data files of one kernel; a file that is missing, damaged or unreadable counts as empty.
+    """Cache files of one kernel: an index, and a data file with machine code for each combination of argument types.
 
-    The digest of a data file covers the types of its compiled form, which the index maps to the file's name.
+    Each file begins with a digest. A file that is missing, damaged or unreadable is treated as empty. The digest of a
+    data file covers the argument types, too.
     """
 
     def __init__(self, folder: str, base: str, stamp: Any) -> None:
@@ -29,12 +30,12 @@ class CheckedCacheFiles(IndexDataCacheFile):
         self._folder = Path(folder)
 
     def load(self, key: Any) -> Any:
-        """Return the compiled form for a key, or None if it is not saved or its file is damaged."""
+        """Return the machine code for a key (the argument types), or None if it is not saved or is damaged."""
         name = self._load_index().get(key)
         return None if name is None else _read_checked(self._folder / name, repr(key))
 
     def save(self, key: Any, data: Any) -> None:
-        """Save a compiled form; if this fails, the next process compiles the kernel again."""
+        """Save the machine code for a key; if this fails, the next process compiles the kernel again."""
         with contextlib.suppress(OSError):
             forms = self._load_index()
             if key not in forms:
@@ -44,7 +45,7 @@ class CheckedCacheFiles(IndexDataCacheFile):
             self._write(self._folder / forms[key], repr(key), data)
 
     def _load_index(self) -> dict[Any, str]:
-        """Return the names of data files by key."""
+        """Return the names of the data files by key; empty if the index is from another version of the source."""
         version, stamp, forms = _read_checked(self._folder / self._index_name, "") or (None, None, {})
         return forms if (version, stamp) == (self._version, self._source_stamp) else {}
 
@@ -53,7 +54,7 @@ class CheckedCacheFiles(IndexDataCacheFile):
         self._write(self._folder / self._index_name, "", (self._version, self._source_stamp, overloads))
 
     def _write(self, path: Path, label: str, data: Any) -> None:
-        """Write an object to a file, behind a digest of the object and a label."""
+        """Write a digest and an object to a file; the digest covers the object and a label."""
         content = dumps(data)  # type: ignore[no-untyped-call]
         with self._open_for_write(path) as file:
             file.write(_compute_digest(label, content) + content)

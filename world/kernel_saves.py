@@ -40,7 +40,10 @@ class CacheWriteLock:
         listen("numba:compiler_lock", _BeginEndListener(lambda: self._track_depth(1), lambda: self._track_depth(-1)))
 
     def _track_depth(self, step: int) -> None:
-        """Count how often this thread holds the compiler lock, and release the file lock with the last release."""
+        """Count the nested uses of numba's compiler lock by this thread; release the file lock after the outermost.
+
+        step: 1 when the compiler lock is taken, -1 when it is released.
+        """
         state = self._thread_state
         state.depth = getattr(state, "depth", 0) + step
         if step < 0 and state.depth < getattr(state, "lock_depth", 0):
@@ -48,9 +51,9 @@ class CacheWriteLock:
             os.close(state.handle)
 
     def _acquire(self) -> None:
-        """Acquire the file lock.
+        """Acquire the file lock, unless this thread has it already.
 
-        Continue without it if the folder does not support locks, or after `LOCK_TIMEOUT_S`.
+        Continue without the lock if the folder does not support locks, or after `LOCK_TIMEOUT_S`.
         """
         state = self._thread_state
         if getattr(state, "lock_depth", 0):
@@ -70,7 +73,9 @@ class _BeginEndListener(event.Listener):
         self._begin, self._end = begin, end
 
     def on_start(self, event: Any) -> None:
+        """Call the first function."""
         self._begin()
 
     def on_end(self, event: Any) -> None:
+        """Call the second function."""
         self._end()

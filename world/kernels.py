@@ -114,7 +114,10 @@ def inlined(kernel: _Kernel) -> _Kernel:
 
 
 def _make_dispatcher(kernel: Any, **options: bool) -> Any:
-    """Return numba's dispatcher of a function."""
+    """Return numba's dispatcher of a function, which compiles it at its first call and caches the machine code.
+
+    options: further options of `numba.njit`.
+    """
     njit: Any = numba.njit
     # The wrapper for C is only needed to pass a kernel to another one as a value, which no kernel here does.
     dispatcher = njit(cache=_usable_folder is not None, error_model="numpy", no_cfunc_wrapper=True, **options)(kernel)
@@ -145,7 +148,7 @@ class _InnerKernel:
         return _make_dispatcher(lambda *arguments: kernel(*arguments))
 
     def __reduce__(self) -> str:
-        """Return the function's name, which distinguishes the wrapper functions in the cache."""
+        """Pickle the kernel by its name, so that the cache distinguishes the wrappers of different kernels."""
         return str(vars(self)["__qualname__"])
 
     def __call__(self, *arguments: Any) -> Any:
@@ -159,7 +162,7 @@ class _InnerType(numba.types.Dispatcher):  # type: ignore[misc]  # numba states 
     def get_call_type(self, context: Any, args: Any, kws: Any) -> Any:
         """Return numba's call type with literal numbers replaced by their types.
 
-        Otherwise numba would compile the function again for each literal number.
+        Without this, numba would compile the function again for each number in a call.
         """
         plain_types = tuple(numba.types.unliteral(argument_type) for argument_type in args)
         return super().get_call_type(context, plain_types, {name: numba.types.unliteral(kws[name]) for name in kws})

@@ -15,9 +15,9 @@ _DEPENDENT_NORM_RATIO = 1e-12
 
 
 def least_squares(basis: Floats, values: Floats) -> Floats:
-    """Return the coefficients c, (k,), that minimise the norm of basis c - values.
+    """Return the coefficients c, (k,), that minimise the norm of basis @ c - values.
 
-    basis: (n, k).
+    basis: (n, k), one column for each coefficient.
     values: (n,).
 
     The method is modified Gram-Schmidt (Golub and Van Loan, Matrix Computations, 4th edition, algorithm 5.2.6). A
@@ -31,7 +31,7 @@ def least_squares(basis: Floats, values: Floats) -> Floats:
 
 @compiled
 def _solve_gram_schmidt(basis: Floats, values: Floats) -> Floats:
-    """Return the coefficients of `least_squares` for contiguous arrays."""
+    """Solve `least_squares` by modified Gram-Schmidt orthogonalisation, for contiguous arrays."""
     row_count, column_count = basis.shape
     # Orthogonalise the columns and the values together.
     q, r = np.empty((row_count, column_count + 1)), np.zeros((column_count, column_count + 1))
@@ -64,7 +64,7 @@ def _solve_gram_schmidt(basis: Floats, values: Floats) -> Floats:
 
 @inner
 def _dot_product(columns: Floats, first: int, second: int) -> float:
-    """Return the dot product of two columns."""
+    """Return the dot product of two columns of a matrix."""
     total = 0.0
     for n in range(columns.shape[0]):
         total += columns[n, first] * columns[n, second]

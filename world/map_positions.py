@@ -13,7 +13,7 @@ from world.threats import Threats, threat_label
 
 
 def map_coordinates(table: PositionTable, origin: GeoOrigin) -> tuple[float, float]:
-    """Return the east and north coordinates in a table, m; degrees are converted."""
+    """Return the east and north that a table states in m, or in degrees, which are converted to m on the map."""
     if table.east_m is not None and table.north_m is not None:
         return table.east_m, table.north_m
     east, north = to_map(origin, float(table.lat_deg or 0.0), float(table.lon_deg or 0.0))
@@ -46,8 +46,9 @@ def map_position(table: PointTable, key: str, source: str, origin: GeoOrigin, gr
 def check_in_area(key: str, point: Floats, source: str, bounds: Floats, origin: GeoOrigin) -> None:
     """Raise ScenarioError, with the distance from the area, for a position outside an area.
 
+    key, source: names of the point and its file in messages.
     point: (2,) or (3,) m.
-    bounds: area, (2, 2) m.
+    bounds: [[west, east], [south, north]] of the area, (2, 2) m.
     """
     for axis, name in enumerate(("east", "north")):
         min_coordinate, max_coordinate = bounds[axis]
@@ -81,9 +82,10 @@ def check_altitude(key: str, point: Floats, source: str, floor: float, ceiling: 
 
 
 def check_above_ground(key: str, point: Floats, source: str, ground: Terrain | None) -> None:
-    """Raise ScenarioError for a point (3,) that is not above the terrain.
+    """Raise ScenarioError for a point that is not above the terrain; accept it where the terrain is unknown.
 
-    A point above unknown terrain is accepted.
+    key, source: names of the point and its file in messages.
+    point: (3,) m.
     """
     ground_height = float(ground.height(point[0], point[1])) if ground is not None else math.nan
     if point[2] <= ground_height:
@@ -93,6 +95,9 @@ def check_above_ground(key: str, point: Floats, source: str, ground: Terrain | N
 
 def make_threats(tables: list[ThreatTable], source: str, origin: GeoOrigin, ground: Terrain | None) -> Threats:
     """Convert the threats of a scenario file to threats on the map.
+
+    source: name of the file in messages.
+    ground: terrain; None if unknown.
 
     A threat without a height is on the ground. Raises ScenarioError for a threat without an altitude AMSL at a position
     without terrain.

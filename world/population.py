@@ -63,9 +63,9 @@ class Population:
 
 
 def density_band(density: float) -> int:
-    """Return the number of a population density's band.
+    """Return the number of the band of a population density (people per km2), between the limits of SORA 2.5.
 
-    Band 0 is below 5 people per km2, band 5 is from 50,000 people per km2.
+    Band 0 is below 5 people per km2, and band 5 starts at 50,000 people per km2.
 
     >>> density_band(4.9), density_band(5.0), density_band(60_000.0)
     (0, 1, 5)
@@ -74,7 +74,7 @@ def density_band(density: float) -> int:
 
 
 def format_density(density: float) -> str:
-    """Return a population density as text.
+    """Format a population density, people per km2.
 
     >>> format_density(30_000.0), format_density(299.94), format_density(3.0)
     ('30,000 people/km²', '299.9 people/km²', '3 people/km²')
@@ -85,10 +85,11 @@ def format_density(density: float) -> str:
 def read_population(file: Path, unit: PopulationUnit, origin: GeoOrigin, area: BaseGeometry) -> Population:
     """Read the population in an area from a GeoTIFF.
 
-    unit: unit of the raster's numbers.
-    area: polygons on the map about the origin, m.
+    unit: unit of the raster's numbers, "per-cell" or "per-km2".
+    origin: origin of the map.
+    area: polygons on the map, m.
 
-    Raises PlanflyError for a file that is no population raster, or that has no data in the area.
+    Raises PlanflyError for a file that is not a population raster, or that has no data in the area.
     """
     import rasterio
     from rasterio.errors import NotGeoreferencedWarning, RasterioError
@@ -147,7 +148,12 @@ def _check_source(file: Path, source: Any, unit: PopulationUnit) -> None:
 
 
 def _check_densities(file: Path, window: "_Window", densities: Floats, is_inside: Flags, unit: PopulationUnit) -> None:
-    """Raise PlanflyError if a cell in the area has an implausible number of people."""
+    """Raise PlanflyError if a cell in the area has an implausible population density.
+
+    densities: people per km2, (rows, columns) of the window.
+    is_inside: mask of the cells in the area, (rows, columns).
+    unit: unit of the raster's numbers, for a hint in the message.
+    """
     is_bad = is_inside & ((densities < 0.0) | (densities > _MAX_DENSITY_PER_KM2))
     if not is_bad.any():
         return
@@ -163,7 +169,7 @@ def _check_densities(file: Path, window: "_Window", densities: Floats, is_inside
 
 
 def _transformed(grid: Any, x: Any, y: Any) -> tuple[Any, Any]:
-    """Apply an affine transformation to numbers or arrays."""
+    """Apply an affine transformation of rasterio to x and y, numbers or arrays."""
     return grid.a * x + grid.b * y + grid.c, grid.d * x + grid.e * y + grid.f
 
 
@@ -190,7 +196,11 @@ class _Window:
 
     @classmethod
     def around(cls, file: Path, source: Any, origin: GeoOrigin, area: BaseGeometry) -> "_Window":
-        """Make the window of an open raster around an area on the map."""
+        """Make the window of an open raster around an area on the map.
+
+        Raises PlanflyError if the raster's reference system is unknown or tears the area apart, or if the window is too
+        large.
+        """
         wkt = source.crs.to_wkt(version="WKT2_2019")
         try:
             transformer = crs_transformer(wkt)
@@ -224,7 +234,7 @@ class _Window:
         if math.prod(shape) > _MAX_CELLS:
             message = f"{file}: the ground risk buffer has {math.prod(shape):,} cells; at most {_MAX_CELLS:,} are read"
             raise PlanflyError(message, file=file)
-        # The same grid, counted from the window's first cell.
+        # Transformation of the same grid for columns and rows that are counted from the window's first cell.
         west, north = _transformed(grid, left, top)
         transform = type(grid)(grid.a, grid.b, west, grid.d, grid.e, north)
         return cls(transform, shape, (top, left), (rows, columns), grid, outline, transformer, origin)
@@ -254,7 +264,7 @@ class _Window:
         )
 
     def to_lon_lat(self, columns: Floats, rows: Floats) -> tuple[Floats, Floats]:
-        """Convert columns and rows of the window's cell corners to longitudes and latitudes, degrees."""
+        """Convert columns and rows of the window, counted between cell corners, to longitudes and latitudes, deg."""
         lon, lat = self.transformer.transform(*_transformed(self.transform, columns, rows), direction="INVERSE")
         return np.asarray(lon), np.asarray(lat)
 
@@ -274,7 +284,7 @@ class _Window:
         return float(lat[0]), float(longitude_near(float(lon[0]), 0.0))
 
     def cover_text(self) -> str:
-        """Return the range of latitudes and longitudes that the raster covers, as text."""
+        """Describe the range of latitudes and longitudes that the raster covers, for a message."""
         rows, columns = self.source_shape
         x, y = _transformed(self.source_transform, np.array([0, columns, 0, columns]), np.array([0, 0, rows, rows]))
         lon, lat = (np.asarray(values) for values in self.transformer.transform(x, y, direction="INVERSE"))
@@ -283,9 +293,9 @@ class _Window:
         return f"the file covers latitude {lat.min():.3f}..{lat.max():.3f}, longitude {lon.min():.3f}..{lon.max():.3f}"
 
     def density_bands(self, densities: Floats) -> tuple[tuple[int, BaseGeometry], ...]:
-        """Return the number of each band that occurs, and the parts of the area in it.
+        """Return the number of each density band that occurs in the window, and its area on the map, m.
 
-        The band of the lowest densities comes first.
+        densities: people per km2, (rows, columns). The band of the lowest densities comes first.
         """
         from rasterio.features import shapes
 

@@ -62,7 +62,7 @@ class RadioLink:
 
 
 def station_position(table: LinkTable | None, origin: GeoOrigin) -> tuple[float, float] | None:
-    """Return the position of the ground station's antenna in a scenario's [link] table, m, or None."""
+    """Return east and north of the station's antenna that a [link] table states, m; None for the mission's home."""
     if table is None or (table.east_m is None and table.lat_deg is None):
         return None
     return map_coordinates(table, origin)
@@ -112,10 +112,10 @@ def knife_edge_loss(diffraction_parameter: float) -> float:
 
 
 def earth_bulge(distance: Floats, length: float) -> Floats:
-    """Return the height by which the curved Earth rises above a straight line between two places, m.
+    """Return the height by which the curved Earth rises above the straight line between two antennas, m.
 
-    distance: distances from one of the places, m.
-    length: distance between the places, m.
+    distance: distances from one antenna at which the height is computed, m.
+    length: distance between the antennas, m.
 
     >>> round(float(earth_bulge(np.array([25_000.0]), 50_000.0)[0]), 1)
     36.8
@@ -193,11 +193,11 @@ def path_loss(profile: PathProfile, station_altitude: float, aircraft_altitude: 
         return PathLoss(free_loss, 0.0, math.inf)
     if np.isnan(profile.altitudes).any():
         return PathLoss(math.nan, math.nan, math.nan)
-    wavelength, remaining = LIGHT_SPEED_MPS / frequency, profile.length - profile.distances
+    wavelength, aircraft_distances = LIGHT_SPEED_MPS / frequency, profile.length - profile.distances
     ray = station_altitude + (aircraft_altitude - station_altitude) * profile.distances / profile.length
     excess = profile.altitudes - ray
     # Radius of the first Fresnel zone (ITU-R P.526-15, equation 2).
-    fresnel_radii = np.sqrt(wavelength * profile.distances * remaining / profile.length)
+    fresnel_radii = np.sqrt(wavelength * profile.distances * aircraft_distances / profile.length)
     diffraction_loss = _bullington_loss(profile, excess, fresnel_radii, station_altitude, aircraft_altitude, wavelength)
     return PathLoss(free_loss + diffraction_loss, diffraction_loss, float((-excess / fresnel_radii).min()))
 
@@ -210,9 +210,12 @@ def _bullington_loss(
     aircraft_altitude: float,
     wavelength: float,
 ) -> float:
-    """Return the diffraction loss of a ground profile, dB (ITU-R P.526-15, section 4.5.1).
+    """Return the diffraction loss of a ground profile by the Bullington method, dB (ITU-R P.526-15, section 4.5.1).
 
-    excess: (n,) height of the ground over the straight line between the antennas, m.
+    excess: height of the ground above the straight line between the antennas, m, (n,).
+    fresnel_radii: radius of the first Fresnel zone, m, (n,).
+    station_altitude, aircraft_altitude: altitudes of the antennas, m AMSL.
+    wavelength: m.
     """
     length = profile.length
     # Slopes towards the highest obstacle in sight from either end, and between both ends (equations 47, 51 and 48).
@@ -254,7 +257,7 @@ class LinkPoints(NamedTuple):
 def link_points(link: RadioLink, terrain: Terrain, station: Floats, positions: Floats) -> LinkPoints:
     """Compute the radio link between a ground station and each position of the aircraft.
 
-    station: antenna, (3,) m.
+    station: position of the station's antenna, (3,) m.
     positions: (t, 3) m; the aircraft's antenna is at least `MIN_AIRCRAFT_HEIGHT_M` above ground.
     """
     antennas = _aircraft_antennas(terrain, positions)
@@ -271,16 +274,19 @@ def link_points(link: RadioLink, terrain: Terrain, station: Floats, positions: F
 
 
 def link_margins(link: RadioLink, terrain: Terrain, station: Floats, positions: Floats) -> Floats:
-    """Return only the margins of `link_points` at positions (t, 3) m, dB, (t,).
+    """Return the margin of the radio link at each position of the aircraft, dB, (t,); NaN over unknown ground.
 
-    This takes half of the time of `link_points`.
+    station: position of the station's antenna, (3,) m.
+    positions: (t, 3) m.
+
+    This takes half of the time of `link_points`, which also computes visibility and clearances.
     """
     losses = _path_losses(link, terrain, station, _aircraft_antennas(terrain, positions))[:, 0]
     return np.asarray(link.allowed_loss - losses)
 
 
 def _aircraft_antennas(terrain: Terrain, positions: Floats) -> Floats:
-    """Return positions (t, 3), m, raised to `MIN_AIRCRAFT_HEIGHT_M` above the ground where the ground is known."""
+    """Return positions (t, 3), m, raised to at least `MIN_AIRCRAFT_HEIGHT_M` above ground where the ground is known."""
     antennas = np.array(positions, dtype=np.float64)
     lowest = terrain.height(antennas[:, 0], antennas[:, 1]) + MIN_AIRCRAFT_HEIGHT_M
     antennas[:, 2] = np.fmax(antennas[:, 2], lowest)
@@ -288,7 +294,10 @@ def _aircraft_antennas(terrain: Terrain, positions: Floats) -> Floats:
 
 
 def _path_losses(link: RadioLink, terrain: Terrain, station: Floats, antennas: Floats) -> Floats:
-    """Return the fields of `PathLoss` for the station and each antenna (t, 3), m, as rows (t, 3)."""
+    """Return the fields of `PathLoss` for the path from the station to each antenna, (t, 3).
+
+    station, antennas: positions, (3,) and (t, 3) m.
+    """
     losses = [
         path_loss(path_profile(terrain, station, antenna), float(station[2]), float(antenna[2]), link.frequency)
         for antenna in antennas

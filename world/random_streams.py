@@ -13,7 +13,7 @@ _STREAM_COUNT = 3
 
 
 def stream(seed: int, number: int) -> np.random.Generator:
-    """Return the random generator of one of the streams that belong to a seed.
+    """Return the random generator of one of the independent streams that belong to a seed.
 
     number: `PLANNER`, `TURBULENCE` or `NAVIGATION`.
 

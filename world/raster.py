@@ -73,8 +73,8 @@ def make_degree_raster(
 
     def to_pixels(lon: Floats, lat: Floats) -> tuple[Floats, Floats]:
         """Convert longitudes and latitudes (deg) to fractional columns and rows."""
-        near = longitude_near(lon, (west + east) / 2)
-        return (near - west) / pixel_width - 0.5, (north - lat) / pixel_height - 0.5
+        shifted_lon = longitude_near(lon, (west + east) / 2)
+        return (shifted_lon - west) / pixel_width - 0.5, (north - lat) / pixel_height - 0.5
 
     def read(top: int, bottom: int, left: int, right: int) -> NDArray[np.float32]:
         """Return the heights of a window of rows and columns."""
@@ -101,7 +101,7 @@ _SHIPPED_TILE_TOLERANCE_DEG = 1e-5
 
 
 def open_npz(file: Path, name: str) -> RasterFile:
-    """Open an .npz file of heights. Raises TerrainError.
+    """Open an .npz file of heights. Raises TerrainError for any other file.
 
     The file has `elevation` (rows from north to south) and xmin, xmax, ymin, ymax: pixel edges in degrees. The two
     values of a pair may be in any order, except in the tile that planfly ships; see `_corrected_edges`.
@@ -137,7 +137,12 @@ def _corrected_edges(stated_edges: list[float], rows: int) -> tuple[float, float
 
 
 def _read_npz(file: Path, name: str) -> tuple[NDArray[np.generic], list[float]]:
-    """Return the heights in a file, and its xmin, xmax, ymin and ymax."""
+    """Return the heights in an .npz file, and its edges xmin, xmax, ymin and ymax, deg.
+
+    name: name of the file in messages.
+
+    Raises TerrainError for a file that is damaged, incomplete or too large.
+    """
     edge_keys = ("xmin", "xmax", "ymin", "ymax")
     try:
         with zipfile.ZipFile(file) as archive:
@@ -248,7 +253,7 @@ def _determine_datum(raster: RasterFile, stated_datum: StatedDatum | None) -> He
 
 
 def _or_list(names: Sequence[str]) -> str:
-    """Return names joined by commas and a final "or"."""
+    """Join names by commas and a final "or"."""
     return f"{', '.join(names[:-1])} or {names[-1]}"
 
 
@@ -266,11 +271,11 @@ _HOLES_PER_STEP = 2**16
 def read_terrain(raster: RasterFile, origin: GeoOrigin, bounds: ArrayLike, buffer: float) -> Terrain:
     """Read the part of a raster that covers an area of the map and a buffer around it.
 
-    bounds: area, [[e0, e1], [n0, n1]] m.
+    bounds: area, [[west, east], [south, north]] m.
     buffer: width of the buffer, m.
 
-    Ground is unknown beyond the tile and where the tile has no data. `require_covered` and `require_no_holes` refuse
-    such ground. Raises TerrainError if no ground in the area is known, or if it has too many pixels.
+    Ground beyond the raster, or without data, becomes NaN. Raises TerrainError if no ground in the area is known, or if
+    it has too many pixels.
 
     >>> raster = open_raster("jacksboro")
     >>> terrain = read_terrain(raster, raster.centre, [[-500.0, 500.0], [-500.0, 500.0]], 100.0)
@@ -297,7 +302,7 @@ def read_terrain(raster: RasterFile, origin: GeoOrigin, bounds: ArrayLike, buffe
     heights[~is_ground(heights)] = np.nan
     _convert_to_sea_level(heights, raster, top, left)
     to_pixel = fit_polymap(
-        lambda e, n: _to_window_pixels(raster.to_pixels, origin, e, n, left, top),
+        lambda east, north: _to_window_pixels(raster.to_pixels, origin, east, north, left, top),
         box + np.array([-buffer, buffer]),
         PIXEL_TOLERANCE,
     )
@@ -320,7 +325,7 @@ def _no_data_error(raster: RasterFile) -> TerrainError:
 def require_covered(raster: RasterFile, origin: GeoOrigin, bounds: ArrayLike) -> None:
     """Raise TerrainError if an area extends beyond the outer pixel centres of a raster.
 
-    bounds: area, [[e0, e1], [n0, n1]] m.
+    bounds: area, [[west, east], [south, north]] m.
     """
     box = np.asarray(bounds, dtype=np.float64)
     if not is_covered(raster, origin, box):
@@ -334,7 +339,7 @@ def require_covered(raster: RasterFile, origin: GeoOrigin, bounds: ArrayLike) ->
 
 
 def is_covered(raster: RasterFile, origin: GeoOrigin, box: Floats) -> bool:
-    """Return True if a raster covers a box on the map, [[e0, e1], [n0, n1]] m.
+    """Return True if a raster covers a box on the map, [[west, east], [south, north]] m.
 
     >>> raster = open_raster("jacksboro")
     >>> is_covered(raster, raster.centre, np.array([[0.0, 14_000.0], [0.0, 1.0]]))
@@ -343,17 +348,16 @@ def is_covered(raster: RasterFile, origin: GeoOrigin, box: Floats) -> bool:
     False
     """
     rows, cols = raster.shape
-    e0, e1, n0, n1 = _outline_window(raster, origin, box, 0.0)
-    return not (e0 < -1e-6 or n0 < -1e-6 or e1 > cols - 1 + 1e-6 or n1 > rows - 1 + 1e-6)
+    col0, col1, row0, row1 = _outline_window(raster, origin, box, 0.0)
+    return not (col0 < -1e-6 or row0 < -1e-6 or col1 > cols - 1 + 1e-6 or row1 > rows - 1 + 1e-6)
 
 
 def _convert_to_sea_level(heights: NDArray[np.float32], raster: RasterFile, top: int, left: int) -> None:
-    """Convert the heights in a window to heights above mean sea level, in place.
+    """Convert the heights in a window of a raster to heights above mean sea level, in place.
 
-    top, left: first row and column of the window in the file.
+    top, left: row and column of the raster at which the window starts.
 
-    Mean sea level is sampled at points so close together that it is nearly a plane between them. Raises TerrainError if
-    mean sea level is unknown in the window.
+    Mean sea level is sampled on a grid and interpolated. Raises TerrainError if it is unknown in the window.
     """
     if raster.datum.sea_level is None:
         return
@@ -380,7 +384,7 @@ def _convert_to_sea_level(heights: NDArray[np.float32], raster: RasterFile, top:
 
 
 def _pixels_per_metre(to_pixel: PolyMap, box: Floats) -> Floats:
-    """Return columns and rows per metre of the map at the centre of a box, (2, 2)."""
+    """Return the derivative of columns and rows (pixels) by east and north (m) at the centre of a box, (2, 2)."""
     centre = box.mean(axis=1)
     col, row = to_pixel(centre[0] + np.array([0.0, 100.0, 0.0]), centre[1] + np.array([0.0, 0.0, 100.0]))
     return np.array([[col[1] - col[0], col[2] - col[0]], [row[1] - row[0], row[2] - row[0]]]) / 100.0
@@ -389,7 +393,7 @@ def _pixels_per_metre(to_pixel: PolyMap, box: Floats) -> Floats:
 def require_no_holes(terrain: Terrain, bounds: ArrayLike) -> None:
     """Raise TerrainError if a height in an area depends on a pixel without data.
 
-    bounds: area, [[e0, e1], [n0, n1]] m.
+    bounds: area, [[west, east], [south, north]] m.
     """
     box = np.asarray(bounds, dtype=np.float64)
     rows, cols = np.nonzero(np.isnan(terrain.heights))
@@ -410,7 +414,7 @@ def require_no_holes(terrain: Terrain, bounds: ArrayLike) -> None:
             east, north = positions[:, int(np.argmax(is_inside))]
             raise TerrainError(
                 f"{terrain.source}: no data at east {east:.0f} m, north {north:.0f} m ({rows.size:,} of "
-                f"{terrain.heights.size:,} pixels in and about the area have none);"
+                f"{terrain.heights.size:,} pixels in and around the area have no data);"
                 " choose an area with data, or fill the holes of the file",
                 file=terrain.source,
             )
@@ -419,9 +423,12 @@ def require_no_holes(terrain: Terrain, bounds: ArrayLike) -> None:
 def _outline_window(
     raster: RasterFile, origin: GeoOrigin, box: Floats, buffer: float
 ) -> tuple[float, float, float, float]:
-    """Return the columns and rows that cover a box on the map and a buffer around it.
+    """Return the first and last column, and the first and last row, of a box on the map and a buffer around it.
 
-    The result is col0, col1, row0, row1.
+    box: [[west, east], [south, north]] m.
+    buffer: width of the buffer, m.
+
+    The columns and rows are fractional, and may lie outside the raster.
     """
     ramp = np.linspace(0.0, 1.0, 41)
     (w, e), (s, n) = box + np.array([-buffer, buffer])
@@ -441,7 +448,7 @@ def _to_window_pixels(
 
 
 def tile_bounds(raster: RasterFile, origin: GeoOrigin) -> Floats:
-    """Return the largest box on the map inside a raster, [[e0, e1], [n0, n1]] m.
+    """Return the largest box on the map inside a raster, [[west, east], [south, north]] m.
 
     Its sides run east and north, and its size is found to within half a percent. Raises TerrainError if no box fits.
 
@@ -467,7 +474,7 @@ def tile_bounds(raster: RasterFile, origin: GeoOrigin) -> Floats:
 
 
 def cover_text(raster: RasterFile) -> str:
-    """Return the range of latitudes and longitudes of a raster, as text.
+    """Describe the range of latitudes and longitudes that a raster covers, for a message.
 
     >>> cover_text(open_raster("jacksboro"))
     'latitude 36.160..36.446, longitude -84.413..-84.078'
@@ -477,14 +484,15 @@ def cover_text(raster: RasterFile) -> str:
 
 
 def _box_text(box: Floats) -> str:
-    """Return a box on the map, [[e0, e1], [n0, n1]] m, as text."""
+    """Format a box on the map, [[west, east], [south, north]] m, for a message."""
     return f"east {box[0, 0]:.0f}..{box[0, 1]:.0f} m, north {box[1, 0]:.0f}..{box[1, 1]:.0f} m"
 
 
 def _outside_text(raster: RasterFile, origin: GeoOrigin, box: Floats) -> str:
-    """Return the corner of a box that is farthest outside a raster's pixel centres, and a box within, as text.
+    """Describe how far a box extends beyond a raster, and the largest box inside the raster, for a message.
 
-    The text is "" for a corner that the raster's coordinate system cannot express.
+    The text names the corner of the box that is farthest outside. It is "" if the raster's coordinate system cannot
+    express a corner.
     """
     rows, cols = raster.shape
     east, north = (axis.ravel() for axis in np.meshgrid(*box))
@@ -500,5 +508,6 @@ def _outside_text(raster: RasterFile, origin: GeoOrigin, box: Floats) -> str:
     with suppress(TerrainError):
         inner = tile_bounds(raster, origin)
         # Rounded towards the inside.
-        text += f"; {_box_text(np.stack([np.ceil(inner[:, 0]), np.floor(inner[:, 1])], axis=1))} is within"
+        inner_box = np.stack([np.ceil(inner[:, 0]), np.floor(inner[:, 1])], axis=1)
+        text += f"; the largest area inside is {_box_text(inner_box)}"
     return text

@@ -81,7 +81,10 @@ def longitude_near(lon: NDArray[np.float64] | float, centre: float) -> Floats:
 
 
 def outline(cols: int, rows: int) -> tuple[Floats, Floats]:
-    """Return columns and rows of 84 points along the outline of a raster's pixel centres, (84,) each."""
+    """Return the columns and the rows of 84 points along the outline of a raster's pixel centres, (84,) each.
+
+    cols, rows: size of the raster.
+    """
     fractions = np.linspace(0.0, 1.0, 21)
     zeros, ones = np.zeros(21), np.ones(21)
     col = np.concatenate([fractions, fractions, zeros, ones]) * (cols - 1)
@@ -90,7 +93,7 @@ def outline(cols: int, rows: int) -> tuple[Floats, Floats]:
 
 
 def shift_grid(grid: Grid, rows: int, cols: int) -> Grid:
-    """Return a grid whose first pixel is moved by ``rows`` and ``cols``.
+    """Return the affine coefficients of a grid that starts ``rows`` rows and ``cols`` columns later.
 
     >>> shift_grid((30.0, 0.0, 400.0, 0.0, -30.0, 900.0), 1, 2)
     (30.0, 0.0, 460.0, 0.0, -30.0, 870.0)

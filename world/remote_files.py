@@ -56,7 +56,7 @@ class _IncompleteAnswer(Exception):
 
 @dataclass(slots=True)
 class RemoteFile:
-    """File on a server, and its copy.
+    """File on a server, and its copy on this machine, which may be incomplete.
 
     size: size in bytes.
     version: its ETag or its time of change; "" if the server states neither.
@@ -85,9 +85,11 @@ class RemoteFile:
         return [(part_begin, part_end) for part_begin, part_end in parts if part_begin < part_end]
 
     def fetch(self, begin: int, end: int, on_bytes: OnBytes = lambda _: None) -> None:
-        """Fetch the bytes of [begin, end) that the copy does not contain yet. Raises TerrainError.
+        """Fetch the bytes of [begin, end) that the copy does not contain yet.
 
         on_bytes: function that is called with the size of each received chunk, bytes.
+
+        After a temporary error the request is repeated. Raises TerrainError if the bytes cannot be fetched.
         """
         for part_begin, part_end in self.missing_parts(begin, min(end, self.size)):
             for attempt in range(_MAX_ATTEMPTS):
@@ -104,7 +106,8 @@ class RemoteFile:
     def _fetch_part(self, begin: int, end: int, on_bytes: OnBytes) -> None:
         """Fetch [begin, end) into the copy; fetch the whole file if the server has no range requests.
 
-        Raises errors of the connection, and _IncompleteAnswer; the bytes received so far are kept.
+        Raises errors of the connection, and _IncompleteAnswer if the server sends other or fewer bytes. The bytes that
+        were received are kept in the copy.
         """
         headers = {"Range": f"bytes={begin}-{end - 1}"} | ({"If-Range": self.version} if self.version else {})
         with _open_url(self.url, headers) as answer:
@@ -115,7 +118,7 @@ class RemoteFile:
                 begin, end = 0, self.size
             elif answer.headers.get("Content-Range") != f"bytes {begin}-{end - 1}/{self.size}":
                 sent_range = answer.headers.get("Content-Range", "nothing")
-                raise _IncompleteAnswer(f"bytes {begin}-{end - 1} were requested, and the server sent {sent_range}")
+                raise _IncompleteAnswer(f"bytes {begin}-{end - 1} were requested, but the server sent {sent_range}")
             with self.copy.open("r+b") as file:
                 file.seek(begin)
                 position = begin
@@ -131,7 +134,7 @@ class RemoteFile:
                     elapsed = time.monotonic() - start_time
                     is_slow = elapsed > _SLOW_AFTER_S and position - begin < _MIN_BYTES_PER_S * elapsed
                 file.flush()
-                # The bytes are on the disk before the notes list them, even if the power fails.
+                # Write the bytes to the disk before the notes list them, in case the power fails.
                 os.fsync(file.fileno())
             if position > begin:
                 self.parts[begin, position] = digest.hexdigest()
@@ -147,7 +150,7 @@ class RemoteFile:
         """Replace the copy by an empty file of the same size, which contains no parts. Raises OSError."""
         _notes_path(self.copy).unlink(missing_ok=True)
         self.parts = {}
-        # A new file, so that another process that reads the old one can go on.
+        # Make a new file, so that another process can continue to read the old one.
         with tempfile.NamedTemporaryFile(dir=self.copy.parent, delete=False) as file:
             os.truncate(file.fileno(), self.size)
         Path(file.name).replace(self.copy)
@@ -189,7 +192,10 @@ def find_remote(url: str, folder: Path) -> RemoteFile | None:
 
 
 def _open_url(url: str, headers: dict[str, str], method: str = "GET") -> http.client.HTTPResponse:
-    """Open an address with some headers, and return the server's answer."""
+    """Send a request for an address with some headers, and return the server's answer.
+
+    Raises OSError, or an HTTP error, if there is no answer in time.
+    """
     request = urllib.request.Request(url, headers={"User-Agent": "planfly"} | headers, method=method)
     return _make_opener().open(request, timeout=_ANSWER_TIMEOUT_S)
 
@@ -301,12 +307,15 @@ def _error_text(error: Exception) -> str:
 
 
 def _notes_path(copy: Path) -> Path:
-    """Return the file with the notes on a local copy."""
+    """Return the path of the notes file of a local copy, which lists the parts that the copy contains."""
     return copy.with_name(copy.name + ".held")
 
 
 def _read_notes(copy: Path, size: int) -> dict[tuple[int, int], str]:
-    """Return the parts of a copy that match the digests in its notes; an empty mapping for damaged notes."""
+    """Return the parts [begin, end) of a copy with their SHA-256, as its notes list them, without damaged parts.
+
+    size: size of the copy, bytes. The result is empty if the notes are missing or damaged.
+    """
     try:
         entries = json.loads(_notes_path(copy).read_text(encoding="ascii"))
         parts = {(int(part_begin), int(part_end)): str(digest) for part_begin, part_end, digest in entries}
@@ -315,7 +324,7 @@ def _read_notes(copy: Path, size: int) -> dict[tuple[int, int], str]:
     with copy.open("rb") as file:
 
         def is_intact(part_begin: int, part_end: int, digest: str) -> bool:
-            """Return True if a part of the copy has a digest."""
+            """Return True if the bytes of a part of the copy have this SHA-256."""
             if not 0 <= part_begin < part_end <= size:
                 return False
             file.seek(part_begin)

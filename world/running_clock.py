@@ -10,7 +10,8 @@ MAX_STEP_S = 1.0
 class RunningClock:
     """Seconds of real time that this process has run since the clock was made.
 
-    The clock must be read at least every `MAX_STEP_S` s.  Timeouts and playback continue from where they stopped.
+    The clock must be read at least every `MAX_STEP_S` s, because a longer step counts as a pause of the process.
+    Timeouts and playback then continue after the pause.
 
     >>> real = iter((100.0, 100.5, 4000.5, 4000.75))
     >>> clock = RunningClock(lambda: next(real))
@@ -21,7 +22,7 @@ class RunningClock:
     def __init__(self, real: Callable[[], float] | None = None) -> None:
         """Start the clock.
 
-        real: function that returns seconds from any epoch; None for the system's monotonic clock.
+        real: function that returns the real time, s, from any epoch; None for the system's monotonic clock.
         """
         self._real = real or time.monotonic
         self._last = self._real()

@@ -77,7 +77,7 @@ _Class = TypeVar("_Class")
 
 
 def _with_clear_errors(scenario_class: type[_Class]) -> type[_Class]:
-    """Decorate a class so that wrong arguments raise an ArgumentError that names `planfly.make_scenario`."""
+    """Decorate the class `Scenario` so that wrong arguments raise an ArgumentError that recommends `make_scenario`."""
     initialise = scenario_class.__init__
 
     @wraps(initialise)
@@ -172,16 +172,21 @@ class Scenario:
         return east, north
 
     def wind_velocities(self, positions: Floats, seconds: Floats) -> Floats:
-        """Return the mean wind at positions (n, 3) and times (n,), m/s, (n, 2); see `wind_velocity`."""
+        """Return the mean wind at n positions and times, m/s, (n, 2) east and north; see `wind_velocity`.
+
+        positions: east, north, up, m, (n, 3).
+        seconds: times after take-off, s, (n,).
+        """
         altitudes, field = np.ascontiguousarray(positions[:, 2], dtype=np.float64), self.wind.field
         if field is None:
             return self.wind.velocities_at(altitudes)
-        found = field.interpolate(seconds, *to_geo(self.origin, positions[:, 0], positions[:, 1]), altitudes)
-        return self.wind.velocities_at(np.ascontiguousarray(found[:, 2])) + found[:, :2]
+        # Two components of the deviation from the mean profile, and the altitude at which it applies.
+        deviations = field.interpolate(seconds, *to_geo(self.origin, positions[:, 0], positions[:, 1]), altitudes)
+        return self.wind.velocities_at(np.ascontiguousarray(deviations[:, 2])) + deviations[:, :2]
 
     @property
     def geo_map(self) -> PolyMap | None:
-        """Map from east and north (m) to longitude and latitude (deg); None without a forecast, which needs it."""
+        """Map from east and north (m) to longitude and latitude (deg), for a forecast; None without a forecast."""
         if self.wind.field is None:
             return None
 
@@ -221,10 +226,10 @@ class Scenario:
         notes = [*(self.spec.zone_notes or ()), *self._small_threat_notes()]
         timed_tables = [table for table in self.spec.zones or () if table.times]
         if timed_tables and self.spec.at is None:
-            count = "1 zone has times of activity, and is active"
+            count = "1 zone has times of activity, but is treated as active"
             if len(timed_tables) > 1:
-                count = f"{len(timed_tables):,} zones have times of activity, and are active"
-            notes.append(f"{count} at all times (--at applies them)")
+                count = f"{len(timed_tables):,} zones have times of activity, but are treated as active"
+            notes.append(f"{count} at all times, because no time of flight is given (--at)")
         elif timed_tables:
             span = " to ".join(f"{time:%Y-%m-%d %H:%M}" for time in parse_span(str(self.spec.at)))
             inactive_count = len(self.spec.zones or ()) - len(self.zones)
@@ -236,7 +241,7 @@ class Scenario:
         return tuple(notes)
 
     def _small_threat_notes(self) -> list[str]:
-        """Return a note on threats whose radius is implausibly small, and perhaps not in metres."""
+        """Return at most one note, on threats whose radius is so small that it may be in kilometres."""
         threats = self.threats
         small_radii = [
             f"the {kind} radius of {name} is {radius:g} m"
@@ -250,7 +255,7 @@ class Scenario:
         return [f"{small_radii[0]}{others}: radii are in metres, not kilometres"]
 
     def __repr__(self) -> str:
-        """Return a short text: name, distance, and numbers of threats and zones."""
+        """Return a short description: name, distance, and numbers of threats and zones."""
         distance = math.dist(self.start, self.destination) / 1000.0
         counts = f"{count_text(len(self.threats), 'threat')}, {count_text(len(self.zones), 'zone')}"
         return f"<Scenario {self.name}: {distance:.1f} km, {counts}>"
@@ -290,10 +295,10 @@ class Scenario:
     def to_toml(self, path: str | Path) -> None:
         """Write the scenario as a TOML file, from which `planfly.plan` and other functions make it again.
 
-        path: the file, replaced if it exists.  Elevation files, an aircraft's folder and parameters are named by their
-        absolute paths.
-        Raises ScenarioError for a scenario that was made around a mission, and OSError for a file that cannot be
-        written.
+        path: the file, replaced if it exists.
+
+        Elevation files, an aircraft's folder and a parameter file are named by their absolute paths. Raises
+        ScenarioError for a scenario that was made around a mission, and OSError for a file that cannot be written.
 
         >>> from tempfile import TemporaryDirectory
         >>> scenario = load_scenario("hard-07")
@@ -303,7 +308,7 @@ class Scenario:
         True
         """
         if self.external:
-            reason = "made around a mission, which is its file; planfly.make_scenario makes a scenario with an area"
+            reason = "made around a mission, so it has no file; planfly.make_scenario makes a scenario with an area"
             raise ScenarioError(f"{self.name}: {reason}", file=self.name)
         write_atomically(Path(path), toml_text(self.to_json()))
 
@@ -332,7 +337,8 @@ def load_scenario(name_or_path: str, terrain: str | None = None) -> Scenario:
     """Read a scenario by its built-in name or from a TOML file.
 
     terrain: elevation file that replaces the scenario's terrain; None to keep the scenario's terrain.
-    Raises ScenarioError for a file that is missing or has a fault, and TerrainError for its elevation file.
+
+    Raises ScenarioError for a file that is missing or has a fault, and TerrainError for a fault of its elevation file.
 
     >>> scenario = load_scenario("tight")
     >>> scenario.start.tolist(), scenario.destination.tolist(), len(scenario.threats)
@@ -358,10 +364,7 @@ def load_scenario(name_or_path: str, terrain: str | None = None) -> Scenario:
 
 
 def _sibling_toml_files(missing_file: Path) -> list[str]:
-    """Return the .toml files in the folder of a missing file.
-
-    Their paths are relative or absolute like the path of the missing file.
-    """
+    """Return the .toml files in the folder of a missing file, for a suggestion; relative if its path is relative."""
     try:
         return [str(file) for file in sorted(missing_file.parent.glob("*.toml"))]
     except OSError:
@@ -396,15 +399,15 @@ def scenario_from_spec(
     terrain: an elevation file that replaces the scenario's own.
     ground: terrain that is already loaded (from a log).
     external: see `Scenario`.
-    is_stored: True for the scenario of a log, whose wind and ground are those of its flight; no forecast is read.
-    Raises ScenarioError, TerrainError and ForecastError as `load_scenario` does.
+    is_stored: True for the scenario of a log, which has the wind and the ground of its flight; no forecast is read.
+    Raises ScenarioError, TerrainError and ForecastError for a file that is missing or has a fault.
 
     >>> again = scenario_from_spec(load_scenario("tight").to_json(), "a plan")
     >>> again.name, again.bounds.tolist()
     ('tight', [[-300.0, 2900.0], [-150.0, 150.0]])
     """
     spec = spec if isinstance(spec, ScenarioFile) else check_scenario(spec, source)
-    # Stored with the scenario's own zones, so that a log without the files makes the same scenario.
+    # Zones of files are stored with the other zones, so that a log without the files makes the same scenario.
     file_zones = FileZones() if spec.zones_file is None else read_zone_files(spec.zones_file, source, base)
     spec = spec.model_copy(update={"zones_file": None})
     if terrain is not None:
@@ -422,7 +425,7 @@ def scenario_from_spec(
     elif raster is not None:
         bounds = tile_bounds(raster, origin)
     else:
-        raise ScenarioError(f"{source}: area: missing, and there is no tile to take it from", file=source, field="area")
+        raise ScenarioError(f"{source}: area: missing, and no elevation file implies it", file=source, field="area")
     if raster is not None:
         ground = _read_terrain_of_area(raster, origin, bounds, station_position(spec.link, origin))
     elif ground is None:
@@ -430,7 +433,7 @@ def scenario_from_spec(
     if ground is not None and spec.terrain.vertical_error_m is not None:
         ground = replace(ground, vertical_error=spec.terrain.vertical_error_m)
     spec = _with_absolute_paths(spec, base)
-    # Values taken from the tile are stored, so that a log without the tile makes the same scenario.
+    # Origin and area from the elevation file are stored, so that a log without the file makes the same scenario.
     origin_table = checked_table(
         lambda: OriginTable(lat_deg=origin.lat_deg, lon_deg=origin.lon_deg), f"{source}: origin"
     )
@@ -446,11 +449,9 @@ def scenario_from_spec(
 
 
 def _with_absolute_paths(spec: ScenarioFile, base: Path | None) -> ScenarioFile:
-    """Return a scenario file's data with absolute paths.
+    """Return a scenario file's data with absolute paths of the aircraft's folder, the parameter file and the forecast.
 
-    The paths lead to the aircraft's folder, the parameter file and the forecast.
-
-    base: folder of relative paths.
+    base: folder of relative paths; None for the current folder.
     """
     flight, wind, changes = spec.flight, spec.wind, {}
     if names_folder(flight.aircraft):
@@ -465,9 +466,10 @@ def _with_absolute_paths(spec: ScenarioFile, base: Path | None) -> ScenarioFile:
 def _replace_terrain(spec: ScenarioFile, terrain: str, source: str, base: Path | None) -> ScenarioFile:
     """Return a scenario file's data with another terrain and the same map origin.
 
-    terrain: path of the elevation file.
+    terrain: path of the new elevation file.
+    base: folder of the scenario's relative paths.
 
-    Without a stated origin, the origin is the centre of the replaced elevation file, and it is then stated in the data.
+    If the data states no origin, the origin is the centre of the old elevation file; the result then states it.
     """
     changes: dict[str, Any] = {
         "terrain": checked_table(lambda: TerrainTable(kind="dem", path=terrain), "terrain"),
@@ -484,6 +486,10 @@ def _with_file_zones(
     spec: ScenarioFile, file_zones: FileZones, source: str, origin: GeoOrigin, bounds: Floats
 ) -> ScenarioFile:
     """Return a scenario file's data with the zones of its zone files.
+
+    file_zones: zones of the files, and notes on reading them.
+    source: name of the files in messages.
+    bounds: [[west, east], [south, north]] of the scenario's area, (2, 2) m.
 
     Zones that are not near the scenario's area are omitted; a note states their number.
     """
@@ -509,9 +515,11 @@ def _active_zones(spec: ScenarioFile) -> list[ZoneTable]:
 
 
 def _open_terrain(table: TerrainTable, source: str, base: Path | None) -> tuple[RasterFile, TerrainTable]:
-    """Open a scenario's elevation file; return it and a [terrain] table that identifies it.
+    """Open a scenario's elevation file or files; return them as one raster, and a [terrain] table that identifies them.
 
-    The table has the file's absolute path and SHA-256.
+    base: folder of relative paths.
+
+    The table has absolute paths and the SHA-256. Raises ScenarioError if the stated SHA-256 differs.
     """
     paths = [str(table.path)] if not isinstance(table.path, list) else table.path
     path_text = ", ".join(paths)
@@ -520,7 +528,7 @@ def _open_terrain(table: TerrainTable, source: str, base: Path | None) -> tuple[
     except TerrainError as error:
         raise TerrainError.from_error(error, source, "terrain.path", path_text) from error
     if table.sha256 not in (None, raster.sha256):
-        raise ScenarioError.at(source, "terrain.path", path_text, "the file has changed since (its SHA-256 differs)")
+        raise ScenarioError.at(source, "terrain.path", path_text, "the file has changed: its SHA-256 differs")
     absolute_paths = [path if path in EMBEDDED else absolute_path(Path(base or "", path)) for path in paths]
     stored_path = absolute_paths if isinstance(table.path, list) else absolute_paths[0]
     return raster, table.model_copy(update={"path": stored_path, "sha256": raster.sha256})
@@ -538,7 +546,8 @@ def _assemble_scenario(
 ) -> Scenario:
     """Make a scenario from the data of its file, its map and its terrain.
 
-    replaced: True if the ground may differ from the one for which the scenario was made.
+    bounds: [[west, east], [south, north]] of the area, (2, 2) m.
+    replaced: True if the ground may differ from the ground for which the scenario was made.
     """
     area = spec.area
     floor = area.floor_amsl_m if area and area.floor_amsl_m is not None else -500.0
@@ -557,7 +566,9 @@ def _assemble_scenario(
     # The ends of an external mission are its own waypoints: the verdict reports zones that they violate.
     check_ends(zones, source, ends if zones and not external else (), ground)
     if not external and math.dist(start[:2], destination[:2]) < 10.0:
-        raise ScenarioError(f"{source}: destination: less than 10 m from start", file=source, field="destination")
+        raise ScenarioError(
+            f"{source}: destination: less than 10 m horizontally from the start", file=source, field="destination"
+        )
     table, start_up = spec.wind, float(start[2])
     wind = Wind(table.speed_mps, math.radians(table.from_deg), table.gradient, table.turbulence, table.seed, start_up)
     return Scenario(
@@ -592,7 +603,9 @@ def _read_terrain_of_area(
 ) -> Terrain:
     """Read the terrain of a scenario's area and, if it lies outside, up to the ground station of its link.
 
-    station: position of the link's antenna, m; None for a link without one.
+    bounds: [[west, east], [south, north]] of the area, (2, 2) m.
+    station: east and north of the station's antenna, m; None without one.
+
     Raises TerrainError if the area extends beyond the elevation file.
     """
     require_covered(raster, origin, bounds)
@@ -600,9 +613,10 @@ def _read_terrain_of_area(
 
 
 def _box_with(raster: RasterFile, origin: GeoOrigin, bounds: Floats, position: tuple[float, float] | None) -> Floats:
-    """Return an area that is extended to contain a position, m, (2, 2).
+    """Return an area that is extended to contain a position, if the elevation file has pixels there.
 
-    If the elevation file does not cover the position, the area is returned unchanged.
+    bounds: [[west, east], [south, north]] of the area, (2, 2) m.
+    position: east and north, m; None to return the area unchanged.
     """
     if position is None:
         return bounds
@@ -628,12 +642,12 @@ def with_ground_at(scenario: Scenario, position: tuple[float, float]) -> Scenari
     box = _box_with(raster, scenario.origin, scenario.bounds, position)
     if box is scenario.bounds:
         return scenario
-    wide = read_terrain(raster, scenario.origin, box, GROUND_BUFFER)
-    return replace(scenario, terrain=replace(wide, vertical_error=terrain.vertical_error))
+    extended_terrain = read_terrain(raster, scenario.origin, box, GROUND_BUFFER)
+    return replace(scenario, terrain=replace(extended_terrain, vertical_error=terrain.vertical_error))
 
 
 def _make_terrain(table: TerrainTable, bounds: Floats) -> Terrain | None:
-    """Make the flat or hilly terrain that a table describes; return None for any other kind."""
+    """Make the flat or hilly terrain that a [terrain] table describes; return None for any other kind."""
     if table.kind == "flat":
         return make_flat_terrain(bounds, float(table.amsl_m or 0.0), 5 * GROUND_BUFFER)
     if table.kind == "peaks":
@@ -658,10 +672,12 @@ def lat_lon_of_points(scenario: Scenario, points: Floats) -> tuple[Floats, Float
 
 
 def with_terrain(scenario: Scenario, terrain: str) -> Scenario:
-    """Return a scenario over another elevation file.
+    """Return a scenario with the terrain of another elevation file.
 
-    Start and destination keep their altitudes AMSL; threats on the ground are placed on the new ground.
-    Raises TerrainError for a file that cannot be read or does not cover the area.
+    terrain: path of the elevation file.
+
+    Start and destination keep their altitudes AMSL; threats on the ground are placed on the new ground. Raises
+    TerrainError for a file that cannot be read or does not cover the area.
 
     >>> with_terrain(load_scenario("jacksboro"), "jacksboro").terrain.source
     'jacksboro'
@@ -688,11 +704,13 @@ def with_amsl_endpoints(spec: dict[str, Any], start: Floats, destination: Floats
 
 
 def with_ground(scenario: Scenario, ground: Terrain) -> Scenario:
-    """Return a scenario in which the real ground is another than the one of the map.
+    """Return a scenario whose real ground differs from the ground of the map.
 
-    What stands on the ground moves with it: home, and threats and rally points without an altitude AMSL.  Heights above
-    ground of zones and of the link's station are measured from `Scenario.terrain`.  Planned altitudes stay: start,
-    destination and ceiling, which the scenario then states AMSL.
+    ground: the real ground.
+
+    Objects on the ground move with it: home, and threats and rally points without an altitude AMSL. Heights above
+    ground of zones and of the link's station are measured from the new `Scenario.terrain`. Start, destination and
+    ceiling keep their altitudes; the scenario then states them AMSL.
 
     >>> scenario = load_scenario("jacksboro")
     >>> raised = with_ground(scenario, replace(scenario.terrain, heights=scenario.terrain.heights + 8))
@@ -717,9 +735,10 @@ def with_ground(scenario: Scenario, ground: Terrain) -> Scenario:
 
 
 def with_wind(scenario: Scenario, speed: float | None, from_course: float | None, turbulence: str | None) -> Scenario:
-    """Return a scenario with another wind; None keeps the present value.
+    """Return a scenario with another wind; an argument of None keeps the present value.
 
-    speed, from_course: speed, m/s, and direction that the wind blows from, rad; either both or neither is given.
+    speed, from_course: speed, m/s, and direction that the wind blows from, rad; either both or neither is given. They
+        replace a forecast.
     turbulence: "none", "light" or "moderate".
 
     Raises ScenarioError for a wind that is not allowed in a scenario file.
@@ -751,13 +770,13 @@ def with_wind(scenario: Scenario, speed: float | None, from_course: float | None
 
 
 def with_forecast(scenario: Scenario, forecast: str, source: str = "") -> Scenario:
-    """Return a scenario with the wind of a weather forecast, which begins at the scenario's time of flight.
+    """Return a scenario with the wind of a weather forecast from the scenario's time of flight on.
 
     forecast: file that `world.forecast.read_forecast` reads.
     source: beginning of messages about the file.
 
-    Without a time of flight, the scenario has no wind until `with_flight_time` states one.
-    Raises ForecastError for a file that cannot be used, or that does not cover the start and the destination.
+    Without a time of flight, the scenario has no wind until `with_flight_time` states one. Raises ForecastError for a
+    file that cannot be used, or that does not cover the start and the destination.
     """
     changes = {"forecast": absolute_path(Path(forecast)), "speed_mps": 0.0, "from_deg": 0.0, "gradient": 0.0}
     table = checked_table(
@@ -779,7 +798,10 @@ def without_forecast(scenario: Scenario) -> Scenario:
 
 
 def forecast_of_scenario(scenario: Scenario) -> Forecast:
-    """Read the forecast that a scenario's [wind] names, around its map.  Raises ForecastError."""
+    """Read the forecast that a scenario's [wind] names, for the area of its map.
+
+    Raises ForecastError for a file that cannot be used.
+    """
     ground = math.nan
     if scenario.terrain is not None:
         ground = float(scenario.terrain.height(scenario.start[0], scenario.start[1]))
@@ -790,7 +812,7 @@ def forecast_of_scenario(scenario: Scenario) -> Forecast:
 def _with_forecast_wind(scenario: Scenario) -> Scenario:
     """Return the scenario with the wind of its forecast, if it names a forecast and states a time of flight.
 
-    Raises ForecastError.
+    Any other scenario is returned unchanged. Raises ForecastError if the forecast cannot be used.
     """
     if scenario.spec.wind.forecast is None or scenario.spec.at is None:
         return scenario
@@ -809,11 +831,13 @@ def in_forecast_member(scenario: Scenario, forecast: Forecast, member: int) -> S
 
 
 def with_link(scenario: Scenario, **entries: Any) -> Scenario:
-    """Return a scenario with changed entries of [link]; None keeps the present value.
+    """Return a scenario with changed entries of [link]; a value of None keeps the present value.
+
+    entries: values by the keys of [link].
 
     A position in degrees replaces a position in metres.  The terrain of an elevation file is read up to the station.
     Raises ScenarioError for an entry that is not allowed in a scenario file, and for a link without frequency, power or
-    sensitivity, and TerrainError for an elevation file that cannot be read.
+    sensitivity. Raises TerrainError for an elevation file that cannot be read.
 
     >>> linked = with_link(load_scenario("tight"), frequency_mhz=1000.0, power_dbm=20.0, sensitivity_dbm=-90.0)
     >>> linked.link.allowed_loss
@@ -832,7 +856,9 @@ def with_link(scenario: Scenario, **entries: Any) -> Scenario:
 
 
 def with_flight(scenario: Scenario, **changes: Any) -> Scenario:
-    """Return a scenario with changed entries of [flight]; None keeps the present value.
+    """Return a scenario with changed entries of [flight]; a value of None keeps the present value.
+
+    changes: values by the keys of [flight].
 
     A given guidance law replaces the autopilot and its parameters. A given autopilot, or given parameters, replace the
     guidance law. Raises ScenarioError for a value that is not allowed in a scenario file.
@@ -894,9 +920,9 @@ def with_zones(scenario: Scenario, tables: Sequence[ZoneTable], source: str, not
 
 
 def with_flight_time(scenario: Scenario, at: str | None) -> Scenario:
-    """Return a scenario with another time of flight; None keeps the present time.
+    """Return a scenario with another time of flight, which selects its active zones and the wind of its forecast.
 
-    at: time span as `world.airspace.zone_times.parse_span` reads it.
+    at: time span as `world.airspace.zone_times.parse_span` reads it; None to return the scenario unchanged.
 
     Raises ScenarioError for an invalid time.
 

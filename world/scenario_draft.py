@@ -95,9 +95,11 @@ def make_draft(
 ) -> Draft:
     """Make the draft of a scenario for a flight from a start to a destination.
 
+    name: name of the scenario.
     height: height of start and destination above ground, m.
     raster: elevation file; None for flat ground.
     terrain: path of that file as the scenario file states it.
+    aircraft, airspeed, autopilot, version: see `Draft`.
 
     The area extends beyond the line from start to destination by about a third of the line's length on all sides. It is
     clipped to the data of the elevation file. Raises ArgumentError for positions that are outside the file, or too near
@@ -130,15 +132,15 @@ def make_draft(
 def _survey_ground(
     raster: RasterFile, origin: GeoOrigin, positions: Mapping[str, GeoPosition], endpoints: Floats, margin: float
 ) -> tuple[Floats, float]:
-    """Return an area around start and destination that has elevation data, and the highest ground in it, m.
+    """Find an area around start and destination that has elevation data, and the highest ground in it, m.
 
     positions: start and destination, by their keywords.
     endpoints: the same two positions on the map, (2, 2) m.
     margin: largest distance between the positions and the edges of the area, m; smaller distances are tried if data is
         missing.
 
-    The area is (2, 2) m. Raises ArgumentError for a position that the file does not cover, and
-    TerrainError if data is missing with every distance.
+    The area is [[west, east], [south, north]], (2, 2) m. Raises ArgumentError for a position that the file does not
+    cover, and TerrainError if data is missing even with the smallest distance.
     """
     for fraction in _MARGIN_REDUCTIONS:
         bounds = _clip_to_file(_enclosing_box(endpoints, fraction * margin), raster, origin)
@@ -169,13 +171,13 @@ def _enclosing_box(endpoints: Floats, margin: float) -> Floats:
 
 
 def _position_text(position: GeoPosition, distance: float | None = None) -> str:
-    """Return a position as text, in degrees, with a distance if one is given."""
+    """Format a position in degrees for a message, with a distance (m) if one is given."""
     text = f"{position.lat:g},{position.lon:g}"
     return text if distance is None else f"{text}, {distance / 1000.0:,.3g} km away"
 
 
 def _clip_to_file(area: Floats, raster: RasterFile, origin: GeoOrigin) -> Floats:
-    """Clip a box, (2, 2) m, to the area that the elevation file covers."""
+    """Clip a box on the map, (2, 2) m, to the area that an elevation file covers."""
     if is_covered(raster, origin, area):
         return area
     tile_area = tile_bounds(raster, origin)
@@ -226,7 +228,7 @@ def _quote(value: str) -> str:
 
 
 def _number_text(value: float) -> str:
-    """Return a number with up to eight significant digits."""
+    """Format a number with up to eight significant digits."""
     return f"{value:.8g}"
 
 
@@ -330,9 +332,9 @@ def _flight_text(draft: Draft) -> str:
 
 
 def _examples_text(draft: Draft) -> str:
-    """Return the commented examples of a scenario file: a threat and a zone near the straight line.
+    """Return the commented examples of a scenario file: a threat, a zone, and requirements on returns.
 
-    The examples are small enough to fly around.
+    Threat and zone are near the line from start to destination, and small enough to fly around.
     """
     radius = max(50.0, round(float(np.diff(draft.box, axis=1).min()) / 200.0) * 10.0)
     threat, zone = (
@@ -366,10 +368,11 @@ def _examples_text(draft: Draft) -> str:
 
 
 def _example_positions(draft: Draft, radius: float) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return two positions for examples, (east, north) m, one on each side of the straight line.
+    """Return two positions for examples, (east, north) m, on both sides of the line from start to destination.
 
-    Each position is a third of the line's length from one end of the line, and half of ``radius`` (m) to the side of
-    it.
+    radius: radius of the examples, m.
+
+    Each position is a third of the line's length from one end of the line, and half of ``radius`` to the side of it.
     """
     endpoints = np.array([to_map(draft.origin, *place) for place in (draft.start, draft.destination)])
     straight_line = endpoints[1] - endpoints[0]

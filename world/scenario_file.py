@@ -28,7 +28,7 @@ def parse_scenario(text: str, source: str) -> ScenarioFile:
     """
     try:
         data = toml_table(text)
-    # Not only TOMLDecodeError: also for a number of thousands of digits, and for deeply nested brackets.
+    # ValueError includes TOMLDecodeError, numbers of thousands of digits, and deeply nested brackets.
     except ValueError as error:
         raise ScenarioError(f"{source}: not valid TOML: {_first_line(error)}", file=source) from error
     terrain = data.get("terrain")
@@ -50,10 +50,11 @@ def parse_scenario(text: str, source: str) -> ScenarioFile:
 
 
 def check_scenario(data: Any, source: str) -> ScenarioFile:
-    """Check the data of a scenario, which must be a dictionary, from a plan or a log.
+    """Check the data of a scenario that a plan or a log stores, and convert it to the model of a scenario file.
 
     source: name of the plan or log in messages.
-    Raises ScenarioError as `parse_scenario` does.
+
+    Raises ScenarioError, in one line, for data that is not a dictionary, or with an invalid value.
     """
     if not isinstance(data, dict):
         raise ScenarioError(
@@ -66,7 +67,7 @@ def check_scenario(data: Any, source: str) -> ScenarioFile:
 
 
 def checked_table(make_table: Callable[[], Table], source: str) -> Table:
-    """Return the table that a function makes; raise pydantic's error as a ScenarioError.
+    """Call a function that makes a table, and return the table; raise pydantic's error as a ScenarioError.
 
     source: name of the file in messages.
     """
@@ -111,9 +112,7 @@ class Fault(NamedTuple):
 
 
 def first_fault(error: ValidationError, data: Any = None, model: type[BaseModel] | None = None) -> Fault:
-    """Return the first fault that pydantic found.
-
-    The text of the fault is ``key: value: what is allowed``.
+    """Convert an error of pydantic to its first fault, with the text ``key: value: allowed values``.
 
     data: data that was checked. It is needed if a field allows several types, because pydantic's location then contains
         names that are not keys of the data.
@@ -164,7 +163,10 @@ _ENDS = (("start",), ("destination",))
 
 
 def _remaining_faults_text(errors: Sequence[Any]) -> str:
-    """Return a text on the errors after the first: the names of missing keys, or else the number of errors."""
+    """Describe the errors after the first as the end of a message.
+
+    The text has the names of the missing keys if all errors are missing keys, or else the number of errors.
+    """
     if len({error_entry["loc"][:2] for error_entry in errors}) < 2 and errors[0]["loc"] not in _ENDS:
         return ""
     if any(error_entry["type"] != "missing" for error_entry in errors):
@@ -179,12 +181,19 @@ def _remaining_faults_text(errors: Sequence[Any]) -> str:
 
 
 def _spelling_suggestion(parts: Sequence[str | int], model: type[BaseModel] | None) -> str:
-    """Return a suggestion for an unknown key, as the end of a message; "" if no known key is similar."""
+    """Return a suggestion for an unknown key, as the end of a message; "" if no known key is similar.
+
+    parts: keys that lead to the unknown key, and the key itself.
+    model: model of the data; None for no suggestion.
+    """
     return "" if model is None else did_you_mean(str(parts[-1]), _known_keys(parts[:-1], model))
 
 
 def _known_keys(parts: Sequence[str | int], model: type[BaseModel]) -> list[str]:
-    """Return the known keys of the table at a location, or of the whole model."""
+    """Return the known keys of a model's field and of all tables in it, or of the model itself.
+
+    parts: keys that lead to the table; the first one names the model's field.
+    """
     key_field = model.model_fields.get(str(parts[0])) if parts else None
     if key_field is None:
         return list(model.model_fields)
@@ -201,7 +210,7 @@ def _known_keys(parts: Sequence[str | int], model: type[BaseModel]) -> list[str]
 
 
 def _data_keys(parts: tuple[str | int, ...], data: Any) -> list[str | int]:
-    """Return the parts of pydantic's location that are keys of the data."""
+    """Return the parts of a pydantic location that are keys or indices of the data, without names of types."""
     keys = []
     for part in parts:
         known_keys = range(len(data)) if isinstance(data, list) else data if isinstance(data, dict) else ()

@@ -29,7 +29,7 @@ def check_no_line_break(text: str) -> str:
 def in_range(
     min_value: float, max_value: float, *, exclude_min: bool = False, exclude_max: bool = False, also: str = ""
 ) -> AfterValidator:
-    """Make a validator that allows ``min_value``..``max_value`` and names this range in its error.
+    """Make a pydantic validator that allows ``min_value``..``max_value`` and names this range in its error.
 
     exclude_min, exclude_max: True to exclude ``min_value`` or ``max_value``.
     also: text for the message about other values that the field allows.
@@ -209,9 +209,9 @@ class PeakTable(ScenarioTable):
 
 
 def _check_datum(datum: StatedDatum) -> StatedDatum:
-    """Return the datum; raise ValueError unless it is a known name or a plausible height, m.
+    """Return the vertical datum; raise ValueError unless it is a known name or a plausible height.
 
-    A height as the datum means the height that mean sea level has in the file.
+    A number is the height of mean sea level in the file, m.
     """
     names = get_args(NamedDatum)
     if datum in names or (not isinstance(datum, str) and abs(datum) <= MAX_SEA_LEVEL):
@@ -221,9 +221,9 @@ def _check_datum(datum: StatedDatum) -> StatedDatum:
 
 
 def _check_paths(path: object) -> object:
-    """Return the path; raise ValueError unless it is a file name or a list of file names.
+    """Return the path; raise ValueError unless it is a file name, a list of file names, or None.
 
-    A pydantic union would report one error for each of its members.
+    This check gives one message, where the union of types would report an error for each type.
     """
     paths = path if isinstance(path, list) else [path]
     if path is None or (1 <= len(paths) <= MAX_TILES and all(isinstance(name, str) and name for name in paths)):
@@ -427,9 +427,7 @@ class PlannerTable(ScenarioTable):
 
 
 def names_folder(aircraft: str) -> bool:
-    """Return True if an aircraft's name is a folder, not an aircraft that planfly ships.
-
-    The name of a folder contains a slash.
+    """Return True if the aircraft of a scenario is a folder (a name with a slash), not a built-in aircraft.
 
     >>> names_folder("aerosonde"), names_folder("models/mine")
     (False, True)
@@ -508,9 +506,10 @@ class FlightTable(ScenarioTable):
 
     @property
     def steering(self) -> Steering:
-        """Return autopilot, guidance law and navigation accuracy.
+        """Autopilot, guidance law and navigation accuracy, with defaults for values that are not stated.
 
-        The default accuracy is "perfect" for planfly's guidance, and "gnss" for other autopilots.
+        The autopilot is planfly's guidance if only a guidance law is stated, and otherwise ArduPlane. The default
+        accuracy is "perfect" for planfly's guidance, and "gnss" for other autopilots.
         """
         implied_autopilot = DEFAULT_AUTOPILOT
         if self.guidance is not None:
@@ -522,10 +521,7 @@ class FlightTable(ScenarioTable):
         return Steering(autopilot, self.guidance or "path", self.nav or default_nav)
 
     def with_stated_defaults(self) -> "FlightTable":
-        """Return a copy with the default autopilot, release and navigation as entries.
-
-        Plans and logs store a flight in this form.
-        """
+        """Return a copy that states autopilot, release and navigation accuracy, as plans and logs store it."""
         autopilot, guidance, nav = self.steering
         autopilot_entries: dict[str, str] = (
             {"autopilot": autopilot} if autopilot != OWN_GUIDANCE else {"guidance": guidance}
@@ -615,7 +611,7 @@ class LaunchTable(ScenarioTable):
                 f"speed_mps: {self.speed_mps:g}: not allowed for a runway, where the motor accelerates the aircraft"
             )
         if self.method == "runway" and (self.incline_deg or 0.0) > MAX_RUNWAY_INCLINE_DEG:
-            raise ValueError(f"incline_deg: {self.incline_deg:g}: allowed 0..{MAX_RUNWAY_INCLINE_DEG:g} of a runway")
+            raise ValueError(f"incline_deg: {self.incline_deg:g}: allowed 0..{MAX_RUNWAY_INCLINE_DEG:g} for a runway")
         return self
 
 
@@ -669,7 +665,7 @@ class RallyTable(PointTable):
 
 
 def _check_autoland(value: Any) -> Any:
-    """Return the value; raise ValueError unless it is a value of RTL_AUTOLAND.
+    """Return the value; raise ValueError unless it is an allowed value of ArduPlane's RTL_AUTOLAND: 1, 2 or 3.
 
     True and 1.0 are not allowed, although they equal 1.
     """
@@ -783,7 +779,7 @@ class ScenarioFile(ScenarioTable):
     def _check_area(self) -> "ScenarioFile":
         """Raise ValueError if the area is missing and there is no elevation file to take it from."""
         if self.area is None and self.terrain.kind != "dem":
-            raise ValueError(f'area: missing; terrain kind "{self.terrain.kind}" has no tile to take it from')
+            raise ValueError(f'area: missing; terrain kind "{self.terrain.kind}" implies none')
         return self
 
     @model_validator(mode="after")

@@ -35,13 +35,13 @@ def _suppressed_output() -> Iterator[Callable[[], str]]:
     try:
         with (
             tempfile.TemporaryFile() as cpp_file,
-            _stream_to(saved_descriptor, sys.stdout) as others,
-            contextlib.redirect_stdout(_ThreadOutput(others, sys.stdout)) as python_output,
+            _stream_to(saved_descriptor, sys.stdout) as other_threads,
+            contextlib.redirect_stdout(_ThreadOutput(other_threads, sys.stdout)) as python_output,
         ):
             os.dup2(cpp_file.fileno(), 1)
 
             def text() -> str:
-                """Return what has been printed so far."""
+                """Return the output of this thread, and of libraries in C++, since the start of the block."""
                 cpp_output = os.pread(cpp_file.fileno(), _MAX_PRINTED_BYTES, 0).decode(errors="replace")
                 return cpp_output + python_output.getvalue()
 
@@ -54,13 +54,13 @@ def _suppressed_output() -> Iterator[Callable[[], str]]:
 class _ThreadOutput(io.StringIO):
     """Stream that keeps the text of the thread that created it, and passes on the text of other threads.
 
-    others: stream that receives the text of other threads.
-    stdout: standard output, which receives this text once `others` is closed.
+    other_threads: stream that receives the text of other threads.
+    stdout: standard output, which receives this text once `other_threads` is closed.
     """
 
-    def __init__(self, others: TextIO, stdout: TextIO) -> None:
+    def __init__(self, other_threads: TextIO, stdout: TextIO) -> None:
         super().__init__()
-        self._thread, self._others, self._stdout = threading.get_ident(), others, stdout
+        self._thread, self._others, self._stdout = threading.get_ident(), other_threads, stdout
 
     def write(self, text: str) -> int:
         """Keep the text of this thread, and pass on the text of any other thread."""
@@ -70,7 +70,7 @@ class _ThreadOutput(io.StringIO):
             count = self._others.write(text)
             self._others.flush()
         except ValueError:
-            # A print that began while the output was suppressed, and ends after it.
+            # The print began while the output was suppressed, and ends afterwards.
             return self._stdout.write(text)
         return count
 

@@ -54,7 +54,7 @@ class Terrain:
         object.__setattr__(self, "heights", heights)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle the terrain with a function that locks the raster again."""
+        """Pickle the terrain so that its raster is locked again when it is unpickled."""
         return _rebuild_terrain, tuple(getattr(self, field.name) for field in fields(self))
 
     def height(self, east: ArrayLike, north: ArrayLike) -> Floats:
@@ -63,27 +63,29 @@ class Terrain:
         return _ground_heights(self.heights, self.to_pixel.record, es.ravel(), ns.ravel()).reshape(es.shape)
 
     def clearance(self, a: ArrayLike, b: ArrayLike) -> tuple[float, float]:
-        """Return the smallest height of the segment a-b above ground, m, and where it is.
+        """Return the smallest height of the segment a-b above ground, m, and the fraction of the segment there.
 
-        a, b: (3,) m.
+        a, b: ends of the segment, (3,) m.
 
-        The place is a fraction of the segment. The height is exact for the bilinearly interpolated ground, and NaN if
-        the segment leaves the raster or its data.
+        The height is exact for the bilinearly interpolated ground, and NaN if the segment leaves the raster or its
+        data.
         """
         start, end = np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64)
         clearance, fraction = segment_clearance(self.heights, self.to_pixel.record, start, end)
         return float(clearance), float(fraction)
 
 
-def _rebuild_terrain(heights: Heights, *others: Any) -> Terrain:
-    """Make a terrain from pickled heights, which are locked again, and the other fields."""
+def _rebuild_terrain(heights: Heights, *other_fields: Any) -> Terrain:
+    """Make a terrain from unpickled heights, which are locked again, and its other fields in order."""
     heights.setflags(write=False)
-    return Terrain(heights, *others)
+    return Terrain(heights, *other_fields)
 
 
 @inlined
 def pixel_height(heights: Heights, col: float, row: float) -> float:
     """Return the bilinearly interpolated height at fractional pixel coordinates, m; NaN off the raster.
+
+    heights: m at the pixel centres, (rows, columns).
 
     The raster extends `EDGE_TOLERANCE` beyond the outer pixel centres.
     """
@@ -108,12 +110,13 @@ def pixel_height(heights: Heights, col: float, row: float) -> float:
 
 @compiled
 def steepest_slopes(heights: Heights, spacing: float) -> Heights:
-    """Return an upper bound on the slope of the interpolated ground in each tile, m per m.
+    """Return an upper bound on the slope of the ground in each tile of a raster, m per m, (tile rows, tile columns).
 
+    heights: m at the pixels, (rows, columns); NaN without data.
     spacing: distance between pixels, m.
 
-    The ground is interpolated bilinearly. A tile has `TILE_PIXELS` x `TILE_PIXELS` pixel cells. Pixels without data
-    (NaN) are ignored.
+    The ground is interpolated bilinearly. A tile has `TILE_PIXELS` x `TILE_PIXELS` pixel cells. Pixels without data are
+    ignored.
     """
     rows, cols = heights.shape
     tiles = np.zeros(((rows - 2) // TILE_PIXELS + 1, (cols - 2) // TILE_PIXELS + 1), dtype=np.float32)
@@ -152,10 +155,12 @@ def _ground_heights(
 
 @compiled
 def segment_clearance(heights: Heights, to_pixel: PolyMapRecord, a: Floats, b: Floats) -> tuple[float, float]:
-    """Return the smallest height of the segment a-b above ground, m, and where it is.
+    """Return the smallest height of the segment a-b above ground, m, and the fraction of the segment there.
 
-    The place is a fraction of the segment. The ground is interpolated bilinearly. The height is NaN if the segment
-    leaves the raster.
+    heights, to_pixel: heights of the terrain, and the map from positions to its pixels.
+    a, b: ends of the segment, (3,) m.
+
+    The ground is interpolated bilinearly. The height is NaN if the segment leaves the raster.
     """
     col, row = polymap(to_pixel, a[0], a[1])
     clearance, fraction, _, _ = _clearance_from_pixel(heights, to_pixel, a, b, col, row)
@@ -164,7 +169,7 @@ def segment_clearance(heights: Heights, to_pixel: PolyMapRecord, a: Floats, b: F
 
 @inner
 def path_clearances(heights: Heights, to_pixel: PolyMapRecord, points: Floats) -> tuple[Floats, Floats]:
-    """Return the smallest height above ground of each segment of a path, m, and where it is, (n - 1,) each.
+    """Return the smallest height of each segment of a path above ground, m, and the fraction there, (n - 1,) each.
 
     points: ends of the segments, m, (n, 3).
 
@@ -188,10 +193,12 @@ def path_clearances(heights: Heights, to_pixel: PolyMapRecord, points: Floats) -
 def _clearance_from_pixel(
     heights: Heights, to_pixel: PolyMapRecord, a: Floats, b: Floats, start_col: float, start_row: float
 ) -> tuple[float, float, float, float]:
-    """Return the results of `segment_clearance` and the pixel coordinates of the segment's end.
+    """Return the results of `segment_clearance`, and the pixel coordinates (column, row) of the segment's end.
 
+    a, b: ends of the segment, (3,) m.
     start_col, start_row: pixel coordinates of `a`.
-    The end's column is NaN if the segment leaves the raster.
+
+    The column of the end is NaN if the segment leaves the raster.
     """
     piece_count = max(1, math.ceil(math.hypot(b[0] - a[0], b[1] - a[1]) / STRAIGHT_PIECE_M))
     min_clearance = math.inf
@@ -227,11 +234,12 @@ def _next_crossing(start: float, step: float, fraction: float) -> float:
 def _piece_clearance(
     heights: Heights, col0: float, row0: float, up0: float, col1: float, row1: float, up1: float
 ) -> tuple[float, float]:
-    """Return the smallest height above ground on a straight piece in pixel coordinates, m, and where it is.
+    """Return the smallest height above ground on a straight piece of a segment, m, and the fraction of the piece there.
 
-    col, row, up: coordinates of the two ends.
-    The place is a fraction of the piece. The height is NaN if the piece leaves the data. Within a pixel cell the
-    height above the bilinearly interpolated ground is a parabola.
+    col0, row0, up0, col1, row1, up1: ends of the piece, in fractional pixels and m AMSL.
+
+    The height is NaN if the piece leaves the data. Within a pixel cell the height above the bilinearly interpolated
+    ground is a parabola.
     """
     delta_col, delta_row, delta_up = col1 - col0, row1 - row0, up1 - up0
     start_fraction = 0.0
@@ -286,10 +294,11 @@ def make_gridded_terrain(
 
     heights: (n, e) m.
     east, north: (e,) and (n,) m, evenly increasing.
+    source, sha256, datum: as in `Terrain`.
     """
     step_e, step_n = east[1] - east[0], north[1] - north[0]
     to_pixel = fit_polymap(
-        lambda e, n: ((e - east[0]) / step_e, (n - north[0]) / step_n),
+        lambda grid_east, grid_north: ((grid_east - east[0]) / step_e, (grid_north - north[0]) / step_n),
         [[east[0], east[-1]], [north[0], north[-1]]],
         1e-9,
     )
@@ -299,7 +308,7 @@ def make_gridded_terrain(
 def make_flat_terrain(bounds: Floats, amsl: float, buffer: float) -> Terrain:
     """Make level ground at an altitude (m AMSL).
 
-    bounds: [[e0, e1], [n0, n1]] m.
+    bounds: [[west, east], [south, north]] m.
     buffer: width of terrain around the bounds, m.
     """
     east = np.linspace(bounds[0, 0] - buffer, bounds[0, 1] + buffer, 3)
@@ -321,7 +330,7 @@ class Peak(NamedTuple):
 def make_peaks_terrain(bounds: Floats, peaks: Sequence[Peak], buffer: float) -> Terrain:
     """Make terrain of Gaussian hills on level ground at sea level.
 
-    bounds: [[e0, e1], [n0, n1]] m.
+    bounds: [[west, east], [south, north]] m.
     buffer: width of terrain around the bounds, m.
 
     The grid spacing is a sixteenth of the smallest sigma, with at most 1,500 pixels a side. This keeps each summit

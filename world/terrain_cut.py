@@ -75,7 +75,10 @@ class CutTerrain(NamedTuple):
 
 
 def cut_from_files(source: Path, box: Box, out: Path) -> CutTerrain:
-    """Write the part of local tiles that covers an area as one file.
+    """Write the part of local elevation files that covers an area as one GeoTIFF.
+
+    source: a folder of tiles, a file or a virtual raster.
+    out: path of the GeoTIFF.
 
     The file has the reference system and the grid of the tiles. Raises TerrainError if the tiles do not reach beyond
     the area, have no data in it, or cannot be read.
@@ -114,14 +117,17 @@ def _box_outline(box: Box) -> tuple[Floats, Floats]:
 
 
 def _count_empty(heights: Heights) -> int:
-    """Return the number of heights without data."""
+    """Return the number of heights that are missing: NaN, or a value that marks missing data."""
     return int(heights.size - is_ground(heights).sum())
 
 
 def _write_geotiff(out: Path, heights: Heights, grid: Sequence[float], crs: str) -> None:
-    """Write a GeoTIFF atomically.
+    """Write heights as a GeoTIFF, completely or not at all.
 
     grid: affine coefficients that convert columns and rows to coordinates.
+    crs: reference system of these coordinates.
+
+    Raises TerrainError for too many heights, or if all are missing.
     """
     if heights.size > MAX_PIXELS:
         message = f"{heights.size:,} pixels; at most {MAX_PIXELS:,} are written"
@@ -212,8 +218,10 @@ def cut_from_server(server: str, box: Box, out: Path, cache: Path, progress: Cut
 def _fetch_tile(remote: RemoteFile, box: Box, count_bytes: Callable[[int], None]) -> RasterFile:
     """Fetch the blocks of a tile that cover an area, and open the local copy of the tile.
 
-    Raises TerrainError. If the copy cannot be read, for example after a power cut or because of a proxy, the tile is
-    fetched once more.
+    count_bytes: function that is called with the number of bytes of each chunk that arrives.
+
+    If the copy cannot be read, for example after a power cut or because of a proxy, the tile is fetched once more.
+    Raises TerrainError if it cannot be read then, or if it cannot be fetched.
     """
     for is_last in (not remote.parts, True):
         try:
@@ -241,8 +249,8 @@ def _open_copy(remote: RemoteFile, count_bytes: Callable[[int], None], sizes: Se
 
     sizes: numbers of bytes to fetch from the start of the file, tried in turn.
 
-    Raises TerrainError and _UnreadableError. The directory of a file that is not cloud-optimised may be longer, or at
-    the end of the file.
+    The directory of a file that is not cloud-optimised may be longer, or at the end of the file. Raises TerrainError if
+    the bytes cannot be fetched, and _UnreadableError if the file cannot be opened.
     """
     for size in sizes:
         remote.fetch(0, size, count_bytes)
@@ -263,7 +271,10 @@ def _open_copy(remote: RemoteFile, count_bytes: Callable[[int], None], sizes: Se
 
 
 def _padded_window(tile: RasterFile, box: Box) -> tuple[int, int, int, int]:
-    """Return the window of a tile that covers an area, with a margin for interpolation to another grid."""
+    """Return the window of a tile that covers an area, with a margin for interpolation to another grid.
+
+    The window is first row, end row, first column, end column, limited to the tile.
+    """
     col, row = tile.to_pixels(*_box_outline(box))
     rows, cols = tile.shape
     ends = (
@@ -296,9 +307,9 @@ class _PlacedTile(NamedTuple):
 
 
 def _georeference_tile(tile: RasterFile, degree: tuple[int, int], box: Box) -> _PlacedTile:
-    """Return the grid of a one-degree tile, with longitudes that match the longitudes of an area.
+    """Return a one-degree tile with its grid of latitude and longitude, checked against its degree.
 
-    Longitudes are shifted by multiples of 360 degrees.
+    The longitude is shifted by a multiple of 360 degrees to match the longitudes of the area.
 
     degree: latitude and longitude of the tile's south-west corner.
 
@@ -323,7 +334,7 @@ def _georeference_tile(tile: RasterFile, degree: tuple[int, int], box: Box) -> _
 
 
 def _merge_tiles(tiles: list[_PlacedTile], box: Box) -> tuple[Heights, tuple[float, ...]]:
-    """Return the heights of an area on the grid of the finest tile, and this grid.
+    """Return the heights of an area on the grid of the finest tile, and the affine coefficients of this grid.
 
     Heights are NaN where there is no tile.
     """
@@ -346,15 +357,19 @@ def _merge_tiles(tiles: list[_PlacedTile], box: Box) -> tuple[Heights, tuple[flo
 
 
 def _fill_from_tile(heights: Heights, lat: Floats, lon: Floats, tile: _PlacedTile) -> None:
-    """Fill the empty points of a grid of latitudes and longitudes from a tile, by interpolation."""
+    """Fill the empty points of a grid from a tile, by interpolation, in place.
+
+    heights: heights of the grid, m, (rows, columns); NaN where they are missing.
+    lat, lon: latitudes of its rows and longitudes of its columns, deg.
+    """
     rows, cols = tile.raster.shape
     col, row = (lon - tile.west) / tile.dx - 0.5, (tile.north - lat) / tile.dy - 0.5
-    # A tile of another pitch reaches half of its own pixel beyond the centres of its outermost pixels.
+    # A tile covers half a pixel beyond the centres of its outermost pixels.
     columns = np.flatnonzero((col > -0.5) & (col < cols - 0.5))
     rows_covered = np.flatnonzero((row > -0.5) & (row < rows - 0.5))
     if not columns.size or not rows_covered.size:
         return
-    # Snap to the tile's own grid: heights there stay unchanged, and need no neighbouring pixel.
+    # Snap positions to pixels that are nearly there: their heights stay unchanged, and need no neighbouring pixel.
     col, row = (
         np.where(np.abs(position - np.round(position)) < _PIXEL_TOLERANCE, np.round(position), position)
         for position in (np.clip(col[columns], 0.0, cols - 1.0), np.clip(row[rows_covered], 0.0, rows - 1.0))
@@ -384,9 +399,10 @@ def _interpolate(tile_heights: Heights, row: Floats, col: Floats) -> Heights:
 
 
 def _fill_sea(heights: Heights, grid: Sequence[float], sea_degrees: Sequence[tuple[int, int]]) -> None:
-    """Set missing heights to 0 m in the one-degree squares that are sea.
+    """Set missing heights to 0 m, in place, in the one-degree squares that are sea.
 
-    sea_degrees: south-west corners of these squares.
+    grid: affine coefficients that convert columns and rows to longitude and latitude.
+    sea_degrees: latitude and longitude of the south-west corners of these squares.
     """
     dx, _, west, _, dy, north = grid
     lon, lat = west + (np.arange(heights.shape[1]) + 0.5) * dx, north + (np.arange(len(heights)) + 0.5) * dy

@@ -20,6 +20,9 @@ W20 = {"none": 0.0, "light": 7.7, "moderate": 15.4}
 def mean_wind_speed(speed: float, gradient: float, reference_amsl: float, amsl: float) -> float:
     """Return the mean wind speed (m/s) at an altitude (m AMSL).
 
+    speed: wind speed at the altitude ``reference_amsl``, m/s.
+    gradient: 1/s.
+
     The speed is linear in altitude, but never below 0.
     """
     return max(0.0, speed + gradient * (amsl - reference_amsl))
@@ -27,7 +30,7 @@ def mean_wind_speed(speed: float, gradient: float, reference_amsl: float, amsl: 
 
 @compiled
 def _mean_wind_speeds(speed: float, gradient: float, reference_amsl: float, amsl: Floats) -> Floats:
-    """Return the mean wind speed at n altitudes, m/s, (n,)."""
+    """Return the mean wind speed at n altitudes, m/s, (n,); arguments as for `mean_wind_speed`."""
     speeds = np.empty(amsl.size)
     for k in range(amsl.size):
         speeds[k] = mean_wind_speed(speed, gradient, reference_amsl, amsl[k])

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 
 def count_text(count: int, noun: str) -> str:
-    """Return a number with its noun.
+    """Return a count with its noun in the singular or plural.
 
     >>> count_text(1, "threat"), count_text(2, "threat"), count_text(1200, "row")
     ('1 threat', '2 threats', '1,200 rows')
@@ -32,9 +32,10 @@ def is_one_edit(first: str, second: str) -> bool:
     """
     for _ in range(2):
         start = next(
-            (k for k, (a, b) in enumerate(zip(first, second, strict=False)) if a != b), min(len(first), len(second))
+            (k for k, letters in enumerate(zip(first, second, strict=False)) if letters[0] != letters[1]),
+            min(len(first), len(second)),
         )
-        # What is left differs at its beginning; reversed, at its end.
+        # Remove the common beginning, and reverse the words, so that the second pass removes the common end.
         first, second = first[start:][::-1], second[start:][::-1]
     if not (first + second).replace("_", "").isalpha():
         return False

@@ -30,7 +30,10 @@ _THINNING = 25
 
 
 def with_airspeed_scale(signals: Signals, flow: Flow) -> Signals:
-    """Scale the airspeed to fit the wind triangle; return the signals, the scale and its standard deviation."""
+    """Return the signals with the airspeed scaled to fit the wind triangle.
+
+    The fields ``airspeed_factor`` and ``airspeed_sd`` state the scale and its standard deviation.
+    """
     factor, sd = airspeed_scale(signals, flow)
     return replace(signals, airspeed=signals.airspeed * factor, airspeed_factor=factor, airspeed_sd=sd)
 
@@ -43,43 +46,43 @@ def airspeed_scale(signals: Signals, flow: Flow) -> tuple[float, float]:
     from scipy.signal import lfilter
 
     north_air, east_air = _air_velocity(signals, flow)
-    thinned = signals.thin(_THINNING, {"north_air": north_air, "east_air": east_air})
-    north_air, east_air = thinned.extra["north_air"], thinned.extra["east_air"]
-    north, east, _ = thinned.velocity.T
-    row_ranges = list(zip(thinned.edges[:-1], thinned.edges[1:], strict=True))
+    thin_signals = signals.thin(_THINNING, {"north_air": north_air, "east_air": east_air})
+    north_air, east_air = thin_signals.extra["north_air"], thin_signals.extra["east_air"]
+    north, east, _ = thin_signals.velocity.T
+    row_ranges = list(zip(thin_signals.edges[:-1], thin_signals.edges[1:], strict=True))
     # Wind is ground velocity minus air velocity; an error of the heading rotates the air velocity. A gust changes the
     # wind, the airspeed and the direction of the air velocity, and after a while the ground velocity, since the
     # aircraft drifts with the gust: a regressor that contains the gust would bias the scale. The regressor is therefore
     # the mean airspeed along the flown course, smoothed over the time in which gusts change.
     mean_air = np.empty((2, len(north_air)))
-    for first, last in row_ranges:
-        rows = slice(first, last)
+    for start_row, end_row in row_ranges:
+        rows = slice(start_row, end_row)
         ground, air = np.column_stack([north[rows], east[rows]]), np.column_stack([north_air[rows], east_air[rows]])
-        course = low_pass(ground - (ground - air).mean(axis=0), 1.0 / _GUST_TIME_S, thinned.hertz)
+        course = low_pass(ground - (ground - air).mean(axis=0), 1.0 / _GUST_TIME_S, thin_signals.hertz)
         length = np.maximum(1.0, np.hypot(*course.T))
-        mean_air[:, rows] = (thinned.airspeed[rows].mean() / length)[np.newaxis, :] * course.T
+        mean_air[:, rows] = (thin_signals.airspeed[rows].mean() / length)[np.newaxis, :] * course.T
     columns = [(mean_air[0], mean_air[1]), (-mean_air[1], mean_air[0])]
-    for first, last in row_ranges:
+    for start_row, end_row in row_ranges:
         indicator = np.zeros(len(north_air))
-        indicator[first:last] = 1.0
+        indicator[start_row:end_row] = 1.0
         columns += [(indicator, 0.0 * indicator), (0.0 * indicator, indicator)]
-    decay = float(np.exp(-1.0 / (_GUST_TIME_S * thinned.hertz)))
+    decay = float(np.exp(-1.0 / (_GUST_TIME_S * thin_signals.hertz)))
 
-    def innovations(values: Floats) -> Floats:
-        """Whiten values (n,) for the correlation time `_GUST_TIME_S`, each record separately."""
+    def whiten(values: Floats) -> Floats:
+        """Remove the autocorrelation of gusts (`_GUST_TIME_S`) from values (n,), in each record separately."""
         filtered = np.empty_like(values)
-        for first, last in row_ranges:
-            record_values = values[first:last]
-            filtered[first:last] = lfilter(
+        for start_row, end_row in row_ranges:
+            record_values = values[start_row:end_row]
+            filtered[start_row:end_row] = lfilter(
                 [1.0, -decay], [1.0], record_values, zi=np.array([-decay * record_values[0]])
             )[0]
-            filtered[first] = record_values[0] * np.sqrt(1.0 - decay * decay)
+            filtered[start_row] = record_values[0] * np.sqrt(1.0 - decay * decay)
         return filtered
 
-    regressors = np.column_stack([np.concatenate([innovations(a), innovations(b)]) for a, b in columns])
-    targets = np.concatenate([innovations(north - north_air), innovations(east - east_air)])
+    regressors = np.column_stack([np.concatenate([whiten(a), whiten(b)]) for a, b in columns])
+    targets = np.concatenate([whiten(north - north_air), whiten(east - east_air)])
     sds = np.concatenate([[SCALE_SD, _HEADING_SD_RAD], np.full(2 * len(row_ranges), _WIND_SD_MPS)])
-    blocks = np.concatenate([thinned.block, thinned.block + thinned.block.max() + 1])
+    blocks = np.concatenate([thin_signals.block, thin_signals.block + thin_signals.block.max() + 1])
     fit = fit_with_prior(regressors, targets, np.zeros(len(sds)), sds, blocks)
     return 1.0 + float(fit.estimate[0]), float(np.hypot(_MIN_SD, np.sqrt(fit.covariance[0, 0])))
 
@@ -90,7 +93,8 @@ def _air_velocity(signals: Signals, flow: Flow) -> tuple[Floats, Floats]:
     u = signals.airspeed * np.cos(flow.alpha) * np.cos(flow.beta)
     v = signals.airspeed * np.sin(flow.beta)
     w = signals.airspeed * np.sin(flow.alpha) * np.cos(flow.beta)
-    below = v * np.sin(roll) + w * np.cos(roll)
-    across = v * np.cos(roll) - w * np.sin(roll)
-    along = u * np.cos(pitch) + below * np.sin(pitch)
-    return along * np.cos(yaw) - across * np.sin(yaw), along * np.sin(yaw) + across * np.cos(yaw)
+    # Components with wings level, then with wings and nose level.
+    wings_level_down = v * np.sin(roll) + w * np.cos(roll)
+    right = v * np.cos(roll) - w * np.sin(roll)
+    forward = u * np.cos(pitch) + wings_level_down * np.sin(pitch)
+    return forward * np.cos(yaw) - right * np.sin(yaw), forward * np.sin(yaw) + right * np.cos(yaw)

@@ -78,8 +78,8 @@ class Signals:
         cutoff: Hz.
         """
         smoothed = np.empty_like(values)
-        for first, last in zip(self.edges[:-1], self.edges[1:], strict=True):
-            smoothed[first:last] = low_pass(values[first:last], cutoff, self.hertz)
+        for start_row, end_row in zip(self.edges[:-1], self.edges[1:], strict=True):
+            smoothed[start_row:end_row] = low_pass(values[start_row:end_row], cutoff, self.hertz)
         return smoothed
 
     def thin(self, step: int, extra: Mapping[str, Floats]) -> "Signals":
@@ -90,23 +90,23 @@ class Signals:
         edges, blocks, pieces = [0], [], []
         columns = {name: getattr(self, name) for name in _SAMPLED_FIELDS} | dict(extra)
         all_columns = np.column_stack(list(columns.values()))
-        for first, last in zip(self.edges[:-1], self.edges[1:], strict=True):
-            pieces.append(low_pass(all_columns[first:last], 0.3 * self.hertz / step, self.hertz)[::step])
-            blocks.append(self.block[first:last:step])
+        for start_row, end_row in zip(self.edges[:-1], self.edges[1:], strict=True):
+            pieces.append(low_pass(all_columns[start_row:end_row], 0.3 * self.hertz / step, self.hertz)[::step])
+            blocks.append(self.block[start_row:end_row:step])
             edges.append(edges[-1] + len(blocks[-1]))
         # Split into contiguous columns again, (n,) or (n, k).
         thinned_rows, column = np.concatenate(pieces), 0
-        own_columns: dict[str, Any] = {}
+        thinned_columns: dict[str, Any] = {}
         for name, values in columns.items():
             width = 1 if values.ndim == 1 else values.shape[1]
-            own_columns[name] = np.ascontiguousarray(
+            thinned_columns[name] = np.ascontiguousarray(
                 thinned_rows[:, column] if values.ndim == 1 else thinned_rows[:, column : column + width]
             )
             column += width
-        extra_columns = {name: own_columns.pop(name) for name in extra}
+        extra_columns = {name: thinned_columns.pop(name) for name in extra}
         return replace(
             self,
-            **own_columns,
+            **thinned_columns,
             edges=tuple(edges),
             block=np.concatenate(blocks),
             hertz=self.hertz / step,
@@ -116,8 +116,8 @@ class Signals:
     def delay(self, values: Floats, delay: float) -> Floats:
         """Return values delayed by ``delay`` (s); each record is delayed on its own."""
         delayed_values = np.empty_like(values)
-        for first, last in zip(self.edges[:-1], self.edges[1:], strict=True):
-            delayed_values[first:last] = apply_delay(values[first:last], delay)
+        for start_row, end_row in zip(self.edges[:-1], self.edges[1:], strict=True):
+            delayed_values[start_row:end_row] = apply_delay(values[start_row:end_row], delay)
         return delayed_values
 
 

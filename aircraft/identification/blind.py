@@ -93,21 +93,21 @@ class Band:
     @property
     def inside(self) -> float:
         """Fraction of the known values that lie inside the band; NaN without known values."""
-        known = self._known
+        is_known = self._known
         is_inside = (self.flown >= self.low) & (self.flown <= self.high)
-        return float(is_inside[known].mean()) if known.any() else float("nan")
+        return float(is_inside[is_known].mean()) if is_known.any() else float("nan")
 
     @property
     def half_width(self) -> float:
         """Half of the width of the band, median over all values."""
-        known = self._known
-        return float(np.median(0.5 * (self.high - self.low)[known])) if known.any() else float("nan")
+        is_known = self._known
+        return float(np.median(0.5 * (self.high - self.low)[is_known])) if is_known.any() else float("nan")
 
     @property
     def known_fraction(self) -> float:
         """Fraction of the flight's known values at which the band is known, too; NaN without known values."""
-        flown = np.isfinite(self.flown)
-        return float(self._known[flown].mean()) if flown.any() else float("nan")
+        is_flown = np.isfinite(self.flown)
+        return float(self._known[is_flown].mean()) if is_flown.any() else float("nan")
 
     @property
     def is_informative(self) -> bool:
@@ -199,13 +199,13 @@ class BlindPrediction:
         blocks = generator.integers(len(self._errors), size=(len(draws), len(self._starts)))
         flights = np.stack(
             [
-                self._simulate_windows(self._judged, base, self._starts) + self._errors[chosen]
-                for base, chosen in zip(draws, blocks, strict=True)
+                self._simulate_windows(self._judged, base, self._starts) + self._errors[block_numbers]
+                for base, block_numbers in zip(draws, blocks, strict=True)
             ]
         )
         flights[:, :, :, _POWER] = np.maximum(0.0, flights[:, :, :, _POWER])
         low, high = band_limits(flights)
-        times = self._times[self._starts[:, np.newaxis] + _kept_rows(self._count)].ravel()
+        times = self._times[self._starts[:, np.newaxis] + _compared_rows(self._count)].ravel()
         bands = []
         for k, quantity in enumerate(QUANTITIES):
             unchanged = np.quantile(np.abs(self._changes[:, :, k]), COVERAGE, axis=0)
@@ -217,7 +217,7 @@ class BlindPrediction:
     def _simulate_windows(self, signals: Signals, base: BaseModel, starts: Ints) -> Floats:
         """Simulate a window from each start row (w,), with the trims of the earlier part; return (w, k, q).
 
-        The result holds the q `QUANTITIES` at the k kept samples of each window.
+        The result holds the q `QUANTITIES` at the k samples of `_compared_rows` in each window.
         """
         values = prior_means()
         trims = Predictor(self._earlier, base, values, self._filters).trims.mean(axis=0)
@@ -245,10 +245,10 @@ def _scale_airspeed(signals: Signals, factor: float) -> Signals:
     return replace(signals, airspeed=signals.airspeed * factor)
 
 
-def _kept_rows(count: int) -> Ints:
-    """Return the indices of the samples of a window that are kept.
+def _compared_rows(count: int) -> Ints:
+    """Return the indices of the samples in a window at which quantities are compared.
 
-    The measured start is not kept.
+    They are every `_THINNING_FACTOR`-th sample after the measured start of the window.
 
     count: number of samples in the window.
     """
@@ -264,14 +264,18 @@ def _window_starts(signals: Signals, count: int, step: int) -> Ints:
     settling = round(_SETTLING_TIME_S * signals.hertz)
     return np.concatenate(
         [
-            np.arange(first + settling, last - count - 1, step)
-            for first, last in zip(signals.edges[:-1], signals.edges[1:], strict=True)
+            np.arange(start_row + settling, end_row - count - 1, step)
+            for start_row, end_row in zip(signals.edges[:-1], signals.edges[1:], strict=True)
         ]
     )
 
 
 def _measured_quantities(signals: Signals, starts: Ints, count: int) -> Floats:
-    """Return the measured `QUANTITIES` in windows, (w, k, q); power is NaN for a log without current."""
+    """Return the measured `QUANTITIES` in windows, (w, k, q); power is NaN for a log without current.
+
+    starts: first row of each window, (w,).
+    count: number of samples in a window.
+    """
     rows = starts[:, np.newaxis] + np.arange(count + 1)
     return _stack_quantities(
         signals.attitude[rows, :2],
@@ -283,7 +287,7 @@ def _measured_quantities(signals: Signals, starts: Ints, count: int) -> Floats:
 
 
 def _stack_quantities(angles: Floats, airspeed: Floats, velocity: Floats, power: Floats, hertz: float) -> Floats:
-    """Return the `QUANTITIES` of windows at the samples that are kept, (w, k, q).
+    """Return the `QUANTITIES` of windows at the samples of `_compared_rows`, (w, k, q).
 
     angles: bank and pitch, rad, (w, n, 2).
     airspeed: m/s, (w, n).
@@ -294,9 +298,9 @@ def _stack_quantities(angles: Floats, airspeed: Floats, velocity: Floats, power:
     course = np.arctan2(east[:, :1], north[:, :1])
     right = east * np.cos(course) - north * np.sin(course)
     height, track = (np.cumsum(speed, axis=1) / hertz for speed in (-down, right))
-    kept = _kept_rows(angles.shape[1] - 1)
+    rows = _compared_rows(angles.shape[1] - 1)
     columns = (angles[:, :, 0], angles[:, :, 1], airspeed, -down, height - height[:, :1], track - track[:, :1], power)
-    return np.stack([column[:, kept] for column in columns], axis=2)
+    return np.stack([column[:, rows] for column in columns], axis=2)
 
 
 def _headings(states: Floats, start: Floats, step: float) -> Floats:
@@ -318,9 +322,11 @@ def _air_velocity_ned(states: Floats, heading: Floats) -> Floats:
     heading: rad, (w, n).
     """
     u, v, w, _, _, _, roll, pitch = np.moveaxis(states, 2, 0)
-    below = v * np.sin(roll) + w * np.cos(roll)
-    across = v * np.cos(roll) - w * np.sin(roll)
-    along, down = u * np.cos(pitch) + below * np.sin(pitch), below * np.cos(pitch) - u * np.sin(pitch)
-    north = along * np.cos(heading) - across * np.sin(heading)
-    east = along * np.sin(heading) + across * np.cos(heading)
+    # Components with wings level, then with wings and nose level.
+    wings_level_down = v * np.sin(roll) + w * np.cos(roll)
+    right = v * np.cos(roll) - w * np.sin(roll)
+    forward = u * np.cos(pitch) + wings_level_down * np.sin(pitch)
+    down = wings_level_down * np.cos(pitch) - u * np.sin(pitch)
+    north = forward * np.cos(heading) - right * np.sin(heading)
+    east = forward * np.sin(heading) + right * np.cos(heading)
     return np.stack([north, east, down], axis=2)

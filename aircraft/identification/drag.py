@@ -132,25 +132,25 @@ class ForwardForces:
 def fit_drag(
     signals: Signals, base: BaseModel, values: Floats, flow: Flow, uncertainty: AlphaUncertainty | None = None
 ) -> tuple[Fit, Floats, Floats]:
-    """Fit the five parameters of drag and motor; return the fit, their values (5,) and covariance (5, 5).
+    """Fit the five parameters of drag and motor; return the fit, the values (5,) and their covariance (5, 5).
 
     values: (n,) values of all parameters, of which the parameters of lift are used.
     uncertainty: uncertainty of the lift curve; None for a default.
 
-    The fit also has nuisance parameters. The nuisance parameters of the aircraft are resistance, idle current, voltage
-    and drag of the elevator. They are folded into the five values: together with the nuisance parameters of the base
-    model, the five values give nearly the same forces and currents as the fit.
+    The fit also estimates nuisance parameters, some of which belong to the aircraft: resistance, idle current, voltage
+    and drag of the elevator. The returned five values replace these as well: used with the base model's resistance,
+    idle current, voltage and elevator drag, they give nearly the same forces and currents as the fit.
     """
     forces = forward_forces(signals, base, values, flow, AlphaUncertainty() if uncertainty is None else uncertainty)
-    thinned = forces.signals
-    with_current = bool(np.isfinite(thinned.current).all())
+    thin_signals = forces.signals
+    with_current = bool(np.isfinite(thin_signals.current).all())
     means, sds = drag_priors(with_current=with_current)
     # First fit only the forces, then forces and current, because the first steps with the current would diverge.
-    fit = _fit_unknowns(forces, _Measurement(thinned, with_current=False), means, sds)
+    fit = _fit_unknowns(forces, _Measurement(thin_signals, with_current=False), means, sds)
     if with_current:
-        fit = _fit_unknowns(forces, _Measurement(thinned, with_current=True), means, sds, fit.estimate)
+        fit = _fit_unknowns(forces, _Measurement(thin_signals, with_current=True), means, sds, fit.estimate)
     force, _ = forces.predict(fit.estimate)
-    measured = thinned.smooth(thinned.acceleration[:, 0], FORCE_CUTOFF_HZ)
+    measured = thin_signals.smooth(thin_signals.acceleration[:, 0], FORCE_CUTOFF_HZ)
     explained = 1.0 - float((measured - force).var() / measured.var())
     drag_values, jacobian = _fold_nuisances(forces, fit.estimate)
     return (
@@ -174,15 +174,15 @@ def drag_priors(*, with_current: bool) -> tuple[Floats, Floats]:
 
 
 def _fold_nuisances(forces: ForwardForces, unknown: Floats) -> tuple[Floats, Floats]:
-    """Fold the aircraft's nuisance parameters into the five parameters, by least squares.
+    """Change the five parameters so that they replace the aircraft's fitted nuisance parameters, by least squares.
 
     unknown: (p,) fitted values of the unknowns.
 
     The differences of force and current over the signals are minimised. Returns the values of the parameters (5,), and
     their derivatives with respect to the unknowns, (5, p).
     """
-    own_count = int(_IS_DRAG_PARAMETER.sum())
-    folded = own_count + np.flatnonzero(_IS_OF_AIRCRAFT)
+    parameter_count = int(_IS_DRAG_PARAMETER.sum())
+    nuisance_indices = parameter_count + np.flatnonzero(_IS_OF_AIRCRAFT)
     scale = FORCE_FLOOR / _CURRENT_FLOOR_A
 
     def stack_force_and_current(force: Floats, current: Floats) -> Floats:
@@ -191,19 +191,25 @@ def _fold_nuisances(forces: ForwardForces, unknown: Floats) -> tuple[Floats, Flo
 
     target = stack_force_and_current(*forces.predict(unknown))
     folded_unknown = unknown.copy()
-    folded_unknown[folded] = 0.0
+    folded_unknown[nuisance_indices] = 0.0
     for _ in range(_MAX_FOLDING_STEPS):
         columns = stack_force_and_current(*forces.slopes(folded_unknown))
         residual = target - stack_force_and_current(*forces.predict(folded_unknown))
-        folded_unknown[:own_count] += np.linalg.lstsq(columns[:, :own_count], residual, rcond=None)[0]
-    jacobian = np.zeros((own_count, len(unknown)))
-    jacobian[:, :own_count] = np.eye(own_count)
-    jacobian[:, folded] = np.linalg.lstsq(columns[:, :own_count], columns[:, folded], rcond=None)[0]
-    return folded_unknown[:own_count], jacobian
+        folded_unknown[:parameter_count] += np.linalg.lstsq(columns[:, :parameter_count], residual, rcond=None)[0]
+    jacobian = np.zeros((parameter_count, len(unknown)))
+    jacobian[:, :parameter_count] = np.eye(parameter_count)
+    jacobian[:, nuisance_indices] = np.linalg.lstsq(
+        columns[:, :parameter_count], columns[:, nuisance_indices], rcond=None
+    )[0]
+    return folded_unknown[:parameter_count], jacobian
 
 
 class _Measurement:
-    """Measured forward acceleration and, with the current, the current, (n,), low-passed."""
+    """Low-passed forward acceleration (m/s^2) and battery current (A) of a log, (n,); no current on request.
+
+    block: (n,) time block of each row.
+    floor: lower bound on the residual variance; see `aircraft.identification.regression.fit_with_prior`.
+    """
 
     def __init__(self, signals: Signals, *, with_current: bool) -> None:
         self.force = signals.smooth(signals.acceleration[:, 0], FORCE_CUTOFF_HZ)
@@ -248,19 +254,19 @@ def forward_forces(
     values, uncertainty: see `fit_drag`.
     """
     coefficients, (slope, zero) = base.coefficients, lift_curve(base, values)
-    thinned = signals.thin(FORCE_THINNING, {"alpha": flow.alpha})
-    alpha, pressure = thinned.extra["alpha"], dynamic_force(thinned, base)
+    thin_signals = signals.thin(FORCE_THINNING, {"alpha": flow.alpha})
+    alpha, pressure = thin_signals.extra["alpha"], dynamic_force(thin_signals, base)
     lift = slope * alpha + zero
     forward_pressure, lift_excess = -pressure * np.cos(alpha), lift - coefficients.lift_least_drag
     tilt = pressure * lift * np.cos(alpha)
     return ForwardForces(
-        signals=thinned,
+        signals=thin_signals,
         base=base,
-        known=pressure * (lift + rate_and_elevator_lift(thinned, base)) * np.sin(alpha),
+        known=pressure * (lift + rate_and_elevator_lift(thin_signals, base)) * np.sin(alpha),
         tilts=tilt
         * np.vstack([np.full(len(alpha), uncertainty.angle), uncertainty.by_lift * (lift - uncertainty.mean_lift)]),
         drags=forward_pressure
         * np.vstack([np.full(len(alpha), coefficients.drag_zero), coefficients.drag_induced * np.square(lift_excess)]),
-        elevator=forward_pressure * coefficients.drag_elevator * thinned.surfaces[:, 0],
-        volts=battery_voltage(thinned, base),
+        elevator=forward_pressure * coefficients.drag_elevator * thin_signals.surfaces[:, 0],
+        volts=battery_voltage(thin_signals, base),
     )

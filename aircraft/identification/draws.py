@@ -30,8 +30,8 @@ def draw_aircraft(estimate: Estimate, count: int = COUNT, seed: int = SEED) -> F
         estimate.values, estimate.covariance, _DRAWS_PER_AIRCRAFT * count, method="eigh"
     )
     within_bounds = samples[((samples >= lower) & (samples <= upper)).all(axis=1)]
-    chosen = np.concatenate([within_bounds, np.clip(samples, lower, upper)])[:count]
-    return np.asarray(chosen)
+    returned_samples = np.concatenate([within_bounds, np.clip(samples, lower, upper)])[:count]
+    return np.asarray(returned_samples)
 
 
 def draw_drive_power(estimate: Estimate, count: int = COUNT, seed: int = SEED) -> Floats:

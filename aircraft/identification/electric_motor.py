@@ -65,13 +65,15 @@ class ElectricMotor:
 
         throttle: 0..1.
         voltage: battery voltage, V.
+        airspeed: m/s, (n,).
+        density: kg/m^3, (n,).
         """
         q2, q1, q0 = self._torque_coefficients(airspeed, density)
         kv = self.back_voltage
-        driving = kv * voltage * throttle / self.resistance
-        driven = _larger_roots(q2, q1 + kv * kv / self.resistance, q0 - driving + kv * self.idle_current)
-        windmill = _larger_roots(q2, q1, q0 + kv * self.idle_current)
-        return np.maximum(0.0, np.maximum(driven, windmill))
+        motor_torque = kv * voltage * throttle / self.resistance
+        driven_speed = _larger_roots(q2, q1 + kv * kv / self.resistance, q0 - motor_torque + kv * self.idle_current)
+        windmill_speed = _larger_roots(q2, q1, q0 + kv * self.idle_current)
+        return np.maximum(0.0, np.maximum(driven_speed, windmill_speed))
 
     def thrust_and_current(
         self, airspeed: Floats, throttle: Floats, density: Floats, voltage: Floats | float | None = None

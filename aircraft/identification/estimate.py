@@ -103,13 +103,13 @@ class Estimate:
     def uninformed_lines(self) -> tuple[str, ...]:
         """Return a line for each parameter that the logs hardly determine.
 
-        These are the parameters whose `log_fractions` are below `MIN_LOG_FRACTION`. Each line names a maneuver that
-        would determine the parameter.
+        These are the parameters whose `log_fractions` are below `MIN_LOG_FRACTION`. Each line names a maneuver or a
+        measurement that would determine the parameter.
         """
         fractions = self.log_fractions().tolist()
         return tuple(
             f"{parameter.title}: the logs hardly determine it, so its assumed interval remains; to"
-            f" determine it, fly {parameter.show}"
+            f" determine it, record {parameter.show}"
             for parameter, fraction in zip(PARAMETERS, fractions, strict=True)
             if fraction < MIN_LOG_FRACTION
         )
@@ -126,26 +126,26 @@ def estimate_model(records: Sequence[FlightRecord], base: BaseModel, *, dynamics
     """
     default_clocks = Clocks(servo_lag=base.servo_lag)
     clocks = estimate_clocks(records, base) if dynamics else tuple(default_clocks for _ in records)
-    signals = aligned_signals(records, clocks, base)
+    signals = make_aligned_signals(records, clocks, base)
     nominal = fit_parameters(signals, base, dynamics=dynamics)
     shifts = {}
-    for fixed in FIXED_PARAMETERS:
-        if fixed.applies(with_current=nominal.with_current):
-            shifted_signals, shifted_base = fixed.change(signals, base)
+    for fixed_parameter in FIXED_PARAMETERS:
+        if fixed_parameter.applies(with_current=nominal.with_current):
+            shifted_signals, shifted_base = fixed_parameter.change(signals, base)
             shifted_estimate = fit_parameters(
                 shifted_signals,
                 shifted_base,
-                level=fixed.tilt(shifted_signals),
+                level=fixed_parameter.tilt(shifted_signals),
                 dynamics=dynamics,
                 nominal=nominal.refinement,
             )
-            shifts[fixed.name] = shifted_estimate.values - nominal.values
+            shifts[fixed_parameter.name] = shifted_estimate.values - nominal.values
     shifts |= _lift_shifts(signals, base, nominal)
     if nominal.refinement is not None:
         for name, horizons in OTHER_HORIZONS_S.items():
-            other = refine_moments(signals, base, nominal.values, horizons, steps=2)
+            other_refinement = refine_moments(signals, base, nominal.values, horizons, steps=2)
             shifts[name] = np.zeros(len(PARAMETERS))
-            shifts[name][IS_MOMENT] = other.values - nominal.refinement.values
+            shifts[name][IS_MOMENT] = other_refinement.values - nominal.refinement.values
     # Noise in a regressor reduces its fitted slope. Doubling the noise shows this effect, which is then subtracted: the
     # linear extrapolation of Cook and Stefanski 1994.
     noise_bias = np.where(IS_MOMENT, shifts[ACCELEROMETER_NOISE], 0.0)
@@ -181,7 +181,7 @@ def combine_with_prior(values: Floats, covariance: Floats) -> tuple[Floats, Floa
     return prior_means() + weight * (values - prior_means()), combined
 
 
-def aligned_signals(records: Sequence[FlightRecord], clocks: Sequence[Clocks], base: BaseModel) -> Signals:
+def make_aligned_signals(records: Sequence[FlightRecord], clocks: Sequence[Clocks], base: BaseModel) -> Signals:
     """Return the aligned signals of all records, without sensor biases and with a scaled airspeed."""
     signals = remove_sensor_biases(align(records, clocks, base.motor_lag))
     return with_airspeed_scale(signals, flow_from_forces(signals, base, prior_means()))
@@ -206,9 +206,9 @@ def total_covariance(fitted: Floats, shifts: Mapping[str, Floats]) -> Floats:
 
     For lift and drag, a variance is limited to the variance of the prior.
 
-    >>> side = np.zeros(len(PARAMETERS))
-    >>> side[0] = 0.04
-    >>> total = total_covariance(np.diag(np.full(len(PARAMETERS), 0.03**2)), {"anything": side})
+    >>> shift = np.zeros(len(PARAMETERS))
+    >>> shift[0] = 0.04
+    >>> total = total_covariance(np.diag(np.full(len(PARAMETERS), 0.03**2)), {"clock of the servos": shift})
     >>> round(float(np.sqrt(total[0, 0])), 6), round(float(np.sqrt(total[1, 1])), 6)
     (0.05, 0.03)
     """

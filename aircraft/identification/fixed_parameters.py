@@ -53,7 +53,10 @@ def _move_one_sd(value: float, relative_sd: float, min_sd: float) -> float:
 
 
 def _coefficient_change(name: str, relative_sd: float, min_sd: float = 0.0) -> Callable[[Signals, BaseModel], Changed]:
-    """Return a function that changes a coefficient by one standard deviation, as `_move_one_sd` does."""
+    """Return a function that changes a coefficient by one standard deviation, as `_move_one_sd` does.
+
+    name: name of the coefficient in `aircraft.identification.base_model.Coefficients`.
+    """
 
     def change(signals: Signals, base: BaseModel) -> Changed:
         """Return the signals, and the model with the changed coefficient."""
@@ -139,9 +142,9 @@ def _servo_lag_trade(seconds: float) -> Callable[[Signals, BaseModel], Changed]:
     def change(signals: Signals, base: BaseModel) -> Changed:
         """Return the signals with the changed lag and delay of the surfaces, and the model."""
         surfaces = np.empty_like(signals.surfaces)
-        for first, last in zip(signals.edges[:-1], signals.edges[1:], strict=True):
-            commands = invert_first_order_lag(signals.surfaces[first:last], base.servo_lag, signals.hertz)
-            surfaces[first:last] = apply_delay(apply_lag(commands, base.servo_lag + seconds), -seconds)
+        for start_row, end_row in zip(signals.edges[:-1], signals.edges[1:], strict=True):
+            commands = invert_first_order_lag(signals.surfaces[start_row:end_row], base.servo_lag, signals.hertz)
+            surfaces[start_row:end_row] = apply_delay(apply_lag(commands, base.servo_lag + seconds), -seconds)
         return replace(signals, surfaces=surfaces), base
 
     return change

@@ -55,7 +55,7 @@ class FlightRecord:
         begin = max(0, (len(self.time) - rows) // 2)
         return self.rows(slice(begin, begin + rows))
 
-    def between(self, start: float, end: float) -> "FlightRecord":
+    def part_between(self, start: float, end: float) -> "FlightRecord":
         """Return the part of the record from a start time up to an end time (excluded), s."""
         begin_row, end_row = np.searchsorted(self.time, [start, end]).tolist()
         return self.rows(slice(begin_row, end_row))

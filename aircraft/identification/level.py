@@ -33,8 +33,8 @@ def forward_excess(signals: Signals) -> list[float]:
     accelerometer. Both would be mistaken for drag.
     """
     excesses = []
-    for first, last in zip(signals.edges[:-1], signals.edges[1:], strict=True):
-        rows = slice(first, last)
+    for start_row, end_row in zip(signals.edges[:-1], signals.edges[1:], strict=True):
+        rows = slice(start_row, end_row)
         roll, pitch, yaw = signals.attitude[rows].T
         x, y, z = signals.acceleration[rows].T
         # Horizontal acceleration along the nose's heading.
@@ -52,11 +52,11 @@ def gyro_and_lateral_biases(signals: Signals) -> Floats:
     The columns are p, q and r (rad/s) and the acceleration to the right (m/s^2).
     """
     biases = []
-    for first, last in zip(signals.edges[:-1], signals.edges[1:], strict=True):
-        rows = slice(first, last)
+    for start_row, end_row in zip(signals.edges[:-1], signals.edges[1:], strict=True):
+        rows = slice(start_row, end_row)
         roll, pitch, yaw = signals.attitude[rows].T
         roll_change, pitch_change, yaw_change = np.gradient(signals.attitude[rows], 1.0 / signals.hertz, axis=0).T
-        turning = np.column_stack(
+        turn_rates = np.column_stack(
             [
                 roll_change - yaw_change * np.sin(pitch),
                 pitch_change * np.cos(roll) + yaw_change * np.sin(roll) * np.cos(pitch),
@@ -64,10 +64,10 @@ def gyro_and_lateral_biases(signals: Signals) -> Floats:
             ]
         )
         north, east, down = np.gradient(signals.velocity[rows], 1.0 / signals.hertz, axis=0).T
-        ahead, across = north * np.cos(yaw) + east * np.sin(yaw), east * np.cos(yaw) - north * np.sin(yaw)
-        below = ahead * np.sin(pitch) + (down - GRAVITY) * np.cos(pitch)
-        right = across * np.cos(roll) + below * np.sin(roll)
-        gyro_bias = (signals.rates[rows] - turning).mean(axis=0)
+        forward, level_right = north * np.cos(yaw) + east * np.sin(yaw), east * np.cos(yaw) - north * np.sin(yaw)
+        pitched_down = forward * np.sin(pitch) + (down - GRAVITY) * np.cos(pitch)
+        right = level_right * np.cos(roll) + pitched_down * np.sin(roll)
+        gyro_bias = (signals.rates[rows] - turn_rates).mean(axis=0)
         biases.append(np.append(gyro_bias, (signals.acceleration[rows, 1] - right).mean()))
     return np.array(biases)
 
@@ -86,11 +86,11 @@ def remove_sensor_biases(signals: Signals, reference: Signals | None = None) -> 
     else:
         means = float(np.mean(forward_excess(reference))), gyro_and_lateral_biases(reference).mean(axis=0)
         biases = [means] * (len(signals.edges) - 1)
-    for (excess, lateral), first, last in zip(biases, signals.edges[:-1], signals.edges[1:], strict=True):
+    for (excess, lateral), start_row, end_row in zip(biases, signals.edges[:-1], signals.edges[1:], strict=True):
         limit = _MAX_LEVEL_SIGMAS * LEVEL_SD
         level = float(np.clip(level_fraction * excess / GRAVITY, -limit, limit))
-        attitude[first:last, 1] += level
-        acceleration[first:last, 0] -= excess - GRAVITY * level
-        acceleration[first:last, 1] -= lateral[3]
-        rates[first:last] -= lateral[:3]
+        attitude[start_row:end_row, 1] += level
+        acceleration[start_row:end_row, 0] -= excess - GRAVITY * level
+        acceleration[start_row:end_row, 1] -= lateral[3]
+        rates[start_row:end_row] -= lateral[:3]
     return replace(signals, attitude=attitude, acceleration=acceleration, rates=rates)

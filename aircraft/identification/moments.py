@@ -42,10 +42,10 @@ def fit_moments(
     For each axis the fit has the parameters, and then a trim offset for each record, because the trim of the surfaces
     and the biases of the sensors may differ between records.
     """
-    thinned = signals.thin(MOMENT_THINNING, {"alpha": alpha, "beta": beta})
-    pressure = dynamic_force(thinned, base)
-    required = required_moments(thinned, base, base.motor if motor is None else motor)
-    terms = _moment_regressors(thinned, base)
+    thin_signals = signals.thin(MOMENT_THINNING, {"alpha": alpha, "beta": beta})
+    pressure = dynamic_force(thin_signals, base)
+    required = required_moments(thin_signals, base, base.motor if motor is None else motor)
+    terms = _moment_regressors(thin_signals, base)
     fits = {}
     ixx, iyy, izz, _ = base.inertia
     for axis, inertia, length in zip(AXES, (iyy, ixx, izz), (base.chord, base.span, base.span), strict=True):
@@ -53,15 +53,15 @@ def fit_moments(
         parameters = [parameter for parameter in PARAMETERS if parameter.group == axis]
         means, sds = [parameter.prior for parameter in parameters], [parameter.sd for parameter in parameters]
         # With a single record, the parameter "pitch-offset" is the trim offset in pitch.
-        trims = _record_indicators(thinned) if axis != "pitch" or len(thinned.edges) > 2 else []
+        trims = _record_indicators(thin_signals) if axis != "pitch" or len(thin_signals.edges) > 2 else []
         columns, means, sds = [*columns, *trims], [*means, *(0.0 for _ in trims)], [*sds, *(_TRIM_SD for _ in trims)]
         scale = pressure * length / inertia
         equation = np.column_stack(
             [required[axis] / inertia - scale * known_part, *(scale * column for column in columns)]
         )
-        equation = thinned.smooth(equation, MOMENT_CUTOFF_HZ)
+        equation = thin_signals.smooth(equation, MOMENT_CUTOFF_HZ)
         fits[axis] = fit_with_prior(
-            equation[:, 1:], equation[:, 0], np.array(means), prior_factor * np.array(sds), thinned.block
+            equation[:, 1:], equation[:, 0], np.array(means), prior_factor * np.array(sds), thin_signals.block
         )
     return fits
 
@@ -70,8 +70,8 @@ def _record_indicators(signals: Signals) -> list[Floats]:
     """Return for each record a column (n,) that is 1 in this record and 0 elsewhere."""
     rows = np.arange(len(signals.airspeed))
     return [
-        ((rows >= first) & (rows < last)).astype(float)
-        for first, last in zip(signals.edges[:-1], signals.edges[1:], strict=True)
+        ((rows >= start_row) & (rows < end_row)).astype(float)
+        for start_row, end_row in zip(signals.edges[:-1], signals.edges[1:], strict=True)
     ]
 
 

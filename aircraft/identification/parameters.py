@@ -25,7 +25,7 @@ class Parameter:
     sd: standard deviation of the prior about its mean, 1 for a factor and 0 for an offset.
     group: equation in which the parameter is estimated.
     bounds: range of the values of all aircraft.
-    show: maneuver that would determine the parameter.
+    show: maneuver or measurement that would determine the parameter.
     """
 
     name: str

@@ -35,7 +35,7 @@ class Performance:
 
 
 def performance(base: BaseModel, values: Floats, airspeed: float, density: float, idle: float = 0.0) -> Performance:
-    """Return the performance of each of m draws.
+    """Compute climb, sink, drag, throttle and power of each of m draws of an aircraft.
 
     values: values of the n parameters in each draw, (m, n).
     airspeed: m/s, true.
@@ -45,13 +45,16 @@ def performance(base: BaseModel, values: Floats, airspeed: float, density: float
     values = np.atleast_2d(values)
     count = len(values)
     level = np.zeros(count)
-    throttle, low, high = np.full(count, 0.5), np.zeros(count), np.ones(count)
+    throttle, min_throttle, max_throttle = np.full(count, 0.5), np.zeros(count), np.ones(count)
     for _ in range(40):
         thrust, _ = _thrusts_and_currents(base, values, airspeed, throttle, density)
         alpha, drag = _alpha_and_drag(base, values, airspeed, density, thrust, level)
         is_short = thrust * np.cos(alpha) < drag
-        low, high = np.where(is_short, throttle, low), np.where(is_short, high, throttle)
-        throttle = 0.5 * (low + high)
+        min_throttle, max_throttle = (
+            np.where(is_short, throttle, min_throttle),
+            np.where(is_short, max_throttle, throttle),
+        )
+        throttle = 0.5 * (min_throttle + max_throttle)
     _, current = _thrusts_and_currents(base, values, airspeed, throttle, density)
     return Performance(
         climb=_path_angle(base, values, airspeed, density, np.ones(count)),
@@ -100,13 +103,17 @@ def max_level_speeds(base: BaseModel, values: Floats, density: float) -> Floats:
 
 
 def level_controls(base: BaseModel, values: Floats, airspeed: float, density: float) -> tuple[float, float]:
-    """Return the elevator (rad) and the throttle (0..1) in level flight for parameter values (n,)."""
+    """Return the elevator (rad) and the throttle (0..1) in level flight for parameter values (n,).
+
+    airspeed: m/s.
+    density: kg/m^3.
+    """
     rows = np.atleast_2d(values)
     throttle = performance(base, rows, airspeed, density).throttle
     thrust, _ = _thrusts_and_currents(base, rows, airspeed, throttle, density)
     alpha, _ = _alpha_and_drag(base, rows, airspeed, density, thrust, np.zeros(1))
-    at_zero, per_alpha = _trimmed_elevator(base, rows)
-    return float(at_zero[0] + per_alpha[0] * alpha[0]), float(throttle[0])
+    elevator_at_zero, elevator_per_alpha = _trimmed_elevator(base, rows)
+    return float(elevator_at_zero[0] + elevator_per_alpha[0] * alpha[0]), float(throttle[0])
 
 
 def _trimmed_elevator(base: BaseModel, values: Floats) -> tuple[Floats, Floats]:
@@ -123,7 +130,12 @@ def _trimmed_elevator(base: BaseModel, values: Floats) -> tuple[Floats, Floats]:
 
 
 def _path_angle(base: BaseModel, values: Floats, airspeed: float, density: float, throttle: Floats) -> Floats:
-    """Return the flight-path angle of each draw at a throttle (m,), rad, (m,)."""
+    """Return the flight-path angle of each draw at a throttle (m,), rad, (m,).
+
+    values: values of the n parameters in each draw, (m, n).
+    airspeed: m/s.
+    density: kg/m^3.
+    """
     thrust, _ = _thrusts_and_currents(base, values, airspeed, throttle, density)
     angle = np.zeros(len(values))
     for _ in range(12):
@@ -139,6 +151,8 @@ def _alpha_and_drag(
 
     thrust: N, (m,).
     angle: flight-path angle, rad, (m,).
+    airspeed: m/s.
+    density: kg/m^3.
     """
     c = base.coefficients
     pressure = 0.5 * density * airspeed * airspeed * base.area
@@ -163,7 +177,13 @@ def _alpha_and_drag(
 def _thrusts_and_currents(
     base: BaseModel, values: Floats, airspeed: Floats | float, throttle: Floats, density: float
 ) -> tuple[Floats, Floats]:
-    """Return the thrust (N) and the battery current (A) of each draw, two arrays (m,)."""
+    """Return the thrust (N) and the battery current (A) of each draw, two arrays (m,).
+
+    values: values of the n parameters in each draw, (m, n).
+    airspeed: m/s.
+    throttle: 0..1, (m,).
+    density: kg/m^3.
+    """
     # Arrays over the draws replace the motor's constants: its formulas accept them unchanged.
     thrust, speed, torque = (values[:, INDEX[name]] for name in ("thrust", "motor-speed", "propeller-torque"))
     motors = base.motor.with_factors(thrust, speed, torque)  # type: ignore[arg-type]

@@ -88,13 +88,13 @@ class GustFilter:
     gain: float
 
     def estimate(self, residual: Floats, signals: Signals) -> Floats:
-        """Estimate the process at each sample, (n,), from the earlier samples of a residual (n,)."""
+        """Estimate the unmodelled moment at each sample, (n,), from the earlier samples of a residual (n,)."""
         from scipy.signal import lfilter
 
         estimate = np.zeros_like(residual)
-        for first, last in zip(signals.edges[:-1], signals.edges[1:], strict=True):
+        for start_row, end_row in zip(signals.edges[:-1], signals.edges[1:], strict=True):
             numerator, denominator = [self.decay * self.gain], [1.0, -self.decay * (1.0 - self.gain)]
-            estimate[first + 1 : last] = lfilter(numerator, denominator, residual[first:last])[:-1]
+            estimate[start_row + 1 : end_row] = lfilter(numerator, denominator, residual[start_row:end_row])[:-1]
         return estimate
 
 
@@ -126,9 +126,11 @@ class Predictor:
             self._flow, signals.rates, signals.airspeed, np.arange(len(signals.airspeed))
         )
         self.trims = np.empty_like(modelled)
-        for first, last in zip(signals.edges[:-1], signals.edges[1:], strict=True):
-            offsets = (required[first:last] - modelled[first:last]).mean(axis=0) if trims is None else trims
-            self.trims[first:last] = offsets
+        for start_row, end_row in zip(signals.edges[:-1], signals.edges[1:], strict=True):
+            offsets = (
+                (required[start_row:end_row] - modelled[start_row:end_row]).mean(axis=0) if trims is None else trims
+            )
+            self.trims[start_row:end_row] = offsets
         residual = required - modelled - self.trims
         self.filters = (
             [_best_filter(residual[:, axis], signals) for axis in range(3)] if filters is None else list(filters)
@@ -173,9 +175,9 @@ class Predictor:
         for k in range(count):
             rows = starts + k
             # Heun's method, with disturbances held over a step.
-            first = self._state_derivatives(state, disturbances, rows)
-            second = self._state_derivatives(state + step * first, disturbances, rows + 1)
-            state = state + 0.5 * step * (first + second)
+            start_derivatives = self._state_derivatives(state, disturbances, rows)
+            end_derivatives = self._state_derivatives(state + step * start_derivatives, disturbances, rows + 1)
+            state = state + 0.5 * step * (start_derivatives + end_derivatives)
             if self._with_flow:
                 state[:, :3] = self._air_velocity(rows + 1)
             disturbances = disturbances * decays
@@ -184,8 +186,8 @@ class Predictor:
     def _air_velocity(self, rows: Ints) -> Floats:
         """Return the measured velocity through the air in body axes, m/s, (n, 3), at the given rows (n,)."""
         speed, alpha, beta = self._signals.airspeed[rows], self._flow.alpha[rows], self._flow.beta[rows]
-        ahead = speed * np.cos(beta)
-        return np.column_stack([ahead * np.cos(alpha), speed * np.sin(beta), ahead * np.sin(alpha)])
+        symmetric_speed = speed * np.cos(beta)
+        return np.column_stack([symmetric_speed * np.cos(alpha), speed * np.sin(beta), symmetric_speed * np.sin(alpha)])
 
     def _required_accelerations(self) -> Floats:
         """Return the required aerodynamic moments divided by the moments of inertia, rad/s^2, (n, 3).
@@ -283,9 +285,9 @@ class Predictor:
         elevator, aileron, rudder = signals.surfaces[rows].T
         roll, pitch, yaw = (rates * np.array([base.span, base.chord, base.span])).T / (2.0 * airspeed)
         slope, zero = lift_curve(base, self._values)
-        from_alpha = zero + slope * flow.alpha
-        lift = from_alpha + c.lift_rate * pitch + c.lift_elevator * elevator
-        induced = c.drag_induced * self._values[INDEX["induced-drag"]] * np.square(from_alpha - c.lift_least_drag)
+        alpha_lift = zero + slope * flow.alpha
+        lift = alpha_lift + c.lift_rate * pitch + c.lift_elevator * elevator
+        induced = c.drag_induced * self._values[INDEX["induced-drag"]] * np.square(alpha_lift - c.lift_least_drag)
         drag = c.drag_zero * self._values[INDEX["zero-lift-drag"]] + induced + c.drag_elevator * elevator
         side = (
             c.side_beta * flow.beta
@@ -345,8 +347,8 @@ def prediction_starts(signals: Signals, count: int = MAX_PREDICTIONS, horizon: f
     settling = round(_SETTLING_TIME_S * signals.hertz)
     rows = np.concatenate(
         [
-            np.arange(first + settling, last - longest - 1)
-            for first, last in zip(signals.edges[:-1], signals.edges[1:], strict=True)
+            np.arange(start_row + settling, end_row - longest - 1)
+            for start_row, end_row in zip(signals.edges[:-1], signals.edges[1:], strict=True)
         ]
     )
     return rows[np.unique(np.linspace(0, len(rows) - 1, min(count, len(rows))).astype(np.int64))]
@@ -362,21 +364,21 @@ def predict_log(signals: Signals, models: Mapping[str, tuple[BaseModel, Floats]]
     measured = {
         horizon: _measured_quantities(signals, starts + round(horizon * signals.hertz)) for horizon in HORIZONS_S
     }
-    now = _measured_quantities(signals, starts)
-    constant = {horizon: _predict_constant_rates(now, horizon) for horizon in HORIZONS_S}
-    predictions = [Prediction("constant rates", _rms_errors(constant, measured))]
-    shown = constant[HORIZONS_S[1]]
+    start_values = _measured_quantities(signals, starts)
+    constant_rates = {horizon: _predict_constant_rates(start_values, horizon) for horizon in HORIZONS_S}
+    predictions = [Prediction("constant rates", _rms_errors(constant_rates, measured))]
+    shown_values = constant_rates[HORIZONS_S[1]]
     for name, (base, values) in models.items():
         predictor = Predictor(signals, base, values)
         predicted = predictor.predict(starts)
-        shown = predicted[HORIZONS_S[1]]
+        shown_values = predicted[HORIZONS_S[1]]
         predictions.append(Prediction(name, _rms_errors(predicted, measured), predictor.whiteness))
     return PredictedLog(
         tuple(predictions),
         len(starts),
         starts / signals.hertz + HORIZONS_S[1],
-        _in_units(measured[HORIZONS_S[1]]),
-        _in_units(shown),
+        _convert_units(measured[HORIZONS_S[1]]),
+        _convert_units(shown_values),
     )
 
 
@@ -394,12 +396,12 @@ def _predict_constant_rates(quantities: Floats, horizon: float) -> Floats:
     return predicted
 
 
-def _in_units(quantities: Floats) -> Floats:
+def _convert_units(quantities: Floats) -> Floats:
     """Convert quantities (n, 6) from rad, rad/s and m/s to `UNITS`."""
     return quantities * np.array([np.degrees(1.0)] * 5 + [1.0])
 
 
 def _rms_errors(predicted: Mapping[float, Floats], measured: Mapping[float, Floats]) -> dict[float, Floats]:
     """Return the root mean square errors (6,) in `UNITS`, by the predicted time."""
-    errors = {horizon: _in_units(predicted[horizon] - measured[horizon]) for horizon in HORIZONS_S}
+    errors = {horizon: _convert_units(predicted[horizon] - measured[horizon]) for horizon in HORIZONS_S}
     return {horizon: np.sqrt(np.square(error).mean(axis=0)) for horizon, error in errors.items()}

@@ -69,9 +69,9 @@ class Refinement:
     def values_for(self, signals: Signals, base: BaseModel, values: Floats) -> Floats:
         """Return the refined values (m,) for other signals, another base, or other parameters of lift and drag.
 
-        values: (n,) all parameters, of which the parameters of the moments are ignored.
+        The values are not refined again: they change by the gains times the change of the prediction errors.
 
-        The change of the prediction errors is taken to first order.
+        values: (n,) all parameters, of which the parameters of the moments are ignored.
         """
         tried_values = values.copy()
         tried_values[IS_MOMENT] = self.values
@@ -105,7 +105,7 @@ def refine_moments(
             moved_values, change = values.copy(), _DIFFERENCE_STEP * sds[column]
             moved_values[k] += change
             slopes[:, column] = ((errors - errors_of(moved_values)) / (scales * change)).ravel()
-        slopes = without_collinear_directions(slopes)
+        slopes = remove_collinear_directions(slopes)
         target = (errors / scales).ravel() + slopes @ values[IS_MOMENT]
         blocks = np.broadcast_to(signals.block[starts][:, np.newaxis], errors.shape).ravel()
         fit = fit_with_prior(slopes, target, means, sds, blocks)
@@ -118,21 +118,23 @@ def refine_moments(
     return Refinement(values[IS_MOMENT], fit.covariance, starts, filters, errors, gains)
 
 
-def without_collinear_directions(slopes: Floats) -> Floats:
-    """Return slopes (n, m) without their components along directions that the log does not determine.
+def remove_collinear_directions(slopes: Floats) -> Floats:
+    """Remove from slopes (n, m) the components along parameter directions that the log does not determine.
 
-    These are directions in the space of the m parameters, with all columns scaled to the same length. Along them an
-    estimate keeps its prior.
+    These directions are combinations of the m parameters whose effects are nearly equal in the log, measured after all
+    columns are scaled to the same length. Along them an estimate keeps its prior.
 
     >>> aileron = np.array([1.0, -1.0, 2.0, 0.5])
     >>> slopes = np.column_stack([aileron, aileron + 0.01 * np.array([1.0, 1.0, -1.0, 0.0])])
-    >>> [int(np.linalg.matrix_rank(some)) for some in (slopes, without_collinear_directions(slopes))]
+    >>> [int(np.linalg.matrix_rank(some)) for some in (slopes, remove_collinear_directions(slopes))]
     [2, 1]
     """
     lengths = np.linalg.norm(slopes, axis=0) + 1e-300
-    left, singular, right = np.linalg.svd(slopes / lengths, full_matrices=False)
-    determined = singular * MAX_CONDITION_INDEX > singular[0]
-    return np.asarray((left[:, determined] * singular[determined]) @ right[determined] * lengths)
+    left_vectors, singular_values, right_vectors = np.linalg.svd(slopes / lengths, full_matrices=False)
+    is_determined = singular_values * MAX_CONDITION_INDEX > singular_values[0]
+    return np.asarray(
+        (left_vectors[:, is_determined] * singular_values[is_determined]) @ right_vectors[is_determined] * lengths
+    )
 
 
 def prediction_errors(

@@ -214,7 +214,7 @@ class PublicPlan:
         best, least = self.encode(path), math.inf
         for generation in range(GENERATION_COUNT):
             spread = deviation * shrinking**generation * np.array([1.0, 1.0, HEIGHT_DEVIATION_PER_CELL])
-            samples = niches.next(samples, costs, count, spread, np.inf, elite)
+            samples = niches.draw_next(samples, costs, count, spread, np.inf, elite)
             layers = [
                 self._legs(self._start, samples[0])[kind],
                 *(self._legs(froms, tos)[kind] for froms, tos in itertools.pairwise(samples)),

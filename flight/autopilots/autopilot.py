@@ -68,8 +68,8 @@ def find_contradictions(values: Iterable[ParameterValue], orders: Iterable[tuple
 
     orders: groups of parameter names; within a group no value may be below the value of the name before it.
 
-    >>> made = [ParameterValue("THR_MIN", 74.0, "aircraft"), ParameterValue("TRIM_THROTTLE", 60.0, "file")]
-    >>> find_contradictions(made, [("THR_MIN", "TRIM_THROTTLE")])
+    >>> values = [ParameterValue("THR_MIN", 74.0, "aircraft"), ParameterValue("TRIM_THROTTLE", 60.0, "file")]
+    >>> find_contradictions(values, [("THR_MIN", "TRIM_THROTTLE")])
     ('TRIM_THROTTLE 60 of the file is below THR_MIN 74 of the aircraft',)
     """
     value_by_name = {value.name: value for value in values}
@@ -226,7 +226,7 @@ class Autopilot(ABC):
         return StoredAutopilot()
 
     @classmethod
-    def of_flight_log(
+    def from_flight_log(
         cls, program: str, parameters: Mapping[str, float], source: str
     ) -> tuple[Self, tuple[str, ...]] | None:
         """Return the autopilot that wrote a flight log, and notes on logged parameters that cannot be used.
@@ -330,10 +330,10 @@ def describe_program(program: AutopilotProgram, aircraft: str, max_named: int = 
 
     max_named: maximum number of changed parameters that the description names; the number of others is appended.
     """
-    changed = [f"{name} {value:g}" for name, value in program.changed.items()]
-    remainder = f", +{len(changed) - max_named} more" if len(changed) > max_named else ""
+    changed_texts = [f"{name} {value:g}" for name, value in program.changed.items()]
+    remainder = f", +{len(changed_texts) - max_named} more" if len(changed_texts) > max_named else ""
     parameters_text = count_text(len(program.parameters), "parameter")
     return (
         f"{program.version} (sha256 {program.sha256[:8]}...), {parameters_text} set for"
-        f" {Path(aircraft).name}, changed: {', '.join(changed[:max_named]) or 'none'}{remainder}"
+        f" {Path(aircraft).name}, changed: {', '.join(changed_texts[:max_named]) or 'none'}{remainder}"
     )

@@ -92,12 +92,13 @@ def load_autopilot(scenario: "Scenario", aircraft: "Aircraft") -> "Autopilot":
         allowed = f"expected {known_names}{did_you_mean(name, sorted(paths))}"
         raise ScenarioError.at(scenario.name, "flight.autopilot", name, allowed, shown=repr(name))
     autopilot = _load_class(paths[name]).load(scenario.flight, aircraft, scenario.name)
-    stated = scenario.returns
-    if stated is not None:
-        rtl_parameters = autopilot.returns.parameters_of(RtlSettings(stated.rtl_altitude, stated.rtl_autoland))
+    return_table = scenario.returns
+    if return_table is not None:
+        settings = RtlSettings(return_table.rtl_altitude, return_table.rtl_autoland)
+        rtl_parameters = autopilot.returns.make_parameters(settings)
         _check_no_conflict(scenario, autopilot, rtl_parameters)
         autopilot = autopilot.with_parameters(**rtl_parameters) if rtl_parameters else autopilot
-    assumed_parameters = autopilot.returns.parameters_of(
+    assumed_parameters = autopilot.returns.make_parameters(
         RtlSettings(lands=scenario.landing is not None, field_depth=_field_depth_below_home(scenario))
     )
     return autopilot.with_parameters("assumed", **assumed_parameters) if assumed_parameters else autopilot
@@ -113,7 +114,7 @@ def _field_depth_below_home(scenario: "Scenario") -> float:
 
 
 def _check_no_conflict(scenario: "Scenario", autopilot: "Autopilot", rtl_parameters: Mapping[str, float]) -> None:
-    """Raise ScenarioError if a scenario and the user's parameter file state different values of a parameter.
+    """Raise ScenarioError if a scenario and the user's parameter file give one parameter different values.
 
     rtl_parameters: parameters that the scenario's RTL settings set.
     """
@@ -121,20 +122,20 @@ def _check_no_conflict(scenario: "Scenario", autopilot: "Autopilot", rtl_paramet
         stated_value = autopilot.stated_value(name)
         if stated_value is not None and not math.isclose(value, stated_value, rel_tol=1e-6, abs_tol=1e-6):
             source = "" if autopilot.parameters is None else autopilot.parameters.source
-            allowed = f"{source} states {name} {stated_value:g}"
+            allowed = f"{source} sets {name} to {stated_value:g}; the two values must be equal"
             raise ScenarioError.at(scenario.name, f"returns ({name})", value, allowed, shown=f"{value:g}")
 
 
-def program_class_for(program: Path) -> "type[ProgramAutopilot]":
-    """Return the autopilot class for an executable built for software in the loop (SITL).
+def find_program_class(program: Path) -> "type[ProgramAutopilot]":
+    """Return the autopilot class that runs an executable built for software in the loop (SITL).
 
-    >>> program_class_for(Path("arduplane")).name
+    >>> find_program_class(Path("arduplane")).name
     'ardupilot'
     """
     return next(kind for kind in program_classes() if kind.accepts_program(program))
 
 
-def autopilot_of_log(
+def autopilot_from_log(
     program: str, parameters: Mapping[str, float], source: str
 ) -> "tuple[Autopilot, tuple[str, ...]] | None":
     """Return the autopilot that wrote a flight log, and notes on its parameters; None for an unknown program.
@@ -144,8 +145,8 @@ def autopilot_of_log(
     program: name of the flown program in the log.
     source: the log's file.
     """
-    found = (kind.of_flight_log(program, parameters, source) for kind in autopilot_classes().values())
-    return next(filter(None, found), None)
+    candidates = (kind.from_flight_log(program, parameters, source) for kind in autopilot_classes().values())
+    return next(filter(None, candidates), None)
 
 
 def restore_autopilot(name: str | None, stored: "StoredAutopilot") -> "Autopilot":
@@ -174,6 +175,6 @@ def stored_name(autopilot: "Autopilot") -> str | None:
 def _implied_name(stored: "StoredAutopilot") -> str:
     """Return the autopilot's name for a log that stores no name.
 
-    Stored parameters or a stored program imply ArduPlane, other settings planfly's guidance.
+    Stored parameters or a stored program imply ArduPlane. Any other settings imply planfly's guidance.
     """
     return "planfly" if stored.parameters is None and stored.program is None else "ardupilot"

@@ -35,8 +35,8 @@ def commented_release(text: str, program: str) -> FileRelease | None:
         rf"^\s*#.*\b{re.escape(program)}[ :]+V?(\d{{1,2}})\.(\d{{1,2}})", re.IGNORECASE | re.MULTILINE
     )
     for pattern in (in_program_name, _QGC_COMMENT):
-        if found := pattern.search(text):
-            return FileRelease(f"{int(found[1])}.{int(found[2])}", found[0].lstrip("# \t").removeprefix("NOTE: "))
+        if match := pattern.search(text):
+            return FileRelease(f"{int(match[1])}.{int(match[2])}", match[0].lstrip("# \t").removeprefix("NOTE: "))
     return None
 
 
@@ -50,29 +50,34 @@ def nearest_release(versions: Sequence[_Version], release: tuple[int, int]) -> _
     >>> [nearest_release(("1.16", "1.17"), release) for release in ((1, 15), (1, 16), (1, 18))]
     ['1.16', '1.16', '1.17']
     """
-    known = [tuple(map(int, version.split("."))) for version in versions]
-    older = [version for version, numbers in zip(versions, known, strict=True) if numbers <= release]
-    return older[-1] if older else versions[0]
+    releases = [tuple(map(int, version.split("."))) for version in versions]
+    not_newer = [version for version, numbers in zip(versions, releases, strict=True) if numbers <= release]
+    return not_newer[-1] if not_newer else versions[0]
 
 
 def choose_release_for_file(
-    versions: Sequence[_Version], stated: _Version | None, found: FileRelease | None, params: str, title: str
+    versions: Sequence[_Version],
+    requested_version: _Version | None,
+    writer_release: FileRelease | None,
+    params: str,
+    title: str,
 ) -> tuple[_Version, tuple[str, ...]]:
     """Return the release to simulate with a parameter file, and a note if the file is from another release.
 
     versions: the simulated releases, oldest first; the newest is simulated if nothing states a release.
-    stated: release that the user names, or None.
-    found: release that wrote the file.
+    requested_version: release that the user names, or None.
+    writer_release: release that wrote the file.
     params: path of the file.
     title: name of the autopilot.
     """
-    if found is None:
-        return stated or versions[-1], ()
-    major, minor = map(int, found.release.split("."))
-    version = stated or nearest_release(versions, (major, minor))
-    if version == found.release:
+    if writer_release is None:
+        return requested_version or versions[-1], ()
+    major, minor = map(int, writer_release.release.split("."))
+    version = requested_version or nearest_release(versions, (major, minor))
+    if version == writer_release.release:
         return version, ()
-    because = "because it was named" if stated else "the nearest release that planfly has"
+    reason = "as requested" if requested_version else "the nearest available release"
     return version, (
-        f"{params} is of {title} {found.release} ({found.evidence}), but {version} is simulated, {because}",
+        f"{params} was written for {title} {writer_release.release} ({writer_release.evidence}),"
+        f" but {title} {version} is simulated, {reason}",
     )

@@ -26,28 +26,26 @@ def gust_deviation(turbulence: Turbulence) -> float:
     return 0.1 * W20[turbulence]
 
 
-def height_in_gusts(opposing_rate: float, turbulence: Turbulence) -> float:
-    """Return the height by which a gust displaces an aircraft, m.
-
-    The gust's displacement is exceeded with a probability of 1 %.
+def gust_displacement(opposing_rate: float, turbulence: Turbulence) -> float:
+    """Return the vertical displacement by a gust, m, that is exceeded with a probability of 1 %.
 
     opposing_rate: climb or sink rate with which the aircraft opposes the gust, m/s.
 
-    >>> round(height_in_gusts(2.0, "moderate"), 1), height_in_gusts(4.0, "moderate"), height_in_gusts(0.0, "none")
+    >>> round(gust_displacement(2.0, "moderate"), 1), gust_displacement(4.0, "moderate"), gust_displacement(0.0, "none")
     (19.1, 0.0, 0.0)
     """
     return _GUST_DURATION_S * max(0.0, _GUST_SIGMAS * gust_deviation(turbulence) - opposing_rate)
 
 
-def height_in_updrafts(sink_reserve: float, turbulence: Turbulence) -> float:
-    """Return the altitude that an autopilot gains in updrafts if it holds its airspeed, m.
+def updraft_altitude_gain(sink_reserve: float, turbulence: Turbulence) -> float:
+    """Return the altitude (m) that an aircraft gains in updrafts if its autopilot holds the airspeed.
 
     sink_reserve: sink rate that the aircraft does not use, m/s.
 
-    >>> round(height_in_updrafts(2.0, "moderate"), 1), round(height_in_updrafts(0.5, "moderate"), 1)
+    >>> round(updraft_altitude_gain(2.0, "moderate"), 1), round(updraft_altitude_gain(0.5, "moderate"), 1)
     (19.1, 92.4)
     """
     deviation = gust_deviation(turbulence)
     if sink_reserve < MIN_SPARE_RATE_SIGMAS * deviation:
         return _LOW_RATE_DURATION_S * deviation
-    return height_in_gusts(sink_reserve, turbulence)
+    return gust_displacement(sink_reserve, turbulence)

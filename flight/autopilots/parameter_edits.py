@@ -50,7 +50,7 @@ def _with_value(line: str, value: float) -> str:
 
 
 def _format_parameter_line(model_line: str, name: str, value: float) -> str:
-    """Return a line for a parameter in the format of a given line."""
+    """Return a line for a parameter in the format of another line of the file, ``model_line``."""
     columns = model_line.split("\t")
     if len(columns) == _QGC_COLUMN_COUNT:
         return "\t".join([columns[0], str(AUTOPILOT), name, f"{value:.10g}", str(_REAL_TYPE)])

@@ -103,7 +103,7 @@ def parse_parameters(text: str, source: str) -> dict[str, Entry]:
             )
         entries[entry.name] = entry
     if not entries:
-        raise ParameterError(f"{source}: no parameter; expected lines of a name and a value", file=source)
+        raise ParameterError(f"{source}: no parameter; expected lines with a name and a value", file=source)
     return entries
 
 

@@ -165,7 +165,7 @@ def parameter_origin(text: str, entries: Mapping[str, Entry]) -> ParameterOrigin
     if votes[winner] < _CLEAR_MAJORITY * min_votes:
         px4_text = f"{names[PX4][0] if names[PX4] else 'its header'} is PX4's"
         ardupilot_text = names[ARDUPILOT][0] if names[ARDUPILOT] else "its header"
-        return ParameterOrigin("", "", f"{px4_text} and {ardupilot_text} ArduPilot's", mixed=True)
+        return ParameterOrigin("", "", f"{px4_text} and {ardupilot_text} is ArduPilot's", mixed=True)
     evidence = ", ".join(names[winner][:_SHOWN_NAMES])
     if winner == header:
         evidence = f'"# Stack: {stack[1][:40]}"' if stack is not None else program[1] if program is not None else ""
@@ -252,24 +252,26 @@ def read_parameters_for(path: Path, autopilot: str) -> dict[str, Entry]:
     if origin.autopilot not in ("", autopilot):
         raise other_autopilot_error(f"{path}", origin.autopilot, origin.evidence, autopilot)
     if origin.vehicle:
-        allowed = "planfly flies fixed-wing aircraft"
-        message = f"{path}: parameters of {origin.vehicle} ({TITLES[origin.autopilot]}): {allowed}"
+        allowed = "planfly simulates only fixed-wing aircraft"
+        message = f"{path}: the parameters are for {origin.vehicle} ({TITLES[origin.autopilot]}): {allowed}"
         raise ParameterError(message, file=path, field="vehicle", value=origin.vehicle, allowed=allowed)
     return entries
 
 
 def refuse_unknown_parameters(
-    path: Path, autopilot: str, entries: Mapping[str, Entry], known: Mapping[str, float]
+    path: Path, autopilot: str, entries: Mapping[str, Entry], used_values: Mapping[str, float]
 ) -> None:
-    """Raise ParameterError if an autopilot uses none of a file's parameters, and none looks like its own.
+    """Raise ParameterError for a file of which the simulated autopilot uses no parameter.
 
-    known: values of the file that the autopilot uses.
+    A file whose parameter names belong to this autopilot is accepted.
+
+    used_values: values of the file that the simulated autopilot uses.
     """
-    if known or parameter_origin("", entries).autopilot == autopilot:
+    if used_values or parameter_origin("", entries).autopilot == autopilot:
         return
     names = ", ".join(list(entries)[:_SHOWN_NAMES])
     allowed = f"expected a parameter file of {TITLES[autopilot]}"
-    message = f"{path}: {names}: not known to the simulated {_MODELS[autopilot]}; {allowed}"
+    message = f"{path}: {names}: not used by the simulated {_MODELS[autopilot]}; {allowed}"
     raise ParameterError(message, file=path, value=names, allowed=allowed)
 
 

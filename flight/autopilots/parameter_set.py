@@ -101,9 +101,9 @@ class ParameterTable:
             if not definition.low <= value <= definition.high:
                 allowed = f"allowed {definition.low / unit_factor:g}..{definition.high / unit_factor:g}"
                 raise _value_error(entry.where, name, entry.value, allowed)
-            first = entry_by_present_name.setdefault(definition.name, entry)
+            first_entry = entry_by_present_name.setdefault(definition.name, entry)
             if not math.isclose(values.setdefault(definition.name, value), value, rel_tol=_SAME_VALUE_TOLERANCE):
-                first_text = f"{first.name} {first.value:g} on line {first.where.number}"
+                first_text = f"{first_entry.name} {first_entry.value:g} on line {first_entry.where.number}"
                 expected = values[definition.name] / unit_factor
                 allowed = f"expected {expected:g}, because {first_text} is the same parameter under its other name"
                 raise _value_error(entry.where, name, entry.value, allowed)
@@ -117,23 +117,24 @@ class ParameterTable:
         values: dict[str, float] = {}
         notes = []
         for name, definition in self.by_name.items():
-            old = definition.old
+            old_name = definition.old
             if name in logged:
                 value = logged[name]
-            elif old is not None and old[0] in logged:
-                value = logged[old[0]] * old[1]
+            elif old_name is not None and old_name[0] in logged:
+                value = logged[old_name[0]] * old_name[1]
             else:
                 continue
             value = float(f"{value:.{self.log_digits}g}")
             if definition.low <= value <= definition.high:
                 values[name] = value
             else:
-                notes.append(f"{name} {value:g} of the log is not allowed: the default is used")
+                allowed = f"{definition.low:g}..{definition.high:g}"
+                notes.append(f"{name} {value:g} in the log is outside {allowed}: the default is used")
         for minimum, maximum in self.pairs:
             if minimum in values and maximum in values and values[minimum] >= values[maximum]:
                 notes.append(
-                    f"{minimum} {values[minimum]:g} and {maximum} {values[maximum]:g} of the log are not allowed: "
-                    "the defaults are used"
+                    f"{minimum} {values[minimum]:g} is not below {maximum} {values[maximum]:g} in the log:"
+                    " the defaults of both are used"
                 )
                 del values[minimum], values[maximum]
         if not values:
@@ -188,7 +189,7 @@ class ParameterSet:
         return cls._build(sources, "" if path is None else str(path), unused, *fields)
 
     @classmethod
-    def of_text(cls, text: str, source: str, *fields: Any) -> Self:
+    def from_text(cls, text: str, source: str, *fields: Any) -> Self:
         """Return the parameters in a file's text; missing parameters have their defaults.
 
         Raises ParameterError if the text is invalid or contains a value that is not allowed.
@@ -216,7 +217,7 @@ class ParameterSet:
         return cls._build(list(origins.items()), stored.source, stored.unused, *fields)
 
     @classmethod
-    def of_log(cls, logged: Mapping[str, float], source: str, *fields: Any) -> tuple[Self, tuple[str, ...]]:
+    def from_log(cls, logged: Mapping[str, float], source: str, *fields: Any) -> tuple[Self, tuple[str, ...]]:
         """Return the parameters of a flight log, and a sentence for each value that could not be used.
 
         For a log without parameters, return the autopilot's defaults and a sentence about this.
@@ -258,7 +259,7 @@ class ParameterSet:
         Raises ParameterError if a minimum is not below its maximum.
         """
         known_sources, unknown_names = cls._without_unknown_parameters(sources, *fields)
-        # A default value of the file that says nothing is not used, either.
+        # A subclass may treat a value of the file as unset if it equals the default.
         unset_names = [
             name
             for origin, values in known_sources

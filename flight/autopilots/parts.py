@@ -43,12 +43,12 @@ Loop = Callable[[Floats, Heights, Records, Floats, Code, Records, Records, int],
 
 
 def _initialise_nothing(guidance: Record, record: Record) -> None:
-    """Do nothing: the control law has no record to initialise."""
+    """Do nothing, because the control law has no record to initialise."""
     return
 
 
 def _transfer_nothing(previous_record: Record, record: Record, start: Floats) -> None:
-    """Do nothing: the control law has no state to keep."""
+    """Do nothing, because the control law has no state to transfer to another route."""
     return
 
 
@@ -82,7 +82,7 @@ class ControlLaw:
 
 
 def _turn_at_waypoint(turn: float, amsl: float) -> float:
-    """Return 0: the autopilot turns at the waypoint itself."""
+    """Return 0, the turn distance of an autopilot that turns at the waypoint itself, m."""
     return 0.0
 
 
@@ -137,13 +137,13 @@ class RateLimit(NamedTuple):
     name: str = ""
 
     @classmethod
-    def of_parameters(cls, **values: float) -> "RateLimit":
+    def from_parameters(cls, **values: float) -> "RateLimit":
         """Return the rate limit that the smallest of several parameters sets, m/s; 0 means no limit.
 
-        >>> RateLimit.of_parameters(FW_T_CLMB_R_SP=3.0, FW_T_CLMB_MAX=5.0)
+        >>> RateLimit.from_parameters(FW_T_CLMB_R_SP=3.0, FW_T_CLMB_MAX=5.0)
         RateLimit(rate=3.0, name='FW_T_CLMB_R_SP 3 m/s')
         """
-        name = min(values, key=lambda each: values[each] or math.inf)
+        name = min(values, key=lambda parameter_name: values[parameter_name] or math.inf)
         return cls(values[name], f"{name} {values[name]:g} m/s") if values[name] else cls()
 
 
@@ -228,7 +228,7 @@ class RtlSettings(NamedTuple):
 
 
 def _no_parameters(settings: RtlSettings) -> Mapping[str, float]:
-    """Return no parameters: RTL settings do not affect the autopilot."""
+    """Return no parameters, because RTL settings do not affect the autopilot."""
     return {}
 
 
@@ -269,7 +269,7 @@ class LinkLossReaction(NamedTuple):
 
 
 def _continue_mission(use: LinkUse) -> tuple[LinkLossReaction, ...]:
-    """Return no reaction: the mission continues after the loss of a link."""
+    """Return no reaction, because the mission continues after the loss of a link."""
     return ()
 
 
@@ -348,17 +348,17 @@ NO_TRIALS = ReturnTrials()
 
 
 def _no_causes(mission: ReturnMission) -> tuple[Cause, ...]:
-    """Return no events: no event ends the mission."""
+    """Return no causes, because no event makes the autopilot leave the mission."""
     return ()
 
 
-def _no_text(mission: ReturnMission) -> str:
-    """Return "": all RTLs are simulated."""
+def _no_unsimulated_reason(mission: ReturnMission) -> str:
+    """Return "", because every RTL of the autopilot is simulated."""
     return ""
 
 
-def _no_texts(mission: ReturnMission) -> tuple[str, ...]:
-    """Return no texts: all parts of an RTL are simulated."""
+def _no_unjudged_parts(mission: ReturnMission) -> tuple[str, ...]:
+    """Return no texts, because all parts of an RTL are simulated."""
     return ()
 
 
@@ -367,7 +367,7 @@ class ReturnBehaviour:
     """Behaviour of an autopilot in an RTL; the defaults are ArduPlane's behaviour with its default parameters.
 
     rules: rules of the RTL's target, altitude, turn and loiter.
-    parameters_of: returns the autopilot's parameters, by name and in its units, for a scenario's settings of the RTL.
+    make_parameters: returns the autopilot's parameters, by name and in its units, for a scenario's settings of the RTL.
     after_link_loss: returns the reactions to the loss of a radio link, in order of time.  If the mission continues, it
         is the reaction "on" alone, or () for an autopilot without parameters.
     fly: simulates RTLs; None for an autopilot without an RTL, for which ArduPlane returns.
@@ -380,13 +380,13 @@ class ReturnBehaviour:
     """
 
     rules: ReturnRules = DEFAULT_RETURN_RULES
-    parameters_of: Callable[[RtlSettings], Mapping[str, float]] = _no_parameters
+    make_parameters: Callable[[RtlSettings], Mapping[str, float]] = _no_parameters
     after_link_loss: Callable[[LinkUse], tuple[LinkLossReaction, ...]] = _continue_mission
     fly: FlyReturns | None = None
     flies_without_engine: bool = False
     causes: Callable[[ReturnMission], tuple[Cause, ...]] = _no_causes
-    unsimulated_text: Callable[[ReturnMission], str] = _no_text
-    unjudged_texts: Callable[[ReturnMission], tuple[str, ...]] = _no_texts
+    unsimulated_text: Callable[[ReturnMission], str] = _no_unsimulated_reason
+    unjudged_texts: Callable[[ReturnMission], tuple[str, ...]] = _no_unjudged_parts
     path_text: str = ""
     trials: ReturnTrials = NO_TRIALS
 
@@ -422,12 +422,12 @@ def straight_glide(height: float, run: float, tail_wind: float, amsl: float) -> 
 
 
 def _cruise_to_landing(cruise: float, tail_wind: float, amsl: float) -> float:
-    """Return the cruise airspeed: the landing is flown at it."""
+    """Return the cruise airspeed (m/s), at which the autopilot flies the landing."""
     return cruise
 
 
 def _unknown_height(stated_height: float, takeoff_height: float) -> None:
-    """Return None: the height of a go-around is unknown."""
+    """Return None, because the height of a go-around is unknown."""
     return None
 
 
@@ -497,7 +497,7 @@ class BatteryFailsafe(NamedTuple):
 
 
 class ReturnTimeFailsafe(NamedTuple):
-    """A failsafe that returns when the battery lasts hardly longer than the return, as the autopilot estimates both.
+    """A failsafe that starts an RTL once the battery is estimated to last hardly longer than the RTL.
 
     parameter: name and value of the parameter that enables it.
     remedy: text on the value with which it does not act.
@@ -572,7 +572,7 @@ MissionDialect = Literal["planfly", "ardupilot", "px4"]
 
 
 def _no_unsimulated_settings(mission: MissionParts) -> list[str]:
-    """Return no sentence: all settings are simulated."""
+    """Return no sentence, because all settings are simulated."""
     return []
 
 
@@ -653,17 +653,17 @@ class TrackingErrorFunction(Protocol):
 def _no_tracking_error(
     airspeed: float, nav: Navigation, *, fly_over: bool = False, turbulence: Turbulence = "none"
 ) -> TrackingError | None:
-    """Return None: the autopilot follows its path exactly."""
+    """Return None, because the autopilot follows its path exactly."""
     return None
 
 
 def _no_altitude_miss(climb_reserve: float, sink_reserve: float, turbulence: Turbulence) -> float:
-    """Return 0: gusts never carry the aircraft out of an altitude tolerance."""
+    """Return the probability 0, because gusts never carry the aircraft out of an altitude tolerance."""
     return 0.0
 
 
 def _no_displacement(reserve: float, turbulence: Turbulence) -> float:
-    """Return 0: gusts do not displace the aircraft."""
+    """Return a displacement of 0 m, because the autopilot holds its altitude in gusts."""
     return 0.0
 
 

@@ -116,11 +116,11 @@ _CACHE_VERSION = 2
 
 @functools.lru_cache(maxsize=8)
 def _load_trim_tables(aircraft: Aircraft) -> tuple[Floats, Floats, float, float, bool]:
-    """Return airspeeds, excess power, two coefficients of the angle of attack, and whether the aircraft can glide.
+    """Return the tables of a point mass from the aircraft's trims, which are cached in the user's cache folder.
 
-    The airspeeds (v,) and the specific excess power (t, v, h) are in m/s.  The angle of attack is the first coefficient
-    (rad) plus the second one (rad m^2/s^2) divided by the square of airspeed.  The aircraft can glide if there is a
-    trim with closed throttle.  Trims are cached in the user's cache folder, like the envelope.
+    The five results are: airspeeds of the grid, m/s, (v,); specific excess power, m/s, (t, v, h) for t throttles and h
+    altitudes; angle of attack without lift, rad; angle of attack from lift, times the square of airspeed, rad m^2/s^2;
+    and True if any trim exists with closed throttle, so that the aircraft can glide.
     """
     speeds = np.linspace(aircraft.airspeed_min, aircraft.airspeed_max, _AIRSPEED_COUNT)
     version = model_hash(aircraft)
@@ -217,10 +217,10 @@ def _resample_power(envelope: Envelope, table: Floats, speeds: Floats) -> Floats
 
 
 def _induced_drag_factor(speeds: Floats, excess: Floats) -> float:
-    """Return the induced drag per weight times the square of airspeed (m^2/s^2), fitted to glides.
+    """Fit the induced drag factor b (m^2/s^2) to glides; it is at least 0.
 
-    In straight flight the drag per weight is a V^2 + b / V^2. The result is b, at least 0. In a bank, b grows as the
-    square of the load factor.
+    In straight flight at the airspeed V the drag per weight is a V^2 + b / V^2. In a bank, b grows as the square of the
+    load factor.
 
     speeds: airspeeds of the glides, m/s, (v,).
     excess: specific excess power of the glides, m/s, (v,).
@@ -243,7 +243,7 @@ def wind_at(position: Record, seconds: float, aircraft: Record, field: Floats) -
     position: a record with `east`, `north` and `up`, m.
     seconds: time after take-off, s.
     aircraft: a record of `POINT_MASS`.
-    field: as in `PointMass`.
+    field: packed wind field, as in `PointMass`; empty for none.
     """
     if not field.size:
         speed = mean_wind_speed(aircraft.wind_speed, aircraft.wind_gradient, aircraft.wind_reference, position.up)
@@ -268,10 +268,12 @@ def advance_point_mass(
 ) -> float:
     """Move a point mass by ``dt`` s, and return the electric power that it uses, W.
 
+    estimated: position and velocity over the ground, a record of `flight.guidance.navigation_error.MOTION`.
+    state: airspeed, attitude, time and wind, a record of `flight.dynamics.state.STATE`.
     path_angle: climb angle relative to the air, rad.
     aircraft: a record of `POINT_MASS`.
     excess_table, power: tables of a `PointMass`.
-    field: as in `PointMass`.
+    field: packed wind field, as in `PointMass`; empty for none.
 
     The wind in the state is updated to the new time and position.
     """
@@ -302,6 +304,11 @@ def _electric_power(
     """Return the electric power (W) for a specific excess power (m/s), by the parabola of `Envelope.power`.
 
     The power is constant below the excess power at idle, and above the excess power at full throttle.
+
+    excess_table: specific excess power, see `PointMass`.
+    power: electric power, see `PointMass`.
+    airspeed: m/s.
+    amsl: altitude, m.
     """
     if not aircraft.has_power:
         return 0.0
@@ -323,7 +330,12 @@ def _electric_power(
 
 @inner
 def excess_power(excess_table: Floats, throttle: float, airspeed: float, amsl: float, aircraft: Record) -> float:
-    """Return the specific excess power in straight flight at a throttle, airspeed and altitude, m/s."""
+    """Return the specific excess power in straight flight at a throttle, airspeed and altitude, m/s.
+
+    throttle: 0..1.
+    airspeed: m/s.
+    amsl: altitude, m.
+    """
     grid_position = min(1.0, max(0.0, throttle)) * (excess_table.shape[0] - 1)
     row = min(excess_table.shape[0] - 2, int(grid_position))
     lower_power = _interpolate(excess_table[row], airspeed, amsl, aircraft)
@@ -337,10 +349,10 @@ def _interpolate(table: Floats, airspeed: float, amsl: float, aircraft: Record) 
 
     Outside the table the value at its nearest edge applies.
     """
-    x = min(table.shape[0] - 1.0, max(0.0, (airspeed - aircraft.first_airspeed) / aircraft.airspeed_step))
-    y = min(table.shape[1] - 1.0, max(0.0, amsl / aircraft.altitude_step))
-    i, j = min(table.shape[0] - 2, int(x)), min(table.shape[1] - 2, int(y))
-    p, q = x - i, y - j
-    low = (1.0 - q) * table[i, j] + q * table[i, j + 1]
-    high = (1.0 - q) * table[i + 1, j] + q * table[i + 1, j + 1]
-    return (1.0 - p) * low + p * high
+    row = min(table.shape[0] - 1.0, max(0.0, (airspeed - aircraft.first_airspeed) / aircraft.airspeed_step))
+    column = min(table.shape[1] - 1.0, max(0.0, amsl / aircraft.altitude_step))
+    i, j = min(table.shape[0] - 2, int(row)), min(table.shape[1] - 2, int(column))
+    row_fraction, column_fraction = row - i, column - j
+    lower_value = (1.0 - column_fraction) * table[i, j] + column_fraction * table[i, j + 1]
+    upper_value = (1.0 - column_fraction) * table[i + 1, j] + column_fraction * table[i + 1, j + 1]
+    return (1.0 - row_fraction) * lower_value + row_fraction * upper_value

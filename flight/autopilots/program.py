@@ -15,7 +15,7 @@ from flight.simulation.setup import FlightSetup
 
 
 class ProgramFlight(RunningFlight, AbstractContextManager["ProgramFlight"]):
-    """Flight of an external program in lockstep with planfly's physics, as a context manager that ends the program."""
+    """Flight of an external program in lockstep with planfly's physics; a context manager that ends the program."""
 
     @abstractmethod
     def prepare(self) -> None:
@@ -25,7 +25,7 @@ class ProgramFlight(RunningFlight, AbstractContextManager["ProgramFlight"]):
         """
 
     @abstractmethod
-    def keep_log(self, target: Path) -> bool:
+    def save_log(self, target: Path) -> bool:
         """End the program cleanly and move its log to a file; return True if there was a log."""
 
 

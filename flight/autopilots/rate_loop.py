@@ -37,29 +37,29 @@ class RateGains(NamedTuple):
     d: float
 
 
-def rate_gains_fault(gains: RateGains, feed_forward_range: tuple[float, float], time_constant: float) -> str:
-    """Return "too low" or "too high" for gains that cannot control the attitude; "" for usable gains.
+def judge_rate_gains(gains: RateGains, feed_forward_range: tuple[float, float], time_constant: float) -> str:
+    """Judge the gains of a rate controller: "too low" or "too high" to control the attitude, or "" if usable.
 
     feed_forward_range: lowest and highest feed-forward gain that suits the aircraft; both are positive.
     time_constant: time constant of the attitude, s.
 
-    >>> rate_gains_fault(RateGains(0.345, 0.08, 0.15, 0.0), (0.345, 0.345), 0.5)
+    >>> judge_rate_gains(RateGains(0.345, 0.08, 0.15, 0.0), (0.345, 0.345), 0.5)
     ''
-    >>> rate_gains_fault(RateGains(1e-4, 1e-4, 1e-4, 0.0), (0.345, 0.345), 0.5)
+    >>> judge_rate_gains(RateGains(1e-4, 1e-4, 1e-4, 0.0), (0.345, 0.345), 0.5)
     'too low'
-    >>> rate_gains_fault(RateGains(6.0, 0.08, 0.15, 0.0), (0.345, 0.345), 0.5)
+    >>> judge_rate_gains(RateGains(6.0, 0.08, 0.15, 0.0), (0.345, 0.345), 0.5)
     'too high'
     """
-    low, high = feed_forward_range
-    immediate_response = (gains.feed_forward + gains.p) / (low + gains.p)
-    decay = math.exp(-_RESPONSE_TIME_S * gains.i / (low + gains.p))
+    min_feed_forward, max_feed_forward = feed_forward_range
+    immediate_response = (gains.feed_forward + gains.p) / (min_feed_forward + gains.p)
+    decay = math.exp(-_RESPONSE_TIME_S * gains.i / (min_feed_forward + gains.p))
     if immediate_response < _MIN_IMMEDIATE_RESPONSE or (1.0 - immediate_response) * decay > 1.0 - _MIN_RESPONSE:
         return "too low"
-    bandwidth = (gains.feed_forward + gains.p) / (high + gains.p) / time_constant
+    bandwidth = (gains.feed_forward + gains.p) / (max_feed_forward + gains.p) / time_constant
     is_unstable = (
         bandwidth > _MAX_BANDWIDTH_RADPS
-        or gains.p > _MAX_P_RATIO * high
-        or gains.i > _MAX_I_RATIO_PER_S * high
-        or gains.d > _MAX_D_RATIO_S * high
+        or gains.p > _MAX_P_RATIO * max_feed_forward
+        or gains.i > _MAX_I_RATIO_PER_S * max_feed_forward
+        or gains.d > _MAX_D_RATIO_S * max_feed_forward
     )
     return "too high" if is_unstable else ""

@@ -35,7 +35,7 @@ LOITER_PROGRESS = record_dtype(
 def simulate_each(
     timeouts: list[float], fly: Callable[[int, Floats, Record], None], *, store_positions: bool
 ) -> SimulatedReturns:
-    """Simulate n RTLs one by one.
+    """Simulate n RTLs one by one; return their results and, if requested, their tracks.
 
     timeouts: timeout of each RTL, s, (n,).
     fly: simulates one RTL; the arguments are its number, the array (t, 3) of positions to fill, m, and its result, a
@@ -54,7 +54,7 @@ def simulate_each(
 
 @inner
 def initialise_outcome(start: Record, estimated: Record, has_terrain: bool, result: Record) -> None:  # pragma: no cover
-    """Set ``estimated`` and ``result`` to their values at the start of an RTL."""
+    """Set the motion ``estimated`` to the start of an RTL, and ``result`` to the outcome before the first tick."""
     estimated.east, estimated.north, estimated.up = start.east, start.north, start.up
     estimated.velocity_east, estimated.velocity_north = start.velocity_east, start.velocity_north
     estimated.velocity_up = start.velocity_up
@@ -86,7 +86,10 @@ def initialise_state(start: Record, aircraft: Record, field: Floats, state: Reco
 
 @inner
 def steady_throttle(start: Record, state: Record, aircraft: Record, excess_table: Floats) -> float:
-    """Return the throttle at which the aircraft holds the climb rate of the start, to the nearest 0.01."""
+    """Return the throttle (0..1) at which the aircraft holds the climb rate of an RTL's start, in steps of 0.01.
+
+    excess_table: specific excess power, see `flight.autopilots.point_mass.PointMass`.
+    """
     throttle = 1.0
     while (
         throttle > 0.0 and excess_power(excess_table, throttle, state.airspeed, start.up, aircraft) > start.velocity_up
@@ -143,6 +146,10 @@ def update_clearances(
 
     Distances are measured from the surface of a sphere. The RTL ends where there are no elevation data, or once the
     aircraft is `MAX_IMPACT_DEPTH_M` below the ground.
+
+    time: time since the start, s.
+    heights, to_pixel, spheres, radii: see `flight.autopilots.simulated_returns.ReturnEnvironment`.
+    has_terrain: True if the terrain is known.
     """
     result.end_time = time
     for m in range(spheres.shape[0]):

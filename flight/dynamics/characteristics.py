@@ -111,7 +111,9 @@ def trim_table(aircraft: Aircraft, count: int = 7) -> tuple[TrimRow, ...]:
 
 
 def level_flight_modes(aircraft: Aircraft, airspeed: float, amsl: float = TRIM_AMSL) -> tuple[Mode, ...]:
-    """Return the named modes of level flight at an airspeed (m/s) and an altitude (m); () if there is none.
+    """Return the named natural modes of level flight at an airspeed (m/s) and an altitude (m AMSL).
+
+    The tuple is empty if the aircraft cannot hold level flight there.
 
     >>> from aircraft.catalog import load_aircraft
     >>> for mode in level_flight_modes(load_aircraft("aerosonde"), 25.0):

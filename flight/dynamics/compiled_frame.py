@@ -370,12 +370,12 @@ def _external_forces(numbers: Floats, code: Code) -> tuple[Vector, Vector]:
 
 
 @inlined
-def _read_registers(numbers: Floats, first: int) -> Vector:
+def _read_registers(numbers: Floats, first_register: int) -> Vector:
     """Return three successive registers as a vector.
 
-    first: index of the first register.
+    first_register: index of the first register.
     """
-    return numbers[first], numbers[first + 1], numbers[first + 2]
+    return numbers[first_register], numbers[first_register + 1], numbers[first_register + 2]
 
 
 @inner

@@ -158,28 +158,28 @@ class CompiledModel:
 
     def _copy_state(self) -> None:
         """Copy the state and the constants of the JSBSim instance to the frame and the registers."""
-        read, numbers = self._fdm.properties.read, self.numbers
+        read_property, numbers = self._fdm.properties.read, self.numbers
         for register, getter in self._getters.values():
             numbers[register] = getter()
         frame: Record = self.frames[0]
-        frame.dt, frame.mass = self._fdm.dt, read(MASS)
-        inertia = {axes: read(f"inertia/i{axes}-slugs_ft2") for axes in ("xx", "yy", "zz", "xy", "xz", "yz")}
+        frame.dt, frame.mass = self._fdm.dt, read_property(MASS)
+        inertia = {axes: read_property(f"inertia/i{axes}-slugs_ft2") for axes in ("xx", "yy", "zz", "xy", "xz", "yz")}
         frame.inertia, frame.inverse_inertia = _inertia_matrices(**inertia)
-        frame.specific_force = [1.0 / frame.mass * read(name) for name in FORCES]
+        frame.specific_force = [1.0 / frame.mass * read_property(name) for name in FORCES]
         # Initial conditions fill the last values of the integrators with the current ones.
         frame.last_velocity, frame.second_last_velocity = frame.velocity, frame.velocity
         frame.last_acceleration = frame.acceleration
-        centre = [read(f"inertia/cg-{axis}-in") for axis in "xyz"]
-        frame.aero_arm = _arm_about_center([read(f"metrics/aero-rp-{axis}-in") for axis in "xyz"], centre)
+        centre = [read_property(f"inertia/cg-{axis}-in") for axis in "xyz"]
+        frame.aero_arm = _arm_about_center([read_property(f"metrics/aero-rp-{axis}-in") for axis in "xyz"], centre)
         for force in self._program.forces:
             base = f"external_reactions/{force.name}"
-            direction = [read(f"{base}/{axis}") for axis in ("lmn" if force.is_moment else "xyz")]
+            direction = [read_property(f"{base}/{axis}") for axis in ("lmn" if force.is_moment else "xyz")]
             axes = [0.0] * 3 + direction + [0.0] * 3
             if not force.is_moment:
                 axes = (
                     direction
                     + [0.0] * 3
-                    + _arm_about_center([read(f"{base}/location-{axis}-in") for axis in "xyz"], centre)
+                    + _arm_about_center([read_property(f"{base}/location-{axis}-in") for axis in "xyz"], centre)
                 )
             numbers[force.axes : force.axes + len(axes)] = axes
         for block in self._program.actuators:
@@ -192,16 +192,16 @@ class CompiledModel:
     def _copy_contacts(self, centre: Sequence[float]) -> None:
         """Copy the contacts from JSBSim.
 
-        Raises UnsupportedModel if a contact is on the ground, because JSBSim does not state its friction.
+        Raises UnsupportedModel if a contact is on the ground, because JSBSim has no property for its friction forces.
 
         centre: center of gravity in JSBSim's structural frame, inches.
         """
-        read, frame = self._fdm.properties.read, self.frames[0]
+        read_property, frame = self._fdm.properties.read, self.frames[0]
         frame.centre, frame.terrain = centre, self._fdm.terrain_amsl / FOOT
         for contact, data in zip(self.contacts, self._program.contacts, strict=True):
-            if read(f"{data.base}/WOW"):
+            if read_property(f"{data.base}/WOW"):
                 raise UnsupportedModel("a start on the ground")
-            contact.position = [read(f"{data.base}/{axis}-position") for axis in "xyz"]
+            contact.position = [read_property(f"{data.base}/{axis}-position") for axis in "xyz"]
             contact.arm = _arm_about_center(contact.position, centre)
             for field in data._fields[1:]:
                 contact[field] = getattr(data, field)
@@ -214,7 +214,7 @@ class CompiledModel:
         scales = [command.above for command in self._fdm.aircraft.model.commands] + [1.0] * 3
         names = [*(command.name for command in self._fdm.aircraft.model.commands), *GUST]
         for k, (name, move, scale) in enumerate(zip(names, moves, scales, strict=True)):
-            # From a Gray code, so that few inputs move at a time and all combinations occur.
+            # A Gray code gives the signs: few inputs move at a time, and all combinations occur.
             sign = 1.0 if (round_number ^ (round_number >> 1)) >> k % 5 & 1 else -1.0
             register = self.properties[name]
             self.numbers[register] = initial_numbers[register] + sign * move * scale

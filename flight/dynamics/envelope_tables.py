@@ -59,7 +59,7 @@ def load_envelope(aircraft: Aircraft, *, motor_braking: bool = False) -> Envelop
         write_tables(file, key, tables)
     uncertainty = read_uncertainty(aircraft.folder)
     if uncertainty is not None and uncertainty.source == SHEET_SOURCE:
-        tables["level_speed_min"] = _stated_min_speeds(tables, aircraft.stall_speed)
+        tables["level_speed_min"] = _limit_to_stall_speed(tables, aircraft.stall_speed)
     return Envelope(
         source="" if uncertainty is None else uncertainty.source,
         climb_sd=0.0 if uncertainty is None else uncertainty.climb_sd,
@@ -78,12 +78,11 @@ def load_envelope(aircraft: Aircraft, *, motor_braking: bool = False) -> Envelop
     )
 
 
-def _stated_min_speeds(tables: Mapping[str, Floats], stall_speed: float) -> Floats:
-    """Return the lowest airspeeds of level flight by altitude, m/s.
+def _limit_to_stall_speed(tables: Mapping[str, Floats], stall_speed: float) -> Floats:
+    """Scale the lowest level-flight airspeeds so that sea level has at least the stated stall speed.
 
-    At sea level the lowest airspeed is at least the stated stall speed (m/s). The model of a data sheet would fly a few
-    per cent slower than this. It reaches the stated stall speed before the elevator reaches its stop, and without the
-    lift of the propeller.
+    A model made from a data sheet can fly a few per cent slower than the stall speed (m/s) of the sheet. The scaled
+    airspeeds are in m/s, one per altitude.
     """
     model_speeds = tables["level_speed_min"]
     factor = max(1.0, stall_speed / float(model_speeds[0])) if model_speeds[0] > 0.0 else 1.0
@@ -123,7 +122,7 @@ def compute_tables(aircraft: Aircraft, motor_braking: bool) -> dict[str, Floats]
             if trim := idle_descent(fdm, airspeed, amsl, last_descent):
                 last_descent, descent[airspeed_index, altitude_index] = trim, -trim.climb
                 powers["power_idle"][airspeed_index, altitude_index] = _power(fdm, trim)
-            if trim := steady_flight(fdm, airspeed, amsl, near=level_trims[-1] if level_trims else None):
+            if trim := steady_flight(fdm, airspeed, amsl, initial_trim=level_trims[-1] if level_trims else None):
                 level_trims.append(trim)
                 powers["power_level"][airspeed_index, altitude_index] = _power(fdm, trim)
         min_level_speed[altitude_index], max_level_speed[altitude_index] = _level_speed_range(fdm, amsl, level_trims)
@@ -152,8 +151,8 @@ def _check_commands(fdm: Fdm) -> None:
         if float(np.abs(accelerations[1] - accelerations[0]).max()) < _MIN_RESPONSE:
             property_name = fdm.aircraft.model.commands[index - QUANTITIES.index("elevator")].name
             raise FlightError(
-                f"{fdm.aircraft.model_file}: {property_name}, the {name}'s command, has no effect: no force and no"
-                " moment changes with it, so there is no level flight",
+                f"{fdm.aircraft.model_file}: the {name} command {property_name} has no effect: it changes no force and"
+                " no moment, so level flight cannot be trimmed",
                 file=fdm.aircraft.model_file,
                 field=f"model.command.{name}",
             )
@@ -179,7 +178,7 @@ def _level_speed_range(fdm: Fdm, amsl: float, level_trims: Sequence[Trim]) -> tu
 
 
 def _power(fdm: Fdm, trim: Trim) -> float:
-    """Return the battery power, or the heat of the fuel, in a trim, W."""
+    """Return the battery power in a trim, W; for a fuel engine, the heat of the fuel per second."""
     fdm.apply_trim(trim.vector())
     return float(fdm.read().power)
 

@@ -64,10 +64,11 @@ def check_start_position(lat_deg: float, lon_deg: float, amsl: float, terrain_am
     """
     if abs(lat_deg) >= 90.0 or abs(lon_deg) > 180.0:
         field, value = ("latitude", lat_deg) if abs(lat_deg) >= 90.0 else ("longitude", lon_deg)
-        text = f"start at latitude {lat_deg}, longitude {lon_deg}: not within +-90 and +-180 degrees"
-        raise FlightError(text, field=field, value=value, allowed="not within +-90 and +-180 degrees")
+        allowed = "the latitude must be within +-90 degrees, the longitude within +-180 degrees"
+        text = f"start at latitude {lat_deg}, longitude {lon_deg}: {allowed}"
+        raise FlightError(text, field=field, value=value, allowed=allowed)
     if not terrain_amsl < amsl < 11000.0:
-        allowed = f"not between ground ({terrain_amsl} m) and 11000 m"
+        allowed = f"must be above the ground ({terrain_amsl} m) and below 11000 m"
         raise FlightError(f"start at {amsl} m above sea level: {allowed}", field="start", value=amsl, allowed=allowed)
 
 
@@ -83,7 +84,7 @@ def load_model(
     copy: Path,
     aircraft: Aircraft,
     dt: float,
-    printed: Callable[[], str],
+    read_output: Callable[[], str],
     *,
     flat_earth: bool,
     is_tested: bool,
@@ -96,7 +97,7 @@ def load_model(
     instance: a JSBSim instance without a model, created for the folder ``copy``.
     copy: the empty folder.
     dt: time step, s.
-    printed: function that returns what JSBSim has printed so far.
+    read_output: function that returns the text that JSBSim has printed so far.
     flat_earth, is_tested, gear: see `Fdm`.
 
     Raises FlightError for a model that is missing, refused or not loadable.
@@ -134,7 +135,7 @@ def load_model(
         message = " ".join(str(error).split()).replace(str(folder), str(aircraft.model_file.parent))
         raise FlightError(f"{aircraft.model_file}: JSBSim: {message}", file=aircraft.model_file) from None
     if not loaded:
-        reason = jsbsim_reason(printed()) or "no reason is given"
+        reason = jsbsim_reason(read_output()) or "no reason is given"
         raise FlightError(f"{aircraft.model_file}: JSBSim cannot load this model: {reason}", file=aircraft.model_file)
     _check_mass(instance, aircraft)
 
@@ -153,7 +154,7 @@ def _check_mass(instance: Any, aircraft: Aircraft) -> None:
         raise FlightError(
             f"{file}: mass_kg = {aircraft.mass:g}: the model"
             f" {aircraft.model_file.name} has {mass:.5g} kg with its fuel; the two may differ by"
-            f" {100.0 * MASS_TOLERANCE:g} %",
+            f" at most {100.0 * MASS_TOLERANCE:g} %",
             file=file,
             field="mass_kg",
             value=aircraft.mass,
@@ -298,7 +299,7 @@ class Fdm:
         wind = np.array(wind_ned, dtype=np.float64)
         numbers = (lat_deg, lon_deg, amsl, course, airspeed, climb_angle, *wind.tolist(), terrain_amsl)
         if len(numbers) != 10 or not all(math.isfinite(number) for number in numbers):
-            message = f"the start takes ten finite numbers, three of them the wind, and has {numbers}"
+            message = f"start: expected ten finite numbers, three of them the wind; found {numbers}"
             raise FlightError(message, field="start", value=numbers)
         check_start_position(lat_deg, lon_deg, amsl, terrain_amsl)
         velocity = air_velocity(course, climb_angle, airspeed, wind)
@@ -352,7 +353,7 @@ class Fdm:
         terrain_amsl: float = 0.0,
         commands: Sequence[float] = (0.0, 0.0, 0.0, 0.0),
     ) -> None:
-        """Start a flight without a trim, for example at rest on the ground, or thrown.
+        """Start a flight without a trim, for example at rest on the ground or at a hand launch.
 
         position: lat_deg, lon_deg (geodetic) and amsl (m).
         attitude: roll, pitch, yaw (true), rad.
@@ -365,7 +366,7 @@ class Fdm:
         """
         numbers = (*position, *attitude, *velocity, *wind, terrain_amsl, *commands)
         if len(numbers) != 17 or not all(math.isfinite(number) for number in numbers):
-            raise FlightError(f"a release takes 17 finite numbers and has {numbers}", field="start", value=numbers)
+            raise FlightError(f"release: expected 17 finite numbers; found {numbers}", field="start", value=numbers)
         lat_deg, lon_deg, amsl = position
         # On the ground the aircraft's reference point may be at ground level: its contacts reach below it.
         check_start_position(lat_deg, lon_deg, amsl, min(terrain_amsl, amsl - 1.0))
@@ -455,7 +456,7 @@ class Fdm:
         return self.aircraft.max_elevator, self.aircraft.max_aileron, self.aircraft.max_rudder
 
     def first_guess(self) -> Floats:
-        """Return a trim vector from which an iteration can start, (8,): level flight at cruise."""
+        """Return the trim vector from which a trim search starts, (8,): approximate level flight at cruise."""
         return first_guess(self.aircraft.airspeed)
 
     def move_to(self, amsl: float) -> None:

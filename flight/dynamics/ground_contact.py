@@ -249,7 +249,13 @@ def _set_friction(
     min_force: float,
     max_force: float,
 ) -> None:
-    """Fill a friction record; limit the contact's last friction force to the range of the record."""
+    """Fill a friction record; limit the contact's last friction force to the range of the record.
+
+    kind: element of the contact's friction: along, across, or against its motion.
+    direction: unit vector of the friction force, in body axes.
+    arm: ft, in body axes, from the center of gravity.
+    min_force, max_force: lbf.
+    """
     friction.contact = contact_index
     friction.kind = kind
     friction.min_force = min_force

@@ -128,51 +128,51 @@ def _clip(value: float, lower: float, upper: float) -> float:
 
 
 @inlined
-def _interpolate_table(numbers: Floats, first: int, row_count: int, key: float) -> float:
+def _interpolate_table(numbers: Floats, first_register: int, row_count: int, key: float) -> float:
     """Interpolate a table linearly at a key; beyond an end of the table return the value at this end.
 
-    first: first register of the table; a row of the table is a key and a value.
+    first_register: first register of the table; a row of the table is a key and a value.
     """
-    last_row = first + 2 * (row_count - 1)
-    if key <= numbers[first]:
-        return numbers[first + 1]
+    last_row = first_register + 2 * (row_count - 1)
+    if key <= numbers[first_register]:
+        return numbers[first_register + 1]
     if key >= numbers[last_row]:
         return numbers[last_row + 1]
     lower, upper = 0, row_count - 1
     while upper - lower > 1:
         middle = (lower + upper) >> 1
-        if numbers[first + 2 * middle] < key:
+        if numbers[first_register + 2 * middle] < key:
             lower = middle
         else:
             upper = middle
-    row_below, row_above = first + 2 * lower, first + 2 * upper
+    row_below, row_above = first_register + 2 * lower, first_register + 2 * upper
     fraction = (key - numbers[row_below]) / (numbers[row_above] - numbers[row_below])
     return fraction * (numbers[row_above + 1] - numbers[row_below + 1]) + numbers[row_below + 1]
 
 
 @inlined
-def _step_actuator(numbers: Floats, first: int, value: float) -> float:
+def _step_actuator(numbers: Floats, first_register: int, value: float) -> float:
     """Advance an actuator by a time step, and return its output.
 
     The output follows the input with a lag, a rate limit and position limits. The position limits do not change the
     stored state.
 
-    first: first register of the actuator.
+    first_register: first register of the actuator.
     value: input.
     """
-    factor = numbers[first + INPUT_FACTOR]
+    factor = numbers[first_register + INPUT_FACTOR]
     if not math.isnan(factor):
-        lagged = factor * (value + numbers[first + LAG_INPUT])
-        lagged += numbers[first + LAG_OUTPUT] * numbers[first + OUTPUT_FACTOR]
-        numbers[first + LAG_INPUT], numbers[first + LAG_OUTPUT] = value, lagged
+        lagged = factor * (value + numbers[first_register + LAG_INPUT])
+        lagged += numbers[first_register + LAG_OUTPUT] * numbers[first_register + OUTPUT_FACTOR]
+        numbers[first_register + LAG_INPUT], numbers[first_register + LAG_OUTPUT] = value, lagged
         value = lagged
-    max_change = numbers[first + MAX_CHANGE]
+    max_change = numbers[first_register + MAX_CHANGE]
     if max_change < math.inf:
-        last_output = numbers[first + RATE_OUTPUT]
+        last_output = numbers[first_register + RATE_OUTPUT]
         change = value - last_output
         if change > max_change:
             value = last_output + max_change
         if change < -max_change:
             value = last_output - max_change
-        numbers[first + RATE_OUTPUT] = value
-    return _clip(value, numbers[first + LOWER_LIMIT], numbers[first + UPPER_LIMIT])
+        numbers[first_register + RATE_OUTPUT] = value
+    return _clip(value, numbers[first_register + LOWER_LIMIT], numbers[first_register + UPPER_LIMIT])

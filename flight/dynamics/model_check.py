@@ -158,9 +158,9 @@ def check_model(
     a property that the model reads but that neither JSBSim nor the model creates.
     """
     readers = {file.name: _read_model(file, main=True, remove_channels=shipped)}
-    pending = [readers[file.name]]
-    while pending:
-        reader = pending.pop()
+    pending_readers = [readers[file.name]]
+    while pending_readers:
+        reader = pending_readers.pop()
         for name, location in reader.included_files.items():
             path = _find_file(name, folders)
             if path is None:
@@ -168,7 +168,7 @@ def check_model(
                 raise FlightError(message, file=reader.file, field="file", value=name)
             if path.name not in readers:
                 readers[path.name] = _read_model(path, main=False, remove_channels=shipped)
-                pending.append(readers[path.name])
+                pending_readers.append(readers[path.name])
     if not shipped:
         _check_property_names(list(readers.values()), provided)
     return {name: reader.without_channels() for name, reader in readers.items()}
@@ -216,7 +216,7 @@ def _check_property_names(readers: Sequence[_Reader], provided: Callable[[str], 
         for name, line in reader.used_names.items():
             if name in created_names or (has_parts and _PART_PROPERTIES.match(name)) or provided(name):
                 continue
-            message = f"{reader.file}:{line}: property {name} is read, and neither JSBSim nor the model defines it"
+            message = f"{reader.file}:{line}: the property {name} is read, but neither JSBSim nor the model defines it"
             raise FlightError(message, file=reader.file, field=name)
 
 
@@ -300,7 +300,7 @@ _MAX_REASON_LINES = 4
 
 
 def jsbsim_reason(printed: str) -> str:
-    r"""Return in one line why JSBSim did not load a model; "" if it printed no reason.
+    r"""Return JSBSim's reason for not loading a model as one line; "" if it printed no reason.
 
     >>> jsbsim_reason("JSBSim startup beginning ...\n\nIn file /tmp/a/m.xml: line 91\n Unknown engine type\n")
     'In file m.xml: line 91 Unknown engine type'

@@ -208,13 +208,13 @@ class _Translator:
         }
         self._declare_properties()
         controls, aerodynamics, reactions = self.sections
-        fcs = self._instructions(self._translate_flight_control, controls)
-        aero = self._instructions(self._translate_aerodynamics, aerodynamics)
-        external = self._instructions(self._translate_external_reactions, reactions)
+        fcs = self._translate_section(self._translate_flight_control, controls)
+        aero = self._translate_section(self._translate_aerodynamics, aerodynamics)
+        external = self._translate_section(self._translate_external_reactions, reactions)
         numbers, actuators, forces = tuple(self.numbers), tuple(self.actuators), tuple(self.forces)
         return ModelProgram(numbers, fcs, aero, external, self.properties, actuators, forces, tuple(self.contacts))
 
-    def _instructions(self, translate_section: Callable[[Element], None], section: Element) -> tuple[int, ...]:
+    def _translate_section(self, translate_section: Callable[[Element], None], section: Element) -> tuple[int, ...]:
         """Translate a section, and return its instructions."""
         self._code = []
         translate_section(section)
@@ -227,33 +227,33 @@ class _Translator:
         for section in self.sections:
             for element in section.iter():
                 if element.tag == "property" and "value" in element.attrib:
-                    self._property(_element_text(element))
+                    self._property_register(_element_text(element))
                 elif element.tag in _COMPONENTS:
-                    self._property(_own_property(_component_property(element)))
+                    self._property_register(_check_model_property(_component_property(element)))
                 elif element.tag == "function" and "name" in element.attrib:
-                    self._property(_own_property(element.attrib["name"]))
+                    self._property_register(_check_model_property(element.attrib["name"]))
 
-    def _property(self, name: str) -> int:
+    def _property_register(self, name: str) -> int:
         """Return the register of a property; assign a new register to a new property."""
         if name not in self.properties:
-            self.properties[name] = self._new_register(0.0)
+            self.properties[name] = self._append_registers(0.0)
         return self.properties[name]
 
-    def _new_register(self, *values: float) -> int:
+    def _append_registers(self, *values: float) -> int:
         """Append registers with some values; return the index of the first new register."""
         self.numbers += values
         return len(self.numbers) - len(values)
 
-    def _constant(self, value: float) -> int:
+    def _constant_register(self, value: float) -> int:
         """Return the register of a constant; equal constants share a register."""
         key = value.hex()
         if key not in self._constants:
-            self._constants[key] = self._new_register(value)
+            self._constants[key] = self._append_registers(value)
         return self._constants[key]
 
     def _emit(self, operation: Operation, operands: Sequence[int], target: int | None = None) -> int:
         """Append an instruction, and return its target register; None for ``target`` means a new register."""
-        target = self._new_register(0.0) if target is None else target
+        target = self._append_registers(0.0) if target is None else target
         self._code += [operation, target, len(operands), *operands]
         return target
 
@@ -270,7 +270,7 @@ class _Translator:
             source = (
                 self._read_property(_element_text(element))
                 if tag[0] == "p"
-                else self._constant(_element_number(element))
+                else self._constant_register(_element_number(element))
             )
             return source if target is None else self._emit(Operation.PRODUCT, [source], target)
         if tag == "table":
@@ -287,7 +287,7 @@ class _Translator:
     def _read_property(self, name: str) -> int:
         """Return the register of a property, or of its negative for a name that begins with a minus sign."""
         if name.startswith("-"):
-            return self._emit(Operation.PRODUCT, [self._read_property(name[1:].strip()), self._constant(-1.0)])
+            return self._emit(Operation.PRODUCT, [self._read_property(name[1:].strip()), self._constant_register(-1.0)])
         if name not in self.properties:
             raise UnsupportedModel(f"property {name}")
         return self.properties[name]
@@ -309,7 +309,7 @@ class _Translator:
         keys = numbers[::2]
         if variables[0].get("lookup", "row") != "row" or len(numbers) % 2 or len(keys) < 2 or keys != sorted(set(keys)):
             raise UnsupportedModel("a table whose rows are not pairs with growing keys")
-        first_register = self._new_register(*numbers)
+        first_register = self._append_registers(*numbers)
         return self._emit(
             Operation.TABLE, [self._read_property(_element_text(variables[0])), first_register, len(keys)], target
         )
@@ -321,7 +321,7 @@ class _Translator:
         """
         _check_element(element, attributes={"name"} if may_have_name else (), children=_VALUES)
         if name := element.get("name"):
-            target = self._property(name)
+            target = self._property_register(name)
         content = [child for child in element if child.tag != "description"]
         if len(content) != 1:
             raise UnsupportedModel(f"<function> of {len(content)} values")
@@ -349,7 +349,7 @@ class _Translator:
         lag, rate_limit = element.find("lag"), element.find("rate_limit")
         lower, upper = _clip_limits(element) or (-math.inf, math.inf)
         # The factors depend on the time step, and the memory on the start of the flight.
-        first_register = self._new_register(*([math.nan] * LOWER_LIMIT), lower, upper)
+        first_register = self._append_registers(*([math.nan] * LOWER_LIMIT), lower, upper)
         self.actuators.append(
             ActuatorBlock(
                 first_register,
@@ -358,7 +358,9 @@ class _Translator:
                 math.inf if rate_limit is None else _element_number(rate_limit),
             )
         )
-        self._emit(Operation.ACTUATOR, [inputs[0], first_register], self._property(_component_property(element)))
+        self._emit(
+            Operation.ACTUATOR, [inputs[0], first_register], self._property_register(_component_property(element))
+        )
 
     def _translate_fcs_function(self, element: Element) -> None:
         """Translate a function of the flight controls, which may have limits."""
@@ -366,12 +368,12 @@ class _Translator:
         functions, limits = element.findall("function"), _clip_limits(element)
         if len(functions) != 1:
             raise UnsupportedModel(f"<fcs_function> of {len(functions)} functions")
-        output = self._property(_component_property(element))
+        output = self._property_register(_component_property(element))
         if limits is None:
             self._translate_function(functions[0], may_have_name=False, target=output)
         else:
             value = self._translate_function(functions[0], may_have_name=False)
-            self._emit(Operation.CLIP, [value, *map(self._constant, limits)], output)
+            self._emit(Operation.CLIP, [value, *map(self._constant_register, limits)], output)
 
     # Forces.
 
@@ -396,7 +398,7 @@ class _Translator:
                 if name in axes
                 else []
             )
-            self._emit(Operation.SUM, values or [self._constant(0.0)], frame_register(vector, element))
+            self._emit(Operation.SUM, values or [self._constant_register(0.0)], frame_register(vector, element))
 
     def _translate_external_reactions(self, section: Element) -> None:
         """Translate the functions of the external reactions, and the magnitudes of the forces and moments."""
@@ -413,7 +415,7 @@ class _Translator:
             if element.get("frame") != "BODY" or len(functions) != 1:
                 raise UnsupportedModel(f"<{element.tag}> that is not a function in the frame BODY")
             magnitude = self._translate_function(functions[0], may_have_name=False)
-            axes = self._new_register(*([0.0] * FORCE_REGISTERS))
+            axes = self._append_registers(*([0.0] * FORCE_REGISTERS))
             self.forces.append(ExternalForce(element.get("name", ""), is_moment, magnitude, axes))
 
 
@@ -506,13 +508,17 @@ def _component_property(element: Element) -> str:
     return name if "/" in name else "fcs/" + name.lower().replace(" ", "-")
 
 
-def _own_property(name: str) -> str:
-    """Return the name of a property that the model computes.
+def _check_model_property(name: str) -> str:
+    """Return the name of a property that the model computes, after checking that JSBSim does not use it.
 
-    Raises UnsupportedModel for a property that JSBSim itself computes or reads, such as a mass, a switch of a failure
-    or the direction of a force. JSBSim would use the model's value for it, but the program would not.
+    Raises UnsupportedModel for a property that JSBSim itself computes or reads, such as a mass, a failure switch or the
+    direction of a force. JSBSim would use the model's value for it, but the compiled program would not.
     """
-    root, _, rest = name.partition("/")
-    if root in _JSBSIM_ROOTS or (root == "aero" and rest in _JSBSIM_AERO_PROPERTIES) or "/malfunction/" in name:
-        raise UnsupportedModel(f"a model that computes {name}, a property of JSBSim's own")
+    root, _, relative_name = name.partition("/")
+    if (
+        root in _JSBSIM_ROOTS
+        or (root == "aero" and relative_name in _JSBSIM_AERO_PROPERTIES)
+        or "/malfunction/" in name
+    ):
+        raise UnsupportedModel(f"a model that computes {name}, which JSBSim uses itself")
     return name

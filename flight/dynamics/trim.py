@@ -45,7 +45,7 @@ class Engine:
     """
 
     def __init__(self, fdm: Any, dt: float, getter: Callable[[str], Any], setter: Callable[[str], Any]) -> None:
-        """Store the means of settling an engine in a JSBSim instance."""
+        """Look up the JSBSim properties that hold the aircraft still and run its engine."""
         self._exec, self._dt = fdm, dt
         kinds = ("rate/rotational", "rate/translational", "position/rotational", "position/translational")
         names = [f"simulation/integrator/{kind}" for kind in kinds]
@@ -69,8 +69,8 @@ class Engine:
     def settle(self, *, spin: bool) -> None:
         """Let the engine speed settle at the present airspeed and throttle.
 
-        Without ``spin`` the engine keeps its speed. Then only quantities that depend on their own derivative settle,
-        such as the lift of a changing angle of attack.
+        spin: True to let the engine speed change, False to keep it. With False, only quantities that depend on their
+            own derivative settle, such as the lift of a changing angle of attack.
 
         A light propeller settles within milliseconds, and would oscillate with longer steps. A heavy propeller takes a
         minute. A step of the engine's time constant leads directly to the steady speed, as in Newton's method.
@@ -264,14 +264,14 @@ def _trim_bounds(limits: tuple[float, float, float]) -> tuple[Floats, Floats]:
 
 
 def trim(
-    simulator: Simulator, amsl: float, fixed_values: Mapping[TrimQuantity, float], near: Trim | None = None
+    simulator: Simulator, amsl: float, fixed_values: Mapping[TrimQuantity, float], initial_trim: Trim | None = None
 ) -> Trim | None:
     """Return the steady flight at an altitude with two fixed quantities, or None if no trim is found.
 
-    near: trim from which the iteration starts; None to start from the simulator's initial guess.
+    initial_trim: trim from which the iteration starts; None to start from the simulator's initial guess.
     """
     simulator.move_to(amsl)
-    start = near.vector() if near else simulator.first_guess()
+    start = initial_trim.vector() if initial_trim else simulator.first_guess()
     values = solve_trim(simulator.apply_trim, fixed_values, simulator.surface_limits(), start)
     return None if values is None else trim_from_vector(values, amsl)
 
@@ -283,7 +283,7 @@ def trim_from_vector(values: Floats, amsl: float) -> Trim:
 
 
 def steady_flight(
-    simulator: Simulator, airspeed: float, amsl: float, climb: float = 0.0, near: Trim | None = None
+    simulator: Simulator, airspeed: float, amsl: float, climb: float = 0.0, initial_trim: Trim | None = None
 ) -> Trim | None:
     """Return the steady flight at an airspeed, altitude and climb angle, or None if no trim is found.
 
@@ -299,8 +299,8 @@ def steady_flight(
     >>> 0.3 < level.throttle < 0.9, steady_flight(model, 90.0, 500.0) is None
     (True, True)
     """
-    found_trim = trim(simulator, amsl, {"airspeed": airspeed, "climb": climb}, near)
-    if found_trim is None and near is None:
+    found_trim = trim(simulator, amsl, {"airspeed": airspeed, "climb": climb}, initial_trim)
+    if found_trim is None and initial_trim is None:
         # With little excess power the search fails from a distant start, and succeeds from the climb at the same
         # airspeed.
         steepest_climb = full_throttle_climb(simulator, airspeed, amsl)
@@ -309,29 +309,31 @@ def steady_flight(
     return found_trim
 
 
-def full_throttle_climb(simulator: Simulator, airspeed: float, amsl: float, near: Trim | None = None) -> Trim | None:
+def full_throttle_climb(
+    simulator: Simulator, airspeed: float, amsl: float, initial_trim: Trim | None = None
+) -> Trim | None:
     """Return the steady climb at full throttle at an airspeed (m/s) and altitude (m), or None."""
-    return trim(simulator, amsl, {"airspeed": airspeed, "throttle": 1.0}, near)
+    return trim(simulator, amsl, {"airspeed": airspeed, "throttle": 1.0}, initial_trim)
 
 
-def idle_descent(simulator: Simulator, airspeed: float, amsl: float, near: Trim | None = None) -> Trim | None:
+def idle_descent(simulator: Simulator, airspeed: float, amsl: float, initial_trim: Trim | None = None) -> Trim | None:
     """Return the steady descent with closed throttle at an airspeed (m/s) and altitude (m).
 
     Return None if no trim is found.
 
-    near: trim from which the iteration starts, as in `trim`.
+    initial_trim: trim from which the iteration starts, as in `trim`.
     """
-    return trim(simulator, amsl, {"airspeed": airspeed, "throttle": 0.0}, near)
+    return trim(simulator, amsl, {"airspeed": airspeed, "throttle": 0.0}, initial_trim)
 
 
-def fastest_level_flight(simulator: Simulator, amsl: float, near: Trim | None = None) -> Trim | None:
+def fastest_level_flight(simulator: Simulator, amsl: float, initial_trim: Trim | None = None) -> Trim | None:
     """Return level flight at full throttle at an altitude (m), or None if no trim is found."""
-    return trim(simulator, amsl, {"climb": 0.0, "throttle": 1.0}, near)
+    return trim(simulator, amsl, {"climb": 0.0, "throttle": 1.0}, initial_trim)
 
 
-def slowest_level_flight(simulator: Simulator, amsl: float, near: Trim | None = None) -> Trim | None:
+def slowest_level_flight(simulator: Simulator, amsl: float, initial_trim: Trim | None = None) -> Trim | None:
     """Return level flight with the elevator at its upper stop at an altitude (m), or None if no trim is found."""
-    return trim(simulator, amsl, {"climb": 0.0, "elevator": -simulator.surface_limits()[0]}, near)
+    return trim(simulator, amsl, {"climb": 0.0, "elevator": -simulator.surface_limits()[0]}, initial_trim)
 
 
 def linearise(simulator: Simulator, trim_point: Trim) -> tuple[Floats, Floats]:
@@ -434,7 +436,7 @@ def air_velocity(course: float, climb: float, airspeed: float, wind: Floats) -> 
     if speed <= 0.0:
         raise FlightError(
             f"no progress along the course of {math.degrees(course):.0f} degrees:"
-            f" airspeed {airspeed:.1f} m/s in {float(np.hypot(wind[0], wind[1])):.1f} m/s of wind",
+            f" airspeed {airspeed:.1f} m/s is too low for a wind of {float(np.hypot(wind[0], wind[1])):.1f} m/s",
             field="airspeed",
             value=airspeed,
         )

@@ -18,7 +18,7 @@ GAINS_FILE = "gains.toml"
 class Gains:
     """Gains of guidance and inner loops, in SI units and radians.
 
-    Uav and altitude:
+    Altitude:
 
     reference_airspeed: airspeed at which surface gains apply; they are scaled with dynamic pressure.
     height_frequency, height_damping, height_integral: second-order altitude law.
@@ -166,9 +166,10 @@ def load_gains(aircraft: Aircraft) -> Gains:
     required_names = {gain.name for gain in fields(Gains) if gain.default is MISSING}
     missing, unknown = sorted(required_names - set(values)), sorted(set(values) - gain_names)
     if missing or unknown:
+        faults = [f"{kind} {', '.join(names)}" for kind, names in (("missing", missing), ("unknown", unknown)) if names]
+        hint = did_you_mean(unknown[0], sorted(gain_names - set(values))) if unknown else ""
         raise FlightError(
-            f"{file}: missing {', '.join(missing) or 'nothing'}; unknown {', '.join(unknown) or 'nothing'}"
-            f"{did_you_mean(unknown[0], sorted(gain_names - set(values))) if unknown else ''}",
+            f"{file}: {'; '.join(faults)}{hint}",
             file=file,
             field=(missing + unknown)[0],
         )

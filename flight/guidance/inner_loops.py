@@ -100,6 +100,9 @@ def step_roll_model(
 
     The roll rate is rad/s, the roll acceleration rad/s^2. The model is a critically damped oscillator with limits of
     roll rate and roll acceleration.
+
+    bank_demand, bank: rad.
+    roll_rate: rad/s.
     """
     frequency = gains.roll_frequency
     acceleration_max, rate_max = gains.roll_acceleration_max, gains.roll_rate_max

@@ -111,7 +111,9 @@ def l1_angles(
 
 @inner
 def l1_integrate(aim_angle: float, integrator: float, gain: float, dt: float) -> float:
-    """Return the cross-track integrator (`_L1_xtrack_i` of AP_L1_Control) after one more tick, rad.
+    """Return the cross-track integrator of L1 (`_L1_xtrack_i` of AP_L1_Control) after one more tick, rad.
+
+    It integrates the angle between the leg and the direction to the L1 point.
 
     aim_angle: angle between the leg and the direction to the L1 point, rad, NaN while L1 aims at a waypoint.  The
         integrator changes only while the magnitude of this angle is below 5 degrees.
@@ -127,13 +129,16 @@ def l1_acceleration(angle: float, speed: float, l1_distance: float, damping: flo
     """Return the acceleration to the right that L1 demands (`_latAccDem` of AP_L1_Control), m/s^2.
 
     angle: angle from the direction to the L1 point to the ground velocity, rad, positive to the right.
+    speed: ground speed, m/s.
+    l1_distance: L1 distance, m.
+    damping: NAVL1_DAMPING.
     """
     angle = min(0.5 * math.pi, max(-0.5 * math.pi, angle))
     return -4.0 * damping * damping * speed * speed / l1_distance * math.sin(angle)
 
 
 @inner
-def has_l1_reached(motion: Record, a: Record, b: Record, l1_distance: float, radius: float) -> bool:
+def has_reached_leg_end(motion: Record, a: Record, b: Record, l1_distance: float, radius: float) -> bool:
     """Return True if the aircraft has reached waypoint b, the end of the leg from a to b.
 
     The waypoint is reached within the turn distance, or past the line across the leg at b. A fly-over waypoint is
@@ -142,6 +147,7 @@ def has_l1_reached(motion: Record, a: Record, b: Record, l1_distance: float, rad
     motion: a record of `flight.guidance.navigation_error.MOTION`.
     a, b: start and end of the leg, records of `WAYPOINT`.
     radius: turn distance for a turn of 90 degrees, m; smaller turns start later.
+    l1_distance: L1 distance, m, the upper limit of the turn distance.
     """
     leg_east, leg_north = b.east - a.east, b.north - a.north
     to_b_east, to_b_north = b.east - motion.east, b.north - motion.north

@@ -88,7 +88,7 @@ def gains_at_airspeed(airspeed: float) -> dict[str, float]:
 
 
 def airframe_gains(aircraft: Aircraft, fdm: Fdm | None = None) -> dict[str, float]:
-    """Return the gains that follow from the airframe's linear model in level cruise.
+    """Compute the gains that follow from the airframe's linear model in level cruise.
 
     Raises FlightError if the aircraft cannot hold level flight at cruise.
     """
@@ -100,7 +100,7 @@ def _level_cruise(aircraft: Aircraft, fdm: Fdm) -> Trim:
     """Return the trim of level flight at cruise. Raises FlightError if no trim exists."""
     level = steady_flight(fdm, aircraft.airspeed, AMSL)
     if level is None:
-        message = f"{aircraft.name} cannot hold level flight at {aircraft.airspeed:g} m/s and {AMSL:g} m"
+        message = f"{aircraft.name} cannot hold level flight at {aircraft.airspeed:g} m/s and an altitude of {AMSL:g} m"
         raise FlightError(message, file=aircraft.model_file, field="airspeed", value=aircraft.airspeed)
     return level
 

@@ -70,7 +70,12 @@ def estimate_motion(
 def _step_error(
     lags: Record, axis: int, noise: Floats, sigma: float, time_constant: float, dt: float
 ) -> tuple[float, float]:
-    """Advance the error of one axis by a tick; return the errors of position (m) and velocity (m/s)."""
+    """Advance the error of one axis by a tick; return the errors of position (m) and velocity (m/s).
+
+    noise: random numbers from the standard normal distribution, (3,).
+    sigma: standard deviation of the position error, m.
+    time_constant: correlation time of the error, s.
+    """
     decay = math.exp(-dt / time_constant)
     # The second lag's variance is half of the first lag's variance.
     scale = sigma * math.sqrt(2.0)

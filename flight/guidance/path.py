@@ -238,8 +238,8 @@ def fly_by_path(
     >>> from flight.simulation.setup import make_limits
     >>> from world.scenario import load_scenario
     >>> limits = make_limits(load_scenario("tight"), load_envelope(load_aircraft("aerosonde")), 25.0, 0.5)
-    >>> way = np.array([[0.0, 0.0, 500.0], [0.0, 1000.0, 500.0], [1000.0, 1000.0, 520.0]])
-    >>> path = fly_by_path(Route(route_points(way, 25.0), ""), limits)
+    >>> positions = np.array([[0.0, 0.0, 500.0], [0.0, 1000.0, 500.0], [1000.0, 1000.0, 520.0]])
+    >>> path = fly_by_path(Route(route_points(positions, 25.0), ""), limits)
     >>> path.pieces["length"].round().tolist(), round(1.0 / path.pieces["curvature"][1])
     ([883.0, 183.0, 883.0], 117)
     """
@@ -293,9 +293,9 @@ def reversals(route: Route) -> NDArray[np.int64]:
     At such a waypoint the turn may go to either side.
 
     >>> from flight.mission.route import route_points
-    >>> way = np.array([[0.0, 0.0, 90.0], [0.0, 900.0, 90.0], [60.0, 0.0, 90.0], [900.0, 0.0, 90.0]])
-    >>> over = np.array([False, True, True, False])
-    >>> reversals(Route(route_points(way, 25.0, fly_over=over), "")).tolist()
+    >>> positions = np.array([[0.0, 0.0, 90.0], [0.0, 900.0, 90.0], [60.0, 0.0, 90.0], [900.0, 0.0, 90.0]])
+    >>> fly_over = np.array([False, True, True, False])
+    >>> reversals(Route(route_points(positions, 25.0, fly_over=fly_over), "")).tolist()
     [1]
     """
     turns = np.concatenate([[0.0], np.abs(signed_turns(route.positions)), [0.0]])
@@ -316,8 +316,9 @@ def _ground_following_corners(
 ) -> list[tuple[float, float]]:
     """Return the corners of the altitude profile on a leg that follows the ground.
 
-    A corner is a pair (distance along the path, altitude), m. The height above ground changes linearly, from that at
-    the leg's start to the height that the leg's end states. There is no corner where the ground is unknown.
+    A corner is a pair (distance along the path, altitude AMSL), m. The height above ground changes linearly from its
+    value at the start of the leg to the value that the mission item at the end states. Places where the terrain is
+    unknown have no corner.
 
     segment_start: east and north of the start of the leg's straight part, m, (2,).
     start_distance: distance of the straight part's start along the path, m.
@@ -350,8 +351,10 @@ def _arcs_at_waypoints(
 ) -> tuple[Floats, Floats, Floats]:
     """Return the tangent lengths, radii and return lengths of the arcs at all waypoints, m, (w,) each.
 
-    The tangents of fly-by arcs are shortened if a leg is too short for them. After a fly-over waypoint, the path joins
-    the next leg after the return length; it is 0 if that leg is too short.
+    tangent length: distance from a fly-by waypoint to the start and the end of its arc. It is shortened if a leg is too
+        short.
+    return length: distance from a fly-over waypoint to the point where the path joins the next leg. It is 0 if that leg
+        is too short.
     """
     count = len(route.points)
     tangents, radii, return_lengths = np.zeros(count), np.zeros(count), np.zeros(count)
@@ -501,17 +504,17 @@ def _bearing_to_origin(item: MissionItem) -> float:
     return math.atan2(-item.lon_deg, -item.lat_deg / math.cos(math.radians(0.5 * item.lat_deg)))
 
 
-def _set_exit_bearing(waypoints: Records, last: int, items: dict[int, MissionItem]) -> None:
+def _set_exit_bearing(waypoints: Records, last_index: int, items: dict[int, MissionItem]) -> None:
     """Set the bearing at which ArduPlane leaves a loiter before an RTL, if there is such a loiter.
 
     It is the bearing of 0 N, 0 E, because the RTL item has no position, and ArduPlane reads this as 0 N, 0 E.
 
-    last: index of the last waypoint before the RTL.
+    last_index: index of the last waypoint before the RTL.
     """
-    item = items.get(int(waypoints["item"][last]))
+    item = items.get(int(waypoints["item"][last_index]))
     if item is not None and item.has_position and stated_loiter(item) is not None:
         bearing = _bearing_to_origin(item) % (2.0 * math.pi)
-        waypoints["exit_bearing"][waypoints["stop"] == waypoints["stop"][last]] = bearing or 2.0 * math.pi
+        waypoints["exit_bearing"][waypoints["stop"] == waypoints["stop"][last_index]] = bearing or 2.0 * math.pi
 
 
 def _set_landing(waypoints: Records, mission: Mission | None) -> None:
@@ -521,11 +524,11 @@ def _set_landing(waypoints: Records, mission: Mission | None) -> None:
     """
     if mission is None:
         return
-    flown = [item for item in mission.items if item.command in PLACES | TAKEOFFS | LANDINGS and item.has_position]
-    last_items = [item.seq for item, next_item in pairwise(flown) if next_item.command in LANDINGS]
+    flown_items = [item for item in mission.items if item.command in PLACES | TAKEOFFS | LANDINGS and item.has_position]
+    last_items = [item.seq for item, next_item in pairwise(flown_items) if next_item.command in LANDINGS]
     waypoints["precedes_landing"] = np.isin(waypoints["item"], last_items)
     first_seq = next((item.seq for item in mission.items if item.command == Command.DO_LAND_START), math.inf)
-    landing_items = [item for item in flown if item.seq > first_seq][1:]
+    landing_items = [item for item in flown_items if item.seq > first_seq][1:]
     plain_items = [item.seq for item in landing_items if item.command == Command.NAV_WAYPOINT]
     waypoints["ignores_altitude"] = np.isin(waypoints["item"], plain_items)
 

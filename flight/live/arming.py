@@ -79,17 +79,18 @@ class ArmingState:
         )
 
     def arm(self, should_arm: bool, param2: float) -> CommandResult:
-        """Arm or disarm (MAV_CMD_COMPONENT_ARM_DISARM).
+        """Arm or disarm the vehicle (MAV_CMD_COMPONENT_ARM_DISARM), or refuse the command.
 
         param2: second parameter of the command; the values in `_FORCE_VALUES` force the command.
 
-        The result is IN_PROGRESS if the command must be repeated after the verdict.
+        The result is IN_PROGRESS while the verdict on the mission is awaited; the command must then be repeated.
         """
         is_forced = param2 in _FORCE_VALUES
         if not should_arm:
             if self.flying and not is_forced:
                 return CommandResult(
-                    DENIED, "in flight: a forced disarm (param2 21196; MAVProxy: disarm force) ends the flight"
+                    DENIED,
+                    "disarm denied in flight: a forced disarm (param2 21196; MAVProxy: disarm force) ends the flight",
                 )
             self.end_requested = self.flying
             self.armed = False
@@ -140,7 +141,7 @@ class ArmingState:
         return CommandResult(ACCEPTED) if should_continue else CommandResult(DENIED, "pause denied: not in flight")
 
     def go_to(self, center: LoiterCenter) -> CommandResult:
-        """Fly to a position and loiter there, in GUIDED."""
+        """Request a flight to a loiter, in mode GUIDED; denied on the ground."""
         if not self.flying:
             return CommandResult(DENIED, "go-to denied: not in flight")
         self.mode, self.loiter_center = GUIDED, center
@@ -148,11 +149,14 @@ class ArmingState:
         return CommandResult(ACCEPTED)
 
     def continue_from_current_item(self) -> None:
-        """Continue the mission from the item that was set in flight."""
+        """Request that the flight continue from the mission item that a station has just made the current one.
+
+        A loiter center without values stands for this request.
+        """
         self.loiter_center = LoiterCenter()
 
     def set_flight_mode(self, mode: int) -> None:
-        """Set the mode and the mission state of a diverted flight."""
+        """Set the mode of a flight; the mission is active in AUTO, and paused in any other mode."""
         self.mode = mode
         self.mission_state = ACTIVE if mode == AUTO else PAUSED
 
@@ -169,7 +173,7 @@ class ArmingState:
         return CommandResult(ACCEPTED)
 
     def on_mission_uploaded(self) -> None:
-        """Wait for the verdict on an uploaded mission."""
+        """Set the state for an uploaded mission whose verdict is awaited."""
         self.is_judging, self.mission_state = True, NOT_STARTED
 
     def on_mission_judged(self, verdict: MissionJudged) -> str:
@@ -203,9 +207,9 @@ class ArmingState:
         self.mode, self.loiter_center = MANUAL, None
 
     def _arming_refusal(self, is_forced: bool) -> str:
-        """Return the reason why arming is refused, or "" if it is not.
+        """Return the reason to refuse arming because of the last verdict, or "" to allow it.
 
-        is_forced: True to allow a failed verdict.
+        is_forced: True to allow a mission that is judged not flyable.
         """
         if self.last_verdict is None:
             return ""

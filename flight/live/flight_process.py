@@ -83,7 +83,7 @@ class StartFlight:
 
 @dataclass(frozen=True, slots=True)
 class LoiterCenter:
-    """Center of a loiter.
+    """Center of a loiter that a ground station requests.
 
     lat_deg, lon_deg: NaN for the aircraft's position.
     alt: m in the frame, NaN for the aircraft's altitude.
@@ -147,7 +147,7 @@ class MissionJudged:
 
 @dataclass(frozen=True, slots=True)
 class FlightDiverted:
-    """Event: the aircraft flies another route, or continues on its route because it cannot be diverted.
+    """Event: the aircraft flies another route, or stays on its route because it cannot be diverted.
 
     mode: current mode of the flight.
     problem: reason why the flight cannot be diverted, or "".
@@ -307,7 +307,7 @@ class _RequestQueue:
     def is_ending(self) -> bool:
         """Return True if the process must end, because of a request or a closed link.
 
-        All requests stay in the queue.
+        Requests that have arrived are moved to the queue, and none is removed from it.
         """
         try:
             while self._connection.poll():
@@ -320,7 +320,11 @@ class _RequestQueue:
 def _run_flight(
     connection: Connection, requests: _RequestQueue, prepared: PreparedFlight, factory: FlightFactory
 ) -> bool:
-    """Fly a prepared mission in real time, log and judge it; return False if the process must end."""
+    """Fly a prepared mission in real time, log it and judge it; return False if the process must end.
+
+    connection: this end of the pipe to the link, for events.
+    requests: requests that arrive during the flight.
+    """
     try:
         # A diverted flight continues in the same instance of JSBSim.
         flight = Flight(prepared.setup, factory.aircraft, local_map=prepared.local_map, engine="jsbsim")
@@ -366,7 +370,11 @@ class _LoggedFlight:
         self._loiter_logs = 0
 
     def run_in_real_time(self) -> tuple[str, bool]:
-        """Run the flight in real time; return its end reason, and True if the process has to continue."""
+        """Fly in real time until the flight ends, and serve the requests that arrive.
+
+        Returns the end reason, and False if the process must end afterwards. If the flight falls behind the clock by
+        more than `_MAX_DELAY_S`, the excess is not made up.
+        """
         clock, speed = time.monotonic, self._factory.speed
         time_origin = start_time = clock()
         ticks, last_flush, snapshot_count = 0, time_origin, 0
@@ -416,7 +424,7 @@ class _LoggedFlight:
             log.abandon()
 
     def _write(self) -> None:
-        """Write the waiting rows to the last log."""
+        """Write the rows since the last call to the current log, and hand them to the operating system."""
         self._logs[-1].write(as_track(join_rows(self._unwritten_rows)))
         self._unwritten_rows.clear()
 
@@ -433,9 +441,9 @@ class _LoggedFlight:
         send_event(self._connection, FlightDiverted(request.mode, "", tuple(int(item) for item in route.items)))
 
     def _start_route(self, request: DivertFlight, end_reason: str) -> bool:
-        """Start a route at the aircraft's position, with its own log; return False if no such route exists.
+        """Start another route at the aircraft's position, with its own log; return False if no such route exists.
 
-        end_reason: text on the end of the current route.
+        end_reason: reason for the end of the current route, for its log.
         """
         try:
             prepared = self._factory.prepare_diversion(request, self._flight.position)

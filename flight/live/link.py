@@ -73,7 +73,10 @@ class Decoder:
 
 
 def split_frames(data: bytes) -> list[MavlinkFrame]:
-    """Return the complete frames in a datagram, in order; damaged frames are skipped."""
+    """Return the complete MAVLink frames in a datagram, in order; damaged frames are skipped.
+
+    At most `MAX_FRAMES` frames and `MAX_DATAGRAM_BYTES` bytes are read.
+    """
     frames: list[MavlinkFrame] = []
     data = data[:MAX_DATAGRAM_BYTES]
     offset = 0
@@ -88,7 +91,10 @@ def split_frames(data: bytes) -> list[MavlinkFrame]:
 
 
 def _parse_frame(data: bytes, offset: int) -> MavlinkFrame | None:
-    """Return the frame that starts at an offset, or None if no complete frame starts there."""
+    """Return the frame that starts at an offset, or None if no complete and valid frame starts there.
+
+    A frame is valid if its message is known, its checksum is right, and its only flag is the signature's.
+    """
     is_v2 = data[offset] == MAGIC_V2
     header_size = 10 if is_v2 else 6
     if len(data) - offset < header_size + 2:
@@ -207,9 +213,10 @@ class Signing:
     def find_refusal(self, frame: MavlinkFrame, wall: float) -> RefusalReason | None:
         """Return the reason to distrust a frame; None if it is signed with the key and newer than its stream.
 
-        A stream is identified by system, component and link id. A frame with a bad signature changes nothing.
-
         wall: time since 1970, s.
+
+        The frames with the same system, component and link id form a stream. Its last timestamp is stored. A frame with
+        a bad signature changes nothing.
         """
         if not frame.signed:
             return RefusalReason.UNSIGNED
@@ -240,7 +247,10 @@ class Signing:
         return None
 
     def sign(self, packed: bytes, wall: float) -> bytes:
-        """Sign a packed MAVLink 2 frame that is not signed yet.
+        """Return a packed MAVLink 2 frame with a signature.
+
+        packed: bytes of the frame without a signature.
+        wall: time since 1970, s.
 
         After the year 2104 timestamps stay at the maximum of six bytes, so stations drop the frames as repeated.
         """
@@ -337,10 +347,11 @@ class Access:
 
 
 def check_access(access: Access) -> None:
-    """Raise FlightError if other machines could access the vehicle without protection.
+    """Raise FlightError if other machines could access the vehicle without protection, or cannot be reached.
 
     Loopback addresses need no protection. Any other address to listen at needs a key or a list of allowed addresses.
-    Any other address to send to needs a key, or must be on that list. The error names the missing argument.
+    Any other address to send to needs a key, or must be on that list; it cannot be reached from a loopback address. The
+    error names the argument at fault.
 
     >>> check_access(Access(("127.0.0.1", 14551), (("127.0.0.1", 14550),)))
     >>> check_access(Access(("0.0.0.0", 14551), ()))
@@ -408,7 +419,7 @@ class Link:
         self._socket.close()
 
     def fileno(self) -> int:
-        """Return the descriptor for `multiprocessing.connection.wait`, which accepts sockets on any system."""
+        """Return the socket's file descriptor, by which `multiprocessing.connection.wait` waits for the link."""
         return self._socket.fileno()
 
     @property
@@ -463,7 +474,7 @@ class Link:
         return messages
 
     def _is_local_request(self, message: Any, source: Address) -> bool:
-        """Return True if a message from this machine addresses the vehicle.
+        """Return True if a message comes from this machine and states the vehicle's system id as its target.
 
         Such a message is accepted even if its sender sends no heartbeats.
         """
@@ -472,7 +483,7 @@ class Link:
         )
 
     def _notice_stranger(self, message: Any, host: str) -> None:
-        """Add a notice on why an address gets no answer, once for each address."""
+        """Add a notice that messages from an address are not answered, once for each address."""
         if (
             host in self._named_strangers
             or len(self._named_strangers) >= _MAX_NAMED_STRANGERS
@@ -484,7 +495,7 @@ class Link:
         self._notices.append(f"{host} sends {message.get_type()} and no HEARTBEAT{full_text}: it is not answered")
 
     def _notice_clock_ahead(self, host: str) -> None:
-        """Add a notice that one of two clocks is wrong, once for each address that has the key."""
+        """Add a notice that a sender's clock is more than a day ahead of this one, once for each address."""
         if host in self._named_ahead or len(self._named_ahead) >= _MAX_NAMED_STRANGERS:
             return
         self._named_ahead.add(host)
@@ -508,7 +519,11 @@ class Link:
         dropped.streams += reason is RefusalReason.STREAMS
 
     def _register_peer(self, source: Address, system: int, component: int) -> Peer | None:
-        """Return the station at an address, which may be new; None if the table of stations is full."""
+        """Return the station at an address, which may be new; None if the table of stations is full.
+
+        source: address of the station.
+        system, component: MAVLink ids of the station.
+        """
         now = self.clock()
         self.peers = {key: peer for key, peer in self.peers.items() if now - peer.last_heard_time < PEER_TIMEOUT_S}
         peer = self.peers.get(source)
@@ -524,7 +539,7 @@ class Link:
         return peer
 
     def _frame_encoder(self, address: Address) -> Any:
-        """Return the encoder of frames to an address, which counts the sequence numbers of the frames."""
+        """Return the encoder of frames to an address; each address has its own sequence numbers."""
         return self._expected_stations.get(address) or mavlink.MAVLink(None, SYSTEM, COMPONENT)
 
     @staticmethod

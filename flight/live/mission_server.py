@@ -63,10 +63,11 @@ def to_message(
     seq: int | None = None,
     mission_type: MissionType | None = None,
 ) -> Any:
-    """Return an item as MISSION_ITEM_INT; x and y are rounded to 1e-7 degrees, not truncated.
+    """Convert an item to a MISSION_ITEM_INT message; latitude and longitude are rounded to 1e-7 degrees.
 
-    seq: None keeps the item's own number.
-    mission_type: None takes the type of the item's command.
+    current: True for the item that is flown now.
+    seq: number of the item in the message; None for the item's own number.
+    mission_type: list that the item belongs to; None to judge it by the item's command.
 
     >>> message = to_message(MissionItem(3, 16, 0, (0.0,) * 4, 46.0, 8.0, 500.0))
     >>> message.get_type(), message.seq, message.x
@@ -91,7 +92,7 @@ def to_message(
 
 
 def from_message(message: Any, source: str) -> MissionItem:
-    """Return the item of a MISSION_ITEM_INT or MISSION_ITEM message.
+    """Convert a MISSION_ITEM_INT or MISSION_ITEM message to an item.
 
     source: name of the sender in messages.
 
@@ -113,10 +114,10 @@ def from_message(message: Any, source: str) -> MissionItem:
     for name, value in (*zip(("p1", "p2", "p3", "p4"), params, strict=True), ("altitude", item.alt)):
         if math.isinf(value):
             problem = ItemProblem(name, value, "a finite number, or NaN for unset")
-            raise MissionError(**problem.at(source, f"{source}: item {item.seq}"))
+            raise MissionError(**problem.error_arguments(source, f"{source}: item {item.seq}"))
     item_fault = item_problem(item)
     if item_fault is not None:
-        raise MissionError(**item_fault.at(source, f"{source}: item {item.seq}"))
+        raise MissionError(**item_fault.error_arguments(source, f"{source}: item {item.seq}"))
     return item
 
 
@@ -124,19 +125,20 @@ def from_message(message: Any, source: str) -> MissionItem:
 # Conversion between the stations' numbers and the flown mission: home, seq and jumps.
 
 
-def uploaded_mission(lists: dict[MissionType, tuple[MissionItem, ...]], own_home: Home) -> tuple[Mission, int]:
-    """Return the mission in uploaded lists, and the offset between its item numbers and the stations' numbers.
+def uploaded_mission(lists: dict[MissionType, tuple[MissionItem, ...]], vehicle_home: Home) -> tuple[Mission, int]:
+    """Return the mission in uploaded lists, and the offset from its item numbers to the stations' numbers.
+
+    vehicle_home: the vehicle's home, for a mission without home.
 
     As in ArduPilot, item 0 is home if it is a waypoint with an altitude above mean sea level or without parameters. The
-    `mission` plugin of MAVSDK sends no home, and its waypoints are relative and have a radius.
-
-    own_home: the vehicle's home, for a mission without home.
+    offset is then 0. The `mission` plugin of MAVSDK sends no home: its item 0 is a waypoint with a height above home
+    and a radius. The offset is then -1, because the mission's items are numbered from 1.
     """
     items = lists[MissionType.MISSION]
-    home = own_home
+    home = vehicle_home
     if items and _is_home(items[0]):
         home_item = items[0]
-        home = Home(home_item.lat_deg, home_item.lon_deg, home_item.alt) if home_item.has_position else own_home
+        home = Home(home_item.lat_deg, home_item.lon_deg, home_item.alt) if home_item.has_position else vehicle_home
         items = items[1:]
         shift = 0
     else:
@@ -152,14 +154,16 @@ def uploaded_mission(lists: dict[MissionType, tuple[MissionItem, ...]], own_home
 
 
 def _is_home(item: MissionItem) -> bool:
-    """Return True if item 0 of an upload is home; see `uploaded_mission`."""
+    """Return True if item 0 of an upload is home: a waypoint with an altitude AMSL or without parameters."""
     if item.command != Command.NAV_WAYPOINT or not is_located(item.command, item.frame):
         return False
     return item.frame in AMSL or not any(item.params)
 
 
 def mission_lists(mission: Mission) -> tuple[tuple[MissionItem, ...], ...]:
-    """Return the lists of a mission for stations: home first, numbers without gaps, jumps renumbered.
+    """Return a mission's lists of items, fences and rally points as stations number them, from 0.
+
+    Home is item 0. Jumps lead to the new numbers; a jump to a missing item leads to number 65535.
 
     >>> place = MissionItem(4, 16, 0, (0.0,) * 4, 46.0, 8.0, 75.0)
     >>> items, fences, rally = mission_lists(Mission(Home(46.0, 8.0, 0.0), (place, replace(place, seq=7))))
@@ -185,15 +189,15 @@ def mission_lists(mission: Mission) -> tuple[tuple[MissionItem, ...], ...]:
 
 
 def start_problem(mission: Mission, first_seq: int, *, in_flight: bool = False) -> str:
-    """Return why a mission cannot be flown from a given item, or "".
+    """Return the reason why a mission cannot be flown from an item on, or "" if it can.
 
     first_seq: number (seq) of the item.
     in_flight: True if the first leg will be the leg from the aircraft to the item.
 
     >>> place = MissionItem(1, 16, 0, (0.0,) * 4, 46.0, 8.0, 75.0)
-    >>> way = Mission(None, (place, replace(place, seq=2), replace(place, seq=3)))
-    >>> start_problem(way, 2), start_problem(way, 3)
-    ('', 'no leg is left to fly from there')
+    >>> mission = Mission(None, (place, replace(place, seq=2), replace(place, seq=3)))
+    >>> start_problem(mission, 2), start_problem(mission, 3)
+    ('', 'the mission has no leg after this item')
     """
     if not mission.items or not 0 <= first_seq <= mission.items[-1].seq:
         return "the mission has no such item"
@@ -202,21 +206,19 @@ def start_problem(mission: Mission, first_seq: int, *, in_flight: bool = False) 
     return (
         ""
         if first_seq <= mission.items[0].seq or len(positions) >= min_position_count
-        else "no leg is left to fly from there"
+        else "the mission has no leg after this item"
     )
 
 
 def mission_from_item(mission: Mission, first_seq: int) -> Mission:
-    """Return a mission that begins with a given item and the speed before it.
+    """Return the part of a mission from an item on, preceded by the last speed change before the item.
 
-    The last speed change before the item is kept. Items keep their numbers.
-
-    first_seq: number (seq) of the item.
+    first_seq: number (seq) of the item. Items keep their numbers.
 
     >>> place = MissionItem(1, 16, 0, (0.0,) * 4, 46.0, 8.0, 75.0)
     >>> speed = MissionItem(2, 178, 2, (0.0, 22.0, -1.0, 0.0), 0.0, 0.0, 0.0)
-    >>> way = Mission(None, (place, speed, replace(place, seq=3), replace(place, seq=4)))
-    >>> [item.seq for item in mission_from_item(way, 4).items], mission_from_item(way, 1) == way
+    >>> mission = Mission(None, (place, speed, replace(place, seq=3), replace(place, seq=4)))
+    >>> [item.seq for item in mission_from_item(mission, 4).items], mission_from_item(mission, 1) == mission
     ([2, 4], True)
     """
     earlier_items = [item for item in mission.items if item.seq < first_seq]
@@ -363,7 +365,10 @@ class MissionServer:
         return handler(self, message, station, kind, now) if handler else []
 
     def tick(self, now: float) -> list[MissionReply]:
-        """Return repeated requests for items that did not arrive; abandon uploads of silent stations."""
+        """Return the messages that are due: repeated requests for items, and the end of abandoned uploads.
+
+        now: time of the clock that `handle` uses, s.
+        """
         replies = []
         for kind, upload in list(self._uploads.items()):
             if now - upload.last_message_time > UPLOAD_TIMEOUT_S:
@@ -401,7 +406,7 @@ class MissionServer:
         return [self._request_next_item(upload, kind, now)]
 
     def _answer_go_to(self, message: Any, station: Station, kind: MissionType) -> MissionReply:
-        """Fly to the position or altitude of an item that a station sends outside a mission."""
+        """Request a flight to the position or altitude of an item that a station sends outside an upload."""
         try:
             item = from_message(message, "go-to")
         except MissionError as error:
@@ -414,6 +419,9 @@ class MissionServer:
 
     def _receive_item(self, message: Any, station: Station, kind: MissionType, now: float) -> list[MissionReply]:
         """Store an item of an upload; request the next item, or replace the list after the last item.
+
+        message: MISSION_ITEM_INT or MISSION_ITEM.
+        kind: list to which the item belongs.
 
         Without an upload, an item is a command to fly to its position, or a repeated last item, which is acknowledged
         again.
@@ -456,7 +464,7 @@ class MissionServer:
         return [self._ack(station, mavlink.MAV_MISSION_ACCEPTED, kind, _FLOAT_WARNING if is_float else "")]
 
     def _send_count(self, _message: Any, station: Station, kind: MissionType, _now: float) -> list[MissionReply]:
-        """Return the reply with the number of items of a list (MISSION_REQUEST_LIST)."""
+        """Answer MISSION_REQUEST_LIST with the number of items of a list."""
         count = len(self.lists[kind])
         return [
             MissionReply(
@@ -465,7 +473,7 @@ class MissionServer:
         ]
 
     def _send_item(self, message: Any, station: Station, kind: MissionType, _now: float) -> list[MissionReply]:
-        """Return the reply with an item of a list (MISSION_REQUEST_INT or MISSION_REQUEST)."""
+        """Answer MISSION_REQUEST_INT or MISSION_REQUEST with an item of a list."""
         items = self.lists[kind]
         if not message.seq < len(items):
             return [self._ack(station, mavlink.MAV_MISSION_INVALID_SEQUENCE, kind)]
@@ -485,7 +493,10 @@ class MissionServer:
     def _clear_lists(
         self, station: Station, kinds: tuple[MissionType, ...], acknowledged_type: int, now: float
     ) -> list[MissionReply]:
-        """Clear lists, and acknowledge with a MAV_MISSION_TYPE; clear no list if one of them must not change."""
+        """Clear lists and acknowledge it; clear no list if one of them must not change now.
+
+        acknowledged_type: MAV_MISSION_TYPE that the acknowledgement states.
+        """
         for kind in kinds:
             refusal = self._upload_refusal(station, kind, now)
             if refusal:
@@ -501,13 +512,14 @@ class MissionServer:
     def _cancel_upload(self, message: Any, station: Station, kind: MissionType, now: float) -> list[MissionReply]:
         """Discard the upload of a station that cancels it (MISSION_ACK with an error).
 
-        A station that accepts only MISSION_REQUEST_INT may have missed these requests; request the item again from it.
+        After some unanswered requests the vehicle sends MISSION_REQUEST instead of MISSION_REQUEST_INT. A station that
+        refuses the former as unsupported gets the latter again.
         """
         upload = self._uploads.get(kind)
         if upload is None or upload.station != station or message.type == mavlink.MAV_MISSION_ACCEPTED:
             return []
         if message.type == mavlink.MAV_MISSION_UNSUPPORTED and upload.unanswered_count >= _INT_REQUEST_ATTEMPTS:
-            # The station accepts only MISSION_REQUEST_INT, and did not get those requests.
+            # The station accepts only MISSION_REQUEST_INT, and did not receive the earlier requests.
             upload.unanswered_count = 0
             return [self._request_next_item(upload, kind, now)]
         del self._uploads[kind]
@@ -520,7 +532,7 @@ class MissionServer:
                 finished.remaining_count = 0
 
     def _upload_refusal(self, station: Station, kind: MissionType, now: float) -> str:
-        """Return why a station must not change a list now, or ""."""
+        """Return the reason why a station must not change a list now, or ""."""
         if self.locked and kind == MissionType.MISSION:
             return self.locked
         for upload in self._uploads.values():
@@ -558,7 +570,7 @@ def _item_request(
 
 
 def _placement_problem(item: MissionItem, kind: MissionType) -> str:
-    """Return why an item does not belong in a list, or ""."""
+    """Return the reason why an item does not belong in a list, or ""."""
     is_allowed = (
         item.command in _ALLOWED_COMMANDS[kind]
         if kind in _ALLOWED_COMMANDS
@@ -568,7 +580,7 @@ def _placement_problem(item: MissionItem, kind: MissionType) -> str:
 
 
 def _refusal_result(message: Any) -> int:
-    """Return the MAV_MISSION_RESULT for the invalid number in an item that `from_message` refused."""
+    """Return the MAV_MISSION_RESULT for an invalid item: its latitude, its longitude, or any other fault."""
     degree_scale = 1.0 if message.get_type() == "MISSION_ITEM" else 1e7
     if abs(message.x) > 90.0 * degree_scale:
         return int(mavlink.MAV_MISSION_INVALID_PARAM5_X)

@@ -92,25 +92,27 @@ class Parameters:
         self.entries[number] = replace(self.entries[number], value=value)
 
     def message(self, number: int) -> Any:
-        """Return PARAM_VALUE of a parameter, by number."""
+        """Return the PARAM_VALUE message of a parameter, by its number."""
         entry = self.entries[number]
         return mavlink.MAVLink_param_value_message(
             entry.name.encode(), entry.value, mavlink.MAV_PARAM_TYPE_REAL32, len(self.entries), number
         )
 
     def find(self, name: bytes, number: int) -> int | None:
-        """Return the number of a parameter in PARAM_REQUEST_READ or PARAM_SET, or None if unknown.
+        """Return the number of the parameter that PARAM_REQUEST_READ names, or None if it is unknown.
 
-        number: -1 to find the parameter by name.
+        number: number that the message states; -1 to find the parameter by name.
         """
         if number >= 0:
             return number if number < len(self.entries) else None
         return self._numbers.get(_decode_name(name))
 
     def set(self, name: bytes, value: float, *, in_flight: bool = False) -> tuple[int | None, str]:
-        """Set a parameter for a station; return its number and the reason for a refusal.
+        """Set a parameter for a station, and return its number and the reason for a refusal.
 
-        The number is None for an unknown parameter, and the reason is "" if the parameter was set.
+        in_flight: True to refuse parameters of the simulated autopilot.
+
+        The number is None for an unknown parameter. The reason is "" if the parameter was set.
         """
         number = self._numbers.get(_decode_name(name))
         if number is None:
@@ -121,7 +123,7 @@ class Parameters:
             if in_flight:
                 return (
                     number,
-                    f"{entry.name} {value:g} refused in flight: a flight has one set of parameters; {unchanged_text}",
+                    f"{entry.name} {value:g}: refused, because parameters are fixed during a flight; {unchanged_text}",
                 )
             return number, self._set_autopilot_parameter(entry, value)
         if entry.max_value is None:
@@ -135,7 +137,7 @@ class Parameters:
         """Set a parameter of the simulated autopilot, and return the reason for a refusal, or ""."""
         if not math.isfinite(value):
             return f"{entry.name} {value:g}: expected a finite number; {entry.value:g} kept"
-        # 0.7 is sent as 0.699999988: the typed number is the shortest one with the same float32.
+        # MAVLink carries 0.7 as 0.699999988. The number that was typed is the shortest one with the same float32.
         stated_values = self.stated | {entry.name: float(str(np.float32(value)))}
         try:
             values = self.autopilot_values(stated_values)
@@ -275,7 +277,7 @@ class Requests:
         return replies
 
     def _on_command(self, message: Any, peer: Peer, now: float) -> list[Response]:
-        """Run and acknowledge a command; an arm command may wait for the verdict."""
+        """Run a command and acknowledge it; the acknowledgement of an arm command may wait for the verdict."""
         system, component = message.get_srcSystem(), message.get_srcComponent()
         number = int(message.command)
         if number == _ARM_COMMAND:
@@ -369,22 +371,25 @@ class Requests:
         return self._acknowledge(peer, message.get_srcSystem(), message.get_srcComponent(), number, reply)
 
     def _on_mission_set_current(self, message: Any, peer: Peer, now: float) -> list[Response]:
-        """Set the start item; after a refusal send no MISSION_CURRENT for some time."""
+        """Set the item at which the mission starts or continues (MISSION_SET_CURRENT).
+
+        After a refusal the station gets no MISSION_CURRENT for `_MISSION_CURRENT_PAUSE_S`.
+        """
         reply = self.set_start_item(int(message.seq))
         if reply.result == ACCEPTED:
             return [PeerMessage(peer, telemetry_message("MISSION_CURRENT", self.status))]
-        # The message has no refusal, and MAVSDK repeats it without end, at each MISSION_CURRENT of another item; MAVSDK
-        # gives up if no MISSION_CURRENT arrives during its timeout.  One sent before the refusal still causes a
-        # repetition.
+        # MISSION_SET_CURRENT cannot be refused, and MAVSDK repeats it at each MISSION_CURRENT of another item, without
+        # end. MAVSDK gives up if no MISSION_CURRENT arrives during its timeout. A MISSION_CURRENT that was sent before
+        # the refusal still causes one repetition.
         peer.due["MISSION_CURRENT"] = now + _MISSION_CURRENT_PAUSE_S
         return [StatusText(reply.text, WARNING)]
 
     def _refuse_guided_item(self, _message: Any, _peer: Peer, _now: float) -> list[Response]:
-        """Refuse a target for GUIDED that is sent as a message."""
+        """Refuse a target position for GUIDED in a SET_POSITION_TARGET message, with a text on the alternative."""
         return [StatusText(_NO_GUIDED_TARGET_TEXT, WARNING)]
 
     def _list_parameters(self, _message: Any, peer: Peer, _now: float) -> list[Response]:
-        """Start to send all parameters to a station."""
+        """Start to send all parameters to a station, from the first one."""
         peer.next_parameter = 0.0
         return []
 
@@ -394,9 +399,9 @@ class Requests:
         return [] if number is None else [PeerMessage(peer, self.parameters.message(number))]
 
     def _write_parameter(self, message: Any, peer: Peer, _now: float) -> list[Response]:
-        """Set a parameter for a station; answer with its value, and with the reason if it is refused.
+        """Set a parameter for a station; answer with its value, and with the reason if the value is refused.
 
-        The parameter `FORCE` then applies to the next arming.
+        A new value of the parameter `FORCE` applies to the next arming.
         """
         number, problem = self.parameters.set(
             message.param_id, float(message.param_value), in_flight=self.arming.flying

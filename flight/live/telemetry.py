@@ -98,7 +98,7 @@ class SnapshotMaker:
         self._map = local_map
 
     def start_snapshot(self, setup: FlightSetup) -> Snapshot:
-        """Return the snapshot of an aircraft at the start of the route, on the course of its first leg."""
+        """Return the snapshot of an aircraft that stands still at the route's start, on the course of its first leg."""
         points = setup.route.positions
         first_leg = points[1] - points[0]
         terrain = setup.scenario.terrain

@@ -75,7 +75,10 @@ class Downlink:
     """
 
     def __init__(self, link: Link, status: Status, parameters: Parameters, show: ShowText, pause: float) -> None:
-        """Send the first heartbeat at once."""
+        """Make the first heartbeat due at once.
+
+        status: state of the vehicle, which telemetry reports.
+        """
         self._link = link
         self._status = status
         self._parameters = parameters
@@ -98,7 +101,7 @@ class Downlink:
             self._link.send(message, peer)
 
     def request_heartbeat(self) -> None:
-        """Make the next heartbeat due at once, because its contents have changed."""
+        """Make the next heartbeat due at once, for contents that have changed."""
         self._next_heartbeat = self._link.clock()
 
     def wait_time(self, now: float, max_wait: float) -> float:
@@ -161,7 +164,10 @@ class MissionProgress:
     """
 
     def __init__(self, server: MissionServer, arming: ArmingState, status: Status, downlink: Downlink) -> None:
-        """Start with a whole mission, from its first item."""
+        """Start with a whole mission, from its first item.
+
+        status: state of the vehicle, whose mission fields are updated.
+        """
         self._server = server
         self._arming = arming
         self._status = status
@@ -184,7 +190,7 @@ class MissionProgress:
         self._leg, self._route_items = -1, items
 
     def reset_current_item(self) -> None:
-        """Set the current item to the start of a mission that is not being flown."""
+        """Set the current item to the item at which the next flight starts."""
         self._status.current = self.first or (self._station_number(0) if self._arming.last_verdict is not None else 0)
 
     def refresh(self) -> None:
@@ -195,9 +201,9 @@ class MissionProgress:
             self.reset_current_item()
 
     def report_leg(self, leg: int) -> None:
-        """Report the waypoints that were reached since the last call.
+        """Report to stations the items that were reached since the last call, and the new current item.
 
-        leg: index of the active leg; its start was reached last.
+        leg: index of the active leg; the waypoint at its start was reached last.
         """
         if leg == self._leg or leg < 0 or not self._waypoint_items():
             return
@@ -232,9 +238,9 @@ class MissionProgress:
         return () if self._arming.last_verdict is None else self._arming.last_verdict.items
 
     def _station_number(self, waypoint: int) -> int:
-        """Return the number of the item at a waypoint, or at the next waypoint that has an item.
+        """Return the number that stations use for the item at a waypoint, or at the next waypoint with an item.
 
-        It is the number that stations use.
+        After the last item the result is the number of that item; it is 0 without any item.
         """
         items = self._waypoint_items()
         next_items = [item for item in items[waypoint:] if item >= 0] or [item for item in items if item >= 0][-1:]
@@ -417,7 +423,7 @@ class Vehicle:
         self._refresh_status()
 
     def _judge_changes(self) -> None:
-        """Request a verdict on a changed mission, which includes a changed fence and changed rally points."""
+        """Request a verdict if the mission, the fence, the rally points or the autopilot's parameters have changed."""
         # One request at a time, so that stations that upload faster than missions are judged do not fill the pipe.
         if not self.server.changed or self.arming.flying or self._awaits_verdict:
             return
@@ -446,7 +452,7 @@ class Vehicle:
         self._refresh_status()
 
     def _divert(self, center: LoiterCenter) -> None:
-        """Request a diversion for the present mode: to the mission's current item, to home, or to a loiter."""
+        """Request a diversion for the current mode: to the mission's current item, to home, or to a loiter."""
         mission, shift = uploaded_mission(self.server.lists, self._standby.home)
         mission = replace(mission, home=self.status.home)
         if self.arming.mode == AUTO:
@@ -454,7 +460,7 @@ class Vehicle:
         self._send_request(DivertFlight(self.arming.mode, mission, center))
 
     def _go_to(self, item: MissionItem) -> str:
-        """Fly to an item's position; return the reason for a refusal, or ""."""
+        """Request a flight to an item's position and a loiter there; return the reason for a refusal, or ""."""
         return self.arming.go_to(LoiterCenter(item.lat_deg, item.lon_deg, item.alt, item.frame)).text
 
     def _handle_diversion(self, event: FlightDiverted) -> None:
@@ -469,11 +475,11 @@ class Vehicle:
         self._refresh_status()
 
     def _set_start_item(self, seq: int) -> CommandResult:
-        """Set the item from which the next flight starts, or at which the present flight continues.
+        """Set the item from which the next flight starts or, in flight, at which the flight continues.
 
         seq: number that the station uses for the item.
 
-        A mission with a new start item is judged from that item.
+        On the ground, the mission is judged again from the new item on.
         """
         mission, shift = uploaded_mission(self.server.lists, self._standby.home)
         problem = start_problem(mission, seq - shift, in_flight=self.arming.flying)

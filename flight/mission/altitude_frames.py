@@ -30,15 +30,14 @@ class AltitudeReading(NamedTuple):
     other_height: float
 
 
-def misread_altitudes(
+def find_misread_altitudes(
     mission: Mission, origin: GeoOrigin, terrain: Terrain | None
 ) -> tuple[tuple[AltitudeReading, ...], tuple[AltitudeReading, ...]]:
-    """Return the items whose altitudes fit the terrain only in the other altitude frame.
+    """Find the items whose altitudes fit the terrain only in the other altitude frame.
 
-    The first result has the items that state AMSL, but lie below the ground, and above it if read as heights above
-    home. The second result has items that state a height above home. They are higher than the other items by at least
-    the altitude of home, or their number is not below that of an item that rightly states AMSL, or their mission has a
-    landing point that is in the air, but on the ground if read as AMSL.
+    Returns two tuples. The first has the items with an altitude AMSL that lie below the ground, but would lie above it
+    if the number were a height above home. The second has the items with a height above home that is probably an
+    altitude AMSL: see `_find_readings_too_high`.
     Both are empty if the ground or the altitude of home is unknown, and if home is near sea level.
     """
     home = mission.home
@@ -56,26 +55,33 @@ def misread_altitudes(
             amsl_altitudes.append(item.alt)
         elif item.frame in OVER_HOME:
             above_home.append(AltitudeReading(k, home_height, amsl_height))
-    return tuple(below_ground), tuple(_too_high(mission, home.alt, above_home, min(amsl_altitudes, default=math.inf)))
+    return tuple(below_ground), tuple(
+        _find_readings_too_high(mission, home.alt, above_home, min(amsl_altitudes, default=math.inf))
+    )
 
 
 def _height_tolerance(item: MissionItem) -> float:
-    """Return the depth below the ground, m, up to which an item may be correct.
+    """Return the depth below the ground, m, up to which an item's altitude is still plausible.
 
-    For a landing point the depth allows for the errors of the map and of home.
+    For a landing point the depth allows for errors of the terrain map and of home. For other items it is 0.
     """
     return LANDING_HEIGHT_TOLERANCE_M if item.command in LANDINGS else 0.0
 
 
-def _too_high(
+def _find_readings_too_high(
     mission: Mission, home_altitude: float, readings: list[AltitudeReading], lowest_amsl: float
 ) -> list[AltitudeReading]:
-    """Return the readings of items above home that are too high by about the altitude of home.
+    """Return the readings of heights above home that are probably altitudes AMSL.
 
-    lowest_amsl: lowest altitude of the items that rightly state AMSL, m; inf without any.
+    readings: all items of the mission with a height above home.
+    lowest_amsl: lowest altitude of the items with a plausible altitude AMSL, m; inf without any.
+
+    An item is returned if its number, read as an altitude AMSL, lies above the ground, and one of these is true: the
+    number exceeds the median of the other items by at least the altitude of home; it is not below ``lowest_amsl``; or
+    a landing point of the mission is in the air, but would be on the ground if read as an altitude AMSL.
     """
     items = [mission.items[reading.item_index] for reading in readings]
-    lands_in_the_air = any(
+    has_landing_in_air = any(
         item.command in LANDINGS and reading.height > LANDING_HEIGHT_TOLERANCE_M >= abs(reading.other_height)
         for item, reading in zip(items, readings, strict=True)
     )
@@ -83,7 +89,9 @@ def _too_high(
     for k, (item, reading) in enumerate(zip(items, readings, strict=True)):
         others = [other.alt for other in items[:k] + items[k + 1 :]]
         is_outlier = bool(others) and item.alt - statistics.median(others) >= home_altitude
-        is_mixed = item.alt >= lowest_amsl
-        if (is_outlier or is_mixed or lands_in_the_air) and reading.other_height >= -_height_tolerance(item):
+        exceeds_amsl_altitude = item.alt >= lowest_amsl
+        if (is_outlier or exceeds_amsl_altitude or has_landing_in_air) and reading.other_height >= -_height_tolerance(
+            item
+        ):
             too_high.append(reading)
     return too_high

@@ -232,7 +232,7 @@ class Treatment(StrEnum):
 
 
 class Support(NamedTuple):
-    """Treatment of a command by each autopilot, with a short reason for people."""
+    """Treatment of a command by each autopilot, with a short reason for the user."""
 
     arduplane: Treatment
     px4: Treatment
@@ -356,7 +356,7 @@ SUPPORT: dict[Command, Support] = {
     C.NAV_ATTITUDE_TIME: Support(_NO_EFFECT, _REFUSED, SKIPPED_REASON),
 }
 
-# Commands without an effect of their own; other commands or modes jump to them.
+# Commands that only mark a place in the list of items; other commands or modes jump to them.
 MARKS = frozenset({C.DO_RETURN_PATH_START, C.DO_LAND_START, C.DO_GO_AROUND, C.JUMP_TAG})
 
 # Treatment of a command that is not in the table.
@@ -364,10 +364,9 @@ _UNKNOWN = Support(_REFUSED, _REFUSED, "no autopilot accepts it in a mission")
 
 
 def command_support(command: int) -> Support:
-    """Return how each autopilot treats a command in a mission.
+    """Return the treatment of a mission command by ArduPlane and by PX4; unknown commands are refused.
 
     >>> command_support(Command.DO_JUMP).px4, command_support(Command.JUMP_TAG).px4, command_support(50_000).arduplane
     (<Treatment.FLOWN: 'flown'>, <Treatment.REFUSED: 'refused'>, <Treatment.REFUSED: 'refused'>)
     """
-    # An unknown number is not found.
     return SUPPORT.get(command, _UNKNOWN)  # type: ignore[call-overload]

@@ -36,15 +36,15 @@ def is_movable(item: MissionItem) -> bool:
 def movable_indices(mission: Mission) -> tuple[int, ...]:
     """Return the indices of the items that can be moved.
 
-    >>> way = [MissionItem(k, c, 0, (0.0,) * 4, 46.0, 8.0, 75.0) for k, c in ((1, 16), (2, 178), (3, 16))]
-    >>> movable_indices(Mission(None, tuple(way)))
+    >>> items = [MissionItem(k, c, 0, (0.0,) * 4, 46.0, 8.0, 75.0) for k, c in ((1, 16), (2, 178), (3, 16))]
+    >>> movable_indices(Mission(None, tuple(items)))
     (0, 2)
     """
     return tuple(k for k, item in enumerate(mission.items) if is_movable(item))
 
 
 def movable_item(mission: Mission, index: int) -> MissionItem:
-    """Return the item at an index.
+    """Return the item at an index, which must be an item that can be moved on the map.
 
     Raises MissionError if there is no such item, or if it cannot be moved.
     """
@@ -59,8 +59,8 @@ def movable_item(mission: Mission, index: int) -> MissionItem:
 def move_item(mission: Mission, index: int, lat_deg: float, lon_deg: float) -> Mission:
     """Return the mission with an item moved, at the same altitude in the item's frame.
 
-    >>> way = tuple(MissionItem(k, 16, 3, (0.0,) * 4, 46.0, 8.0, 75.0) for k in (1, 2))
-    >>> move_item(Mission(None, way), 1, 46.01, 8.00000004).items[1].lon_deg
+    >>> items = tuple(MissionItem(k, 16, 3, (0.0,) * 4, 46.0, 8.0, 75.0) for k in (1, 2))
+    >>> move_item(Mission(None, items), 1, 46.01, 8.00000004).items[1].lon_deg
     8.0
     """
     item = movable_item(mission, index)
@@ -70,14 +70,15 @@ def move_item(mission: Mission, index: int, lat_deg: float, lon_deg: float) -> M
 
 
 def raise_items(mission: Mission, indices: Iterable[int], height_change: float) -> Mission:
-    """Return the mission with items raised, each in its frame.
+    """Return the mission with some items raised, each in its altitude frame.
 
-    height_change: m.
+    indices: indices of the items in the mission's list.
+    height_change: m, negative to lower the items.
 
-    An item without altitude is unchanged.
+    An item without an altitude is unchanged.
 
-    >>> way = tuple(MissionItem(k, 16, 3, (0.0,) * 4, 46.0, 8.0, 75.0) for k in (1, 2))
-    >>> [item.alt for item in raise_items(Mission(None, way), [1], 12.5).items]
+    >>> items = tuple(MissionItem(k, 16, 3, (0.0,) * 4, 46.0, 8.0, 75.0) for k in (1, 2))
+    >>> [item.alt for item in raise_items(Mission(None, items), [1], 12.5).items]
     [75.0, 87.5]
     """
     for index in indices:
@@ -90,7 +91,7 @@ def raise_items(mission: Mission, indices: Iterable[int], height_change: float) 
 def set_altitude(mission: Mission, index: int, amsl: float, current_amsl: float) -> Mission:
     """Return the mission with the altitude of an item changed from ``current_amsl`` to ``amsl``, m AMSL.
 
-    An item without altitude gets an altitude in the AMSL frame.
+    The item keeps its altitude frame. An item without an altitude gets an altitude in the AMSL frame.
     """
     item = movable_item(mission, index)
     if math.isfinite(item.alt):
@@ -116,10 +117,10 @@ def set_loiter_radius(mission: Mission, index: int, radius: float) -> Mission:
 
 
 def insertion_index(mission: Mission, previous_index: int) -> int:
-    """Return the index at which to insert a waypoint after an item, behind all actions at that item.
+    """Return the index at which to insert a waypoint after an item and the commands that belong to that item.
 
-    >>> way = [MissionItem(k, c, 3, (0.0,) * 4, 46.0, 8.0, 75.0) for k, c in ((1, 16), (2, 206), (3, 16))]
-    >>> insertion_index(Mission(None, tuple(way)), 0)
+    >>> items = [MissionItem(k, c, 3, (0.0,) * 4, 46.0, 8.0, 75.0) for k, c in ((1, 16), (2, 206), (3, 16))]
+    >>> insertion_index(Mission(None, tuple(items)), 0)
     2
     """
     index = previous_index + 1
@@ -133,16 +134,15 @@ def insertion_index(mission: Mission, previous_index: int) -> int:
 def insert_waypoint(
     mission: Mission, previous_index: int, lat_deg: float, lon_deg: float, height: float | None = None
 ) -> Mission:
-    """Return the mission with a waypoint inserted after an item and after the actions at that item.
+    """Return the mission with a waypoint inserted after an item and the commands that belong to that item.
 
-    The waypoint is in the altitude frame of that item; see `insertion_index`.
-
-    height: altitude of the waypoint in that frame, m; None for the altitude of the item.
+    previous_index: index of the item before the new waypoint.
+    height: altitude of the waypoint in the altitude frame of that item, m; None for the altitude of that item.
 
     Raises MissionError if the mission already has the maximum number of items.
 
-    >>> way = tuple(MissionItem(k, 16, 3, (0.0,) * 4, 46.0, 8.0, 75.0) for k in (1, 2))
-    >>> longer = insert_waypoint(Mission(None, way), 0, 46.01, 8.0)
+    >>> items = tuple(MissionItem(k, 16, 3, (0.0,) * 4, 46.0, 8.0, 75.0) for k in (1, 2))
+    >>> longer = insert_waypoint(Mission(None, items), 0, 46.01, 8.0)
     >>> [(item.seq, item.lat_deg) for item in longer.items]
     [(1, 46.0), (2, 46.01), (3, 46.0)]
     """
@@ -183,15 +183,15 @@ def delete_item(mission: Mission, index: int) -> Mission:
 def set_airspeed(mission: Mission, index: int, airspeed: float, next_airspeed: float) -> Mission:
     """Return the mission with another airspeed on the leg to an item.
 
-    A speed change directly before the item is edited. If there is none, a speed change is inserted. A second speed
-    change after the item restores ``next_airspeed``; it is omitted after the last item with a position, and before
-    another speed change.
+    airspeed: new airspeed on the leg to the item, m/s.
+    next_airspeed: airspeed to restore after the item, m/s.
 
-    airspeed, next_airspeed: m/s.
+    A speed change directly before the item is edited, or else one is inserted. A second speed change after the item
+    restores ``next_airspeed``. It is omitted after the last item with a position, and before another speed change.
     """
     movable_item(mission, index)
-    has_own_speed = index > 0 and mission.items[index - 1].command == Command.DO_CHANGE_SPEED
-    if has_own_speed:
+    has_speed_change = index > 0 and mission.items[index - 1].command == Command.DO_CHANGE_SPEED
+    if has_speed_change:
         change = mission.items[index - 1]
         new_change = replace(change, params=(change.params[0], _round_to_milli(airspeed), *change.params[2:]))
         mission, item_index = _with_replaced_item(mission, index - 1, new_change), index
@@ -233,11 +233,11 @@ def _check_item(mission: Mission, item: MissionItem) -> None:
     """Raise MissionError for an invalid item."""
     problem = item_problem(item)
     if problem is not None:
-        raise MissionError(**problem.at(mission.source, f"{mission.source}: item {item.seq}"))
+        raise MissionError(**problem.error_arguments(mission.source, f"{mission.source}: item {item.seq}"))
 
 
 def _renumber(item: MissionItem, after_seq: int, shift: int) -> MissionItem:
-    """Return an item with ``shift`` added to its number and jump target where they exceed ``after_seq``."""
+    """Return an item with ``shift`` added to its number and to its jump target, each only if above ``after_seq``."""
     params = item.params
     if item.command == Command.DO_JUMP and params[0] > after_seq:
         params = (params[0] + shift, *params[1:])

@@ -30,7 +30,7 @@ _POLYGON_COMMANDS = {
 
 
 def fence_item(origin: GeoOrigin, command: Command, param1: float, position: Sequence[float] | Floats) -> MissionItem:
-    """Return a fence item at a position (east, north, m).
+    """Return a fence item (a polygon's corner or a circle) at a position (east, north, m).
 
     param1: number of corners of the polygon, or radius of the circle, m.
 
@@ -48,9 +48,9 @@ def fence_item(origin: GeoOrigin, command: Command, param1: float, position: Seq
 def zone_fences(zones: Sequence[Zone], origin: GeoOrigin) -> tuple[list[MissionItem], list[str]]:
     """Return the fence items of zones, and notes on what a fence cannot represent.
 
-    A cylinder becomes a circle, and an outline becomes a polygon. A hole in an inclusion becomes an exclusion, and a
-    hole in an exclusion is closed. An inclusion of several parts is omitted, because an aircraft must be inside every
-    inclusion. Fences have no floor and no ceiling.
+    A cylinder becomes a circle, and an outline becomes a polygon. A hole in an inclusion becomes an exclusion. A hole
+    in an exclusion is closed. An inclusion of several parts is omitted, because an autopilot requires the aircraft to
+    be inside every inclusion. Fences have no floor and no ceiling.
 
     >>> zone = Zone("mast", "exclusion", Cylinder(0.0, 500.0, 200.0))
     >>> items, notes = zone_fences([zone], GeoOrigin(36.5, -84.2))
@@ -100,7 +100,7 @@ def _ring_items(ring: Ring, command: Command, origin: GeoOrigin) -> Iterator[Mis
 
 
 def _joined_names(names: list[str]) -> str:
-    """Return up to three names as the subject of a sentence; further names are only counted."""
+    """Join up to three names, count the others, and append "is" or "are", for the start of a sentence."""
     remainder = f" and {len(names) - 3} more" if len(names) > 3 else ""
     return ", ".join(names[:3]) + remainder + (" is" if len(names) == 1 else " are")
 
@@ -119,7 +119,7 @@ _MAX_NAMES = 12
 
 
 def fence_shapes(fences: tuple[MissionItem, ...], source: str = "fence") -> list[tuple[MissionItem, ...]]:
-    """Group fence items into shapes: the corners of one polygon, or a single circle.
+    """Group fence items into shapes, each the corners of one polygon or a single circle.
 
     Raises MissionError if a polygon has fewer corners than stated.
     """
@@ -132,8 +132,8 @@ def fence_shapes(fences: tuple[MissionItem, ...], source: str = "fence") -> list
         if len(shape) < count or any(
             corner.command != item.command or (count > 1 and corner.params[0] != item.params[0]) for corner in shape
         ):
-            problem = ItemProblem("p1", item.params[0], "fewer corners follow than it states")
-            raise MissionError(**problem.at(source, f"{source}: fence item {item.seq}"))
+            problem = ItemProblem("p1", item.params[0], "the polygon has fewer corners than this number")
+            raise MissionError(**problem.error_arguments(source, f"{source}: fence item {item.seq}"))
         shapes.append(shape)
         k += count
     return shapes
@@ -161,7 +161,7 @@ def fence_problem(
     >>> fence_problem((circle,), origin, east=0.0, north=400.0) is None
     True
     """
-    first_left: tuple[str, int] | None = None
+    first_violation: tuple[str, int] | None = None
     is_in_inclusion = False
     for shape in fence_shapes(fences):
         item = shape[0]
@@ -179,8 +179,8 @@ def fence_problem(
         problem = f"{'outside an inclusion' if not is_inside else 'inside an exclusion'} {name}", item.seq
         if is_inside or not unites_inclusions:
             return problem
-        first_left = first_left or problem
-    return None if is_in_inclusion else first_left
+        first_violation = first_violation or problem
+    return None if is_in_inclusion else first_violation
 
 
 # Test whether a mission's path passes through a fence shape, given as its items, at any altitude.
@@ -190,12 +190,14 @@ PassTest = Callable[[tuple[MissionItem, ...]], bool]
 def with_fences(mission: Mission, scenario: Scenario, passes: PassTest) -> tuple[Mission, tuple[str, ...]]:
     """Return a mission with a scenario's area, threats and zones as its fence, and notes for the user.
 
-    The area becomes an inclusion polygon of four corners, and each missile's kill radius an exclusion circle without
-    altitude limits. Radars are omitted: detection is not forbidden. Zones are converted by `zone_fences`. The mission's
-    own fence is kept. An exclusion that the mission passes above or below, according to ``passes``, is omitted. An
-    autopilot with such a fence would refuse or abort the mission, because a fence has no height limits.
+    passes: test whether the mission passes through a fence shape, at any altitude.
 
-    The mission keeps its rally points. The notes list what a fence cannot represent, and what is omitted.
+    The area becomes an inclusion polygon of four corners. The kill radius of each missile becomes an exclusion circle.
+    Radars are omitted, because detection is not forbidden. Zones are converted by `zone_fences`. The fence items that
+    the mission already has are appended.
+
+    A fence has no height limits. Therefore an exclusion that the mission passes above or below is omitted: with it, an
+    autopilot would refuse or abort the mission. The notes list what a fence cannot represent, and what is omitted.
 
     >>> from world.scenario import load_scenario
     >>> fenced, notes = with_fences(Mission(None, ()), load_scenario("tight"), lambda shape: False)
@@ -223,8 +225,8 @@ def with_fences(mission: Mission, scenario: Scenario, passes: PassTest) -> tuple
             f" and {len(omitted_names) - _MAX_NAMES} more" if len(omitted_names) > _MAX_NAMES else ""
         )
         notes.append(
-            f"omitted from the fence, because the mission passes above or below: {names}; a fence "
-            "has no height, and an autopilot with such a fence refuses or aborts the mission"
+            f"omitted from the fence, because the mission passes above or below: {names}. A fence has "
+            "no height limits, so an autopilot would refuse or abort the mission"
         )
     notes += zone_notes
     if scenario.limits.max_height_m is not None:
@@ -247,7 +249,10 @@ def _missile_zones(scenario: Scenario) -> list[Zone]:
 def _omit_crossed_exclusions(
     zones: Sequence[Zone], origin: GeoOrigin, passes: PassTest
 ) -> tuple[list[Zone], list[str]]:
-    """Return the zones without exclusions that the mission crosses on the map, and the omitted names."""
+    """Split zones into those to write to the fence and the names of exclusions that the mission crosses on the map.
+
+    passes: test whether the mission passes through a fence shape, at any altitude.
+    """
     remaining, crossed_names = [], []
     for zone in zones:
         if zone.kind == "exclusion" and passes(number_items(zone_fences([zone], origin)[0])):
@@ -285,7 +290,7 @@ def _is_in_polygon(corners_east: Floats, corners_north: Floats, east: float, nor
 
 
 def fence_zones(fences: tuple[MissionItem, ...], origin: GeoOrigin, source: str = "fence") -> tuple[Zone, ...]:
-    """Return the zones of fence items (MAV_CMD 5001..5004); the zones have no floor and no ceiling.
+    """Convert fence items (MAV_CMD 5001..5004) to zones on the map, without floor and ceiling.
 
     source: name of the mission in messages.
 

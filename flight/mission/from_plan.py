@@ -30,23 +30,21 @@ _MAX_ARC_TURN_RAD = math.radians(179.0)
 def plan_mission(
     plan: Plan, airspeed: float, max_bank: float, source: str = "plan", tracking: TrackingError | None = None
 ) -> Mission:
-    """Return the mission of a plan, with the plan's departure and approach, if any.
+    """Convert a plan to a mission, with the plan's departure and approach, if any.
 
     airspeed: m/s.
     max_bank: rad.
+    source: name of the mission in messages.
+    tracking: tracking error of the autopilot; None if unknown.
 
-    Home is the scenario's home, or the ground below the start. The mission of a plan with a departure and an approach
-    starts with NAV_TAKEOFF at home. It ends with DO_LAND_START, two waypoints of the final approach, and NAV_LAND. The
+    Home is the scenario's home, or the ground below the start. A mission with a departure starts with NAV_TAKEOFF at
+    home. A mission with an approach ends with DO_LAND_START, two waypoints of the final approach, and NAV_LAND. The
     first parameter of NAV_LAND is the go-around height above home. The scenario's rally points are included.
 
     Positions are rounded to the 1e-7 degree grid of MISSION_ITEM_INT, and altitudes to whole millimeters. Therefore
     every file format states the same numbers. The rounding moves a waypoint by less than 8 mm on the map.
 
-    The acceptance radius is the distance at which a turn passes its waypoint, R(1/cos(theta/2) - 1), plus
-    `ACCEPTANCE_TOLERANCE_M`, rounded up to a whole meter. R is the turn radius at this speed and bank with the
-    scenario's wind from behind. With this acceptance radius no arc of the flight misses its waypoint. PX4 has its own
-    radius for fixed-wing aircraft. If the tracking error of an autopilot is known, the radius is the one with the
-    smallest error, because ArduPlane turns to the next leg at that distance before a waypoint.
+    Each waypoint states an acceptance radius: see `acceptance_radii`. PX4 uses its own radius for fixed-wing aircraft.
 
     >>> from planner.plan import Certificate
     >>> from world.scenario import load_scenario
@@ -90,16 +88,16 @@ def plan_mission(
 
 
 class _ItemBuilder:
-    """Builder of mission items in the world's frame."""
+    """Builder of a list of mission items, numbered from 1, from positions on the map."""
 
     def __init__(self, origin: GeoOrigin) -> None:
         self.items: list[MissionItem] = []
         self._origin = origin
 
     def add(self, command: Command, params: tuple[float, float, float, float], position: Floats | None = None) -> None:
-        """Add an item.
+        """Append a mission item; its altitude is AMSL.
 
-        position: (3,) m; None for a command without a position.
+        position: east, north, up on the map, (3,) m; None for a command without a position.
         """
         frame = Frame.MISSION
         lat = 0.0
@@ -112,9 +110,9 @@ class _ItemBuilder:
 
 
 def _mission_positions(plan: Plan, procedures: DepartureAndApproach) -> Floats:
-    """Return the positions of all navigation items, from above home to the landing point, (w, 3) m.
+    """Return the positions of a plan's navigation items, from above home to the landing point, (w, 3) m.
 
-    The landing point has the altitude of the end of the final approach.
+    The position of the landing has the altitude of the last waypoint of the final approach.
     """
     parts = [plan.waypoints]
     if (climb := procedures.climb) is not None:
@@ -151,9 +149,16 @@ def acceptance_radii(
 ) -> Floats:
     """Return the acceptance radius of each position of a planned mission, (w,) whole m.
 
-    `plan_mission` describes the acceptance radius.
-
     points: (w, 3) m, in flying order.
+    airspeed: m/s.
+    max_bank: rad.
+    tracking: tracking error of the autopilot; None if unknown.
+
+    The radius is the distance at which a fly-by turn passes its waypoint, R(1/cos(turn/2) - 1), plus
+    `ACCEPTANCE_TOLERANCE_M`, rounded up. R is the turn radius at this airspeed and bank with the scenario's wind from
+    behind. With this acceptance radius no arc of the flight misses its waypoint. If the tracking error of the autopilot
+    is known, the radius is the one with the smallest error, because ArduPlane turns to the next leg at that distance
+    before a waypoint.
     """
     if tracking is not None:
         return _acceptance_radii_for_tracking(scenario, points, airspeed, tracking)
@@ -198,27 +203,26 @@ def corner_speeds(scenario: Scenario, points: Floats, airspeed: float) -> list[f
     """Return the highest ground speed in the turn at each of the w - 2 corners of a path, m/s.
 
     points: path, (w, 3) m.
+    airspeed: equivalent airspeed, m/s.
 
-    airspeed: equivalent, m/s.
-
-    If the wind is too strong for every course of a turn, the result is the true airspeed.
+    Five courses of each turn are checked. If the wind is too strong for all of them, the result is the true airspeed.
     """
     courses, speeds = leg_courses(points), []
     for i in range(1, len(points) - 1):
         altitude = float(points[i, 2])
         east, north = scenario.wind.velocity_at(altitude)
-        speed = airspeed * air_density_factor(altitude)
+        true_airspeed = airspeed * air_density_factor(altitude)
         turn_courses = courses[i - 1] + wrap(courses[i] - courses[i - 1]) * np.linspace(0.0, 1.0, 5)
         ground_speeds = [
             ground_speed(
-                speed,
+                true_airspeed,
                 east * math.sin(course) + north * math.cos(course),
                 east * math.cos(course) - north * math.sin(course),
             )
             for course in turn_courses.tolist()
         ]
         # The ground speed is NaN on a course on which the wind is too strong.
-        speeds.append(max((value for value in ground_speeds if value > 0.0), default=speed))
+        speeds.append(max((value for value in ground_speeds if value > 0.0), default=true_airspeed))
     return speeds
 
 

@@ -54,7 +54,7 @@ class TakeOff:
     acceleration: float
 
     def release(self) -> tuple[Floats, Floats]:
-        """Return the position (m) and the velocity (m/s) at the release, each (3,): east, north, up.
+        """Return the position (m) and the velocity (m/s) at the end of the launch, each (3,) east, north, up.
 
         The release is the end of the rail, the throw of a hand launch, or the start of a runway. On a runway the
         position is on the ground, and the caller adds the height of the standing aircraft.
@@ -69,7 +69,7 @@ class TakeOff:
         return position, self.speed * np.array([*(cos_incline * direction), sin_incline])
 
     def description(self) -> str:
-        """Return a description of the start of the flight."""
+        """Describe the take-off in one line: item, launch method, home, course and end altitude."""
         throw_text = f"{self.speed:.1f} m/s after {self.launch.effective_length:.1f} m, {self.acceleration:.1f} m/s²"
         method_texts = {"catapult": "from a catapult", "hand": f"by hand ({throw_text})", "runway": "on a runway"}
         course = math.degrees(self.course) % 360.0
@@ -171,19 +171,22 @@ def find_ground_phases(scenario: Scenario, mission: Mission, route: Route, min_a
 def _find_take_off(
     scenario: Scenario, mission: Mission, route: Route, min_airspeed: float
 ) -> tuple[TakeOff | None, str]:
-    """Return the take-off, or the reason why no take-off is simulated."""
-    launch, base = scenario.launch, home_point(mission, scenario.origin, scenario.terrain)
+    """Return the take-off to simulate and "", or None and the reason why no take-off is simulated.
+
+    min_airspeed: minimum level-flight speed, m/s, which sets the launch speed if the scenario states none.
+    """
+    launch, mission_home = scenario.launch, home_point(mission, scenario.origin, scenario.terrain)
     items = {item.seq: item for item in mission.items if item.command == Command.NAV_TAKEOFF}
     route_items = route.items.tolist()
     index = next((k for k, seq in enumerate(route_items) if seq >= 0), 0)
     if launch is None or not items or route_items[index] not in items:
         return None, "[launch]: the mission does not begin with a NAV_TAKEOFF, so its flight begins in the air"
-    if base is None:
+    if mission_home is None:
         return None, "[launch]: the mission has no home to take off from, so its flight begins in the air"
     if index + 1 >= len(route_items):
-        return None, "[launch]: nothing follows the take-off, so it is not flown"
-    item, home_position = items[route_items[index]], np.array([base.east, base.north])
-    ground = scenario.terrain.height(*home_position) if scenario.terrain is not None else base.up
+        return None, "[launch]: the mission has no waypoint after the take-off, so the take-off is not flown"
+    item, home_position = items[route_items[index]], np.array([mission_home.east, mission_home.north])
+    ground = scenario.terrain.height(*home_position) if scenario.terrain is not None else mission_home.up
     if math.isnan(ground):
         return None, "[launch]: the terrain at home is unknown, so the flight begins in the air"
     # ArduPlane does not fly to the position of a take-off item: the next item is the first one.
@@ -192,7 +195,7 @@ def _find_take_off(
     home = np.array([*home_position, float(ground)])
     end_altitude, pitch = float(route.positions[index, 2]), climb_pitch(item)
     speed, acceleration = launch.release_speed(min_airspeed), launch.acceleration(min_airspeed)
-    return TakeOff(launch, item.seq, home, course, end_altitude, base.up, pitch, index, speed, acceleration), ""
+    return TakeOff(launch, item.seq, home, course, end_altitude, mission_home.up, pitch, index, speed, acceleration), ""
 
 
 def climb_pitch(item: MissionItem) -> float:
@@ -202,7 +205,7 @@ def climb_pitch(item: MissionItem) -> float:
 
 
 def _find_approach(scenario: Scenario, mission: Mission, route: Route) -> tuple[Approach | None, str]:
-    """Return the landing, or the reason why no landing is simulated."""
+    """Return the landing to simulate and "", or None and the reason why no landing is simulated."""
     strip, last_leg = scenario.landing, route.legs
     items = {item.seq: item for item in mission.items if item.command == Command.NAV_LAND}
     if strip is None or not items or int(route.items[last_leg]) not in items or last_leg < 2:
@@ -217,16 +220,15 @@ def _find_approach(scenario: Scenario, mission: Mission, route: Route) -> tuple[
     final_leg = leg_end[:2] - leg_start[:2]
     course, length = math.atan2(final_leg[0], final_leg[1]), float(np.hypot(*final_leg))
     point = np.array([leg_end[0], leg_end[1], ground])
-    wind = scenario.wind.components_on_course(course, ground)[0]
+    tail_wind = scenario.wind.components_on_course(course, ground)[0]
     home = home_point(mission, scenario.origin, scenario.terrain)
-    base = ground if home is None else home.up
-    return Approach(
-        strip, int(route.items[last_leg]), last_leg - 1, point, course, length, float(leg_start[2]), wind, base
-    ), ""
+    home_altitude = ground if home is None else home.up
+    item, start_altitude = int(route.items[last_leg]), float(leg_start[2])
+    return Approach(strip, item, last_leg - 1, point, course, length, start_altitude, tail_wind, home_altitude), ""
 
 
 def airborne_route(route: Route, ground_phases: GroundPhases, first_leg_start: Floats | None) -> Route:
-    """Return the part of a route that is flown in the air and judged by the rules for it.
+    """Return the part of a route between take-off and landing, which the rules for flight in the air judge.
 
     first_leg_start: point at which the take-off ends and the first leg starts, (3,) m; None to keep the first waypoint.
 
@@ -235,7 +237,7 @@ def airborne_route(route: Route, ground_phases: GroundPhases, first_leg_start: F
     points = np.array(route.positions)
     if ground_phases.take_off is not None and first_leg_start is not None:
         points[: ground_phases.take_off.waypoint + 1] = first_leg_start
-        # Earlier waypoints are not flown: place each slightly before the next, so that every leg has a length.
+        # Earlier waypoints are not flown. Place each 1 m before the next, so that every leg has a length.
         for index in range(ground_phases.take_off.waypoint - 1, -1, -1):
             next_leg = points[index + 1, :2] - points[index + 2, :2]
             points[index, :2] += next_leg / max(1e-6, float(np.hypot(*next_leg)))
@@ -263,7 +265,7 @@ def display_waypoints(route: Route, ground_phases: GroundPhases) -> Floats:
 
 
 def flown_notes(route: Route, ground_phases: GroundPhases) -> tuple[str, ...]:
-    """Return a route's notes; the note on the landing is omitted if the landing is simulated."""
+    """Return a route's notes, without the note that the landing is not flown if the landing is simulated."""
     if ground_phases.approach is None:
         return route.notes
     return tuple(note for note in route.notes if LANDING_NOTE not in note)

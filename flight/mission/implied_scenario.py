@@ -45,10 +45,13 @@ def implied_scenario(
     vertical_legs: see `flight.mission.placing.place_stops`.
 
     The area is the bounding box of the mission's positions and loiters, home and rally points, with a margin of 2 km. A
-    home or rally point more than 100 km from the start of the mission is left out. Start and destination are the first
-    and last positions of the mission. A scenario requires them to be above the ground, so they are raised to 1 m above
-    it if necessary. The route and its verdict keep the mission's altitudes. A part of the mission may lie where the
-    terrain is unknown. Raises MissionError, or TerrainError if the ground is unknown at all positions of the mission.
+    home or rally point more than 100 km from the start of the mission is left out.
+
+    Start and destination are the first and last positions of the mission. A scenario requires them to be above the
+    ground, so they are raised to 1 m above it if necessary. The route and its verdict keep the mission's altitudes.
+
+    Raises MissionError if the mission cannot be placed on the map. Raises TerrainError if the ground is unknown at all
+    positions of the mission.
 
     >>> from flight.mission.items import Command, Frame, MissionItem
     >>> items = [
@@ -112,7 +115,7 @@ def mission_origin(mission: Mission, stops: tuple[RoutePoint, ...]) -> GeoOrigin
 
 
 def _mission_area(mission: Mission, itinerary: Itinerary, origin: GeoOrigin, points: Floats) -> Floats:
-    """Return the area around a mission, (2, 2) [[e0, e1], [n0, n1]] m.
+    """Return the area around a mission, (2, 2) [[west, east], [south, north]], m.
 
     points: positions of the mission's stops, (n, 2) m.
     """
@@ -132,8 +135,10 @@ def _mission_area(mission: Mission, itinerary: Itinerary, origin: GeoOrigin, poi
 def _load_terrain(
     path: str | None, origin: GeoOrigin, area: Floats, points: Floats
 ) -> tuple[Terrain | None, TerrainTable]:
-    """Return the terrain and the scenario's [terrain] table.
+    """Read the terrain of an area; return it with the scenario's [terrain] table.
 
+    path: elevation file or built-in name; None for no terrain.
+    area: [[west, east], [south, north]], (2, 2) m.
     points: positions of the mission's stops, (n, 2) m.
 
     Raises TerrainError if the ground is unknown at all of these positions, as in the file of another region.
@@ -159,7 +164,7 @@ def _load_terrain(
 
 
 def _end_table_above_ground(position: Position, terrain: Terrain | None) -> EndTable:
-    """Return the table of a start or destination; raise the position to 1 m above ground if it is lower."""
+    """Return the scenario table of a start or destination, raised to at least 1 m above the ground."""
     east, north, amsl = position
     if terrain is not None:
         amsl = max(amsl, float(terrain.height(east, north)) + 1.0)

@@ -46,7 +46,7 @@ class Notes:
 
 
 def _range_text(numbers: list[int]) -> str:
-    """Return sorted numbers as text; consecutive numbers are joined: "3-5, 9", or "3-5, 9, 12 and 3 more"."""
+    """Format sorted numbers, with consecutive numbers as ranges: "3-5, 9", or "3-5, 9, 12 and 3 more"."""
     ranges: list[list[int]] = []
     for number in numbers:
         if not ranges or number > ranges[-1][1] + 1:
@@ -54,8 +54,8 @@ def _range_text(numbers: list[int]) -> str:
         ranges[-1][1] = number
     listed = ranges[:_MAX_LISTED_RANGES]
     text = ", ".join(str(first) if first == last else f"{first}-{last}" for first, last in listed)
-    others = len(numbers) - sum(last - first + 1 for first, last in listed)
-    return f"{text} and {others} more" if others else text
+    unlisted_count = len(numbers) - sum(last - first + 1 for first, last in listed)
+    return f"{text} and {unlisted_count} more" if unlisted_count else text
 
 
 # Largest number of ranges of items that a note lists; the other items are counted.
@@ -141,7 +141,7 @@ OVER_TERRAIN = frozenset({Frame.GLOBAL_TERRAIN_ALT, Frame.GLOBAL_TERRAIN_ALT_INT
 
 
 def is_located(command: int, frame: int) -> bool:
-    """Return True if items of a command and frame have latitude, longitude and altitude."""
+    """Return True if items with this MAV_CMD and MAV_FRAME state latitude, longitude and altitude."""
     return frame != Frame.MISSION and (
         command <= _LAST_NAV_COMMAND or command in FENCES or command in _LOCATED_COMMANDS
     )
@@ -169,7 +169,7 @@ def command_name(command: int) -> str:
 
 
 def round_to_grid(degrees: float) -> float:
-    """Round degrees to a multiple of 1e-7, without truncating; NaN stays NaN.
+    """Round degrees to the nearest multiple of 1e-7, the resolution of MISSION_ITEM_INT; NaN stays NaN.
 
     >>> round_to_grid(36.50000006), round_to_grid(-84.19999994)
     (36.5000001, -84.1999999)
@@ -214,7 +214,10 @@ class MissionItem:
         return self._scaled(self.lon_deg)
 
     def _scaled(self, value: float) -> int:
-        """Return a coordinate as an int32; INT32_MAX for NaN."""
+        """Return a latitude or longitude (degrees) as MISSION_ITEM_INT carries it, an int32; INT32_MAX for NaN.
+
+        A command without a position carries an unscaled parameter in this field.
+        """
         if not math.isfinite(value):
             return _MAX_INT32
         return round(value * 1e7) if is_located(self.command, self.frame) else round(value)
@@ -302,11 +305,10 @@ class Mission:
 def renumber_items(mission: Mission) -> Mission:
     """Return a mission with its items numbered from 1 without gaps, as ground stations number them.
 
-    Number 0 remains home. The targets of jumps are renumbered, too. A jump to a missing item still leads to a missing
-    item.
+    The targets of jumps are renumbered, too. A jump to a missing item still leads to a missing item.
 
-    >>> way = tuple(MissionItem(k, 16, 0, (0.0,) * 4, 46.0, 8.0, 75.0) for k in (0, 1, 5))
-    >>> [item.seq for item in renumber_items(Mission(None, way)).items]
+    >>> items = tuple(MissionItem(k, 16, 0, (0.0,) * 4, 46.0, 8.0, 75.0) for k in (0, 1, 5))
+    >>> [item.seq for item in renumber_items(Mission(None, items)).items]
     [1, 2, 3]
     """
     numbers = {item.seq: number for number, item in enumerate(mission.items, 1)}
@@ -352,17 +354,17 @@ class ItemProblem(NamedTuple):
         """Return the problem as text: field, value and allowed values."""
         return f"{self.field} {self.value:.10g}: {self.allowed}"
 
-    def at(self, file: str, location: object) -> dict[str, Any]:
-        """Return the arguments with which a `MissionError` reports this problem.
+    def error_arguments(self, file: str, location: object) -> dict[str, Any]:
+        """Return the keyword arguments of a `MissionError` that reports this problem.
 
         file: file that holds the item.
-        location: beginning of the message.
+        location: beginning of the message, such as "survey.plan: item 3".
         """
         return {"message": f"{location}: {self}", "file": file, **self._asdict()}
 
 
 def position_problem(lat_deg: float, lon_deg: float) -> ItemProblem | None:
-    """Return what is wrong with a latitude and longitude (degrees), or None if both are valid."""
+    """Return the fault of a latitude and longitude (degrees), or None if both are valid."""
     if abs(lat_deg) > 90.0:
         hint = " (latitude and longitude swapped?)" if abs(lon_deg) <= 90.0 else ""
         return ItemProblem("latitude", lat_deg, f"allowed -90..90 degrees{hint}")
@@ -372,7 +374,7 @@ def position_problem(lat_deg: float, lon_deg: float) -> ItemProblem | None:
 
 
 def item_problem(item: MissionItem) -> ItemProblem | None:
-    """Return what is wrong with an item that no autopilot could interpret, or None for a valid item.
+    """Return the fault of an item that no autopilot could interpret, or None for a valid item.
 
     >>> print(item_problem(MissionItem(1, 16, 0, (0.0,) * 4, 91.0, 8.0, 75.0)))
     latitude 91: allowed -90..90 degrees (latitude and longitude swapped?)
@@ -399,7 +401,7 @@ def item_problem(item: MissionItem) -> ItemProblem | None:
 
 
 def _count_problem(item: MissionItem) -> ItemProblem | None:
-    """Return what is wrong with a parameter that is a count, a size or a jump target, or None."""
+    """Return the fault of a parameter that is a count, a size or a jump target, or None for valid parameters."""
     p1, p2 = item.params[:2]
     if item.command in JUMPS:
         if not (p1 >= 0 and p1 == int(p1)):

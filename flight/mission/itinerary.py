@@ -86,10 +86,13 @@ class Loiter:
     exits_on_tangent: bool = False
 
     def min_sweep(self, airspeed: float, radius: float) -> float:
-        """Return the angle around the circle for the loiter's turns or time, rad; the larger of the two.
+        """Return the angle around the circle that the loiter's turns and its time require, rad.
 
-        The angle for a time is computed without wind. In wind a lap takes longer, so the aircraft covers a smaller
-        angle in this time.
+        airspeed: m/s.
+        radius: radius of the circle, m.
+
+        The result is the larger of the angle for the turns and the angle for the time. The latter is computed without
+        wind. In wind a lap takes longer, so the aircraft covers a smaller angle in this time.
         """
         min_turns = 1.0 if self.endless else self.turns
         return max(2.0 * math.pi * min_turns, self.seconds * airspeed / radius)
@@ -137,9 +140,8 @@ def pass_by_distance(item: MissionItem) -> float:
     The distance is the third parameter of NAV_WAYPOINT in whole metres (`AP_Mission::mavlink_int_to_mission_cmd`). For
     any other item it is 0.
 
-    >>> place = (0, 36.5, 8.0, 700.0)
-    >>> made = [MissionItem(1, 16, place[0], (0.0, 0.0, p3, 0.0), *place[1:]) for p3 in (150.9, 300.0, math.nan, -50.0)]
-    >>> [pass_by_distance(item) for item in made]
+    >>> parameters = [(0.0, 0.0, distance, 0.0) for distance in (150.9, 300.0, math.nan, -50.0)]
+    >>> [pass_by_distance(MissionItem(1, 16, 0, params, 36.5, 8.0, 700.0)) for params in parameters]
     [150.0, 255.0, 0.0, 0.0]
     """
     stated_distance = item.params[2]
@@ -186,10 +188,9 @@ NO_ITEM = -1
 
 @dataclass(frozen=True, slots=True)
 class RoutePoint:
-    """A position to fly to: a stop of a mission's itinerary, and each waypoint of the route that belongs to the stop.
+    """A stop of a mission's itinerary, or a waypoint of its route: a loiter stop becomes several waypoints.
 
-    The position is None until `flight.mission.placing` has placed the stop on the map; a loiter then becomes several
-    points.
+    The position is None until `flight.mission.placing` has placed the stop on the map.
 
     item: seq of the mission item, `NO_ITEM` for a stop without an item.
     command: MAV_CMD of the item.
@@ -226,8 +227,8 @@ class RoutePoint:
     position: Position | None = None
     arc_radius: float = 0.0
 
-    def at(self, position: Position, arc_radius: float = 0.0) -> "RoutePoint":
-        """Return the route point of this stop at a position on the map, with a turn radius there, m."""
+    def placed_at(self, position: Position, arc_radius: float = 0.0) -> "RoutePoint":
+        """Return a copy at a position on the map (east, north, up, m), with a turn radius, m, negative to the left."""
         return replace(self, position=position, arc_radius=arc_radius)
 
     @property
@@ -300,7 +301,7 @@ class Itinerary:
 def make_itinerary(mission: Mission, *, resets_jump_counters: bool = False) -> Itinerary:
     """Return the sequence of stops that an autopilot flies for a mission, with jumps and commands applied.
 
-    resets_jump_counters: True to start a jump's count again each time it is complete, as ArduPlane 4.7 does.
+    resets_jump_counters: True to reset the counter of a jump after its last repeat, as ArduPlane 4.7 does.
 
     Raises MissionError if no item has a position, if a jump leads to a missing item, or if the result has more than
     `MAX_STOPS` stops.
@@ -353,7 +354,11 @@ def make_itinerary(mission: Mission, *, resets_jump_counters: bool = False) -> I
 
 
 def _add_command_limits(mission: Mission, steps: "_Steps", builder: "_ItineraryBuilder") -> None:
-    """Add open items and notes where an autopilot runs fewer jumps or commands than the mission has."""
+    """Add open items and notes where an autopilot runs fewer jumps or commands than the mission has.
+
+    steps: finished iteration over the mission's items.
+    builder: receives the open items and notes.
+    """
     jumps = [item.seq for item in mission.items if item.command in JUMPS and item.seq in steps.reached]
     if len(jumps) > _MAX_COUNTED_JUMPS:
         text = f"flown, but ArduPlane skips jumps beyond the first {_MAX_COUNTED_JUMPS}"
@@ -389,9 +394,9 @@ class _Step(NamedTuple):
 
 
 class _Steps:
-    """Navigation items of a mission, following jumps.
+    """Iterator over the navigation items of a mission, following jumps.
 
-    Jump counters are not reset in ArduPlane 4.6 and PX4.  ArduPlane 4.7 resets an exhausted counter
+    After its last repeat a jump is skipped by ArduPlane 4.6 and PX4, but ArduPlane 4.7 resets its counter
     (`AP_Mission::get_next_cmd`).
 
     passes_exhausted_jump: True if a jump is passed again after its last repeat.
@@ -418,7 +423,7 @@ class _Steps:
         self.long_command_chain, self._step_count = -1, 0
 
     def __iter__(self) -> Iterator[_Step]:
-        """Iterate over the navigation items, counting jumps."""
+        """Yield a step for each navigation item, and a last step without a target for the mission's end."""
         index: int | None = 0
         while index is not None:
             passed_indices: list[int] = []
@@ -439,9 +444,11 @@ class _Steps:
             index = None if index is None else index + 1
 
     def _commands_on_leg(self, first_index: int) -> list[int]:
-        """Return the indices of the commands that ArduPlane runs on the leg to an item.
+        """Return the indices of the commands that ArduPlane runs on the leg to the next navigation item.
 
-        first_index: index of the last command that ArduPlane has run before that leg.
+        first_index: index of the command that ArduPlane has run before that leg.
+
+        Jump counters are read, but not changed.
         """
         commands: list[int] = []
         index = self._next_item(first_index + 1, counting=False)
@@ -453,8 +460,11 @@ class _Steps:
     def _next_item(self, index: int, *, counting: bool) -> int | None:
         """Return the index of the next item that is not a jump; None at the mission's end (`get_next_cmd`).
 
-        counting: True to count the jumps on the way, as ArduPlane does when it reaches a navigation item; False to look
-            ahead only.
+        index: index of the first item to look at; jumps from there on are followed.
+        counting: True to advance the jump counters and record the items reached, as ArduPlane does when it reaches a
+            navigation item; False to look ahead without a change.
+
+        A jump without end is taken once; the second time, `endless` is set and the result is None.
         """
         first_jump, chain_length = -1, 0
         while index < len(self.items):
@@ -486,7 +496,7 @@ class _Steps:
         return None
 
     def _count_item(self, item: MissionItem) -> None:
-        """Add an item to the items reached so far.
+        """Record that an item has been reached.
 
         Raises MissionError if jumps lead through too many items.
         """
@@ -506,7 +516,9 @@ class _Steps:
         if number not in index_by_number:
             missing_name = f"JUMP_TAG {number}" if is_tag_jump else f"item {number}"
             problem = ItemProblem(f"{command_name(jump.command)} p1", number, f"the mission has no {missing_name}")
-            raise MissionError(**problem.at(self.mission.source, f"{self.mission.source}: item {jump.seq}"))
+            raise MissionError(
+                **problem.error_arguments(self.mission.source, f"{self.mission.source}: item {jump.seq}")
+            )
         return index_by_number[number]
 
 
@@ -523,7 +535,7 @@ class _AutopilotNotes:
 
 
 class _ItineraryBuilder:
-    """Builder of an itinerary, with its stops, speed, home and notes so far."""
+    """Builder of an itinerary: its state is the speed and home that apply to the next stop."""
 
     def __init__(self, mission: Mission) -> None:
         self.source = mission.source
@@ -542,18 +554,22 @@ class _ItineraryBuilder:
         self.first_home = self.home = mission.home or _first_position(mission)
 
     def process_step(self, step: _Step) -> None:
-        """Process a step of the mission: the commands before a navigation item, then the item itself."""
+        """Run the commands before a navigation item as both autopilots do, then add the item's stops.
+
+        PX4 runs each command where it stands in the list. ArduPlane runs one command before the leg, and the others on
+        the leg; after a jump these may be commands of the next loop.
+        """
         for item in step.commands:
             self._run_as_px4(item)
         arduplane_commands = () if step.command_before_leg is None else (step.command_before_leg, *step.commands_on_leg)
         for index, item in enumerate(arduplane_commands):
-            # A home that is set on a leg does not change the altitude of the item at its end.
+            # A home that is set on a leg does not change the altitude of the item at the end of the leg.
             if index == 0 or item.command != Command.DO_SET_HOME:
                 self._run_as_arduplane(item, arduplane_commands[index + 1 :])
         for item in step.commands_on_leg:
             if item not in step.commands:
                 self.notes.arduplane.add(
-                    f"{command_name(item.command)}: run one loop early, as ArduPlane does", item.seq
+                    f"{command_name(item.command)}: flown one loop early, as ArduPlane runs it", item.seq
                 )
         if step.target is not None:
             self._fly_item(step.target)
@@ -566,7 +582,12 @@ class _ItineraryBuilder:
                 self._set_home(item)
 
     def add_open_item(self, text: str, seq: int, *, arduplane: bool = True, px4: bool = True) -> None:
-        """Record an item that changes the path and is not simulated, for one or both autopilots."""
+        """Record an item that changes the path and is not simulated, for one or both autopilots.
+
+        text: command of the item, and the part that is not simulated.
+        seq: number of the item.
+        arduplane, px4: True to record it for this autopilot.
+        """
         for applies, notes, open_items in (
             (arduplane, self.notes.arduplane, self.open_items),
             (px4, self.notes.px4, self.px4_open_items),
@@ -615,9 +636,9 @@ class _ItineraryBuilder:
             self._note_unsimulated_command(item, as_px4=True)
 
     def _note_unsimulated_command(self, item: MissionItem, *, as_px4: bool) -> None:
-        """Record a command that is not simulated.
+        """Record a command that is not simulated: as an open item if it may change the path, otherwise as a note.
 
-        It is an open item if it may change the path, otherwise a note.
+        as_px4: True for PX4's treatment of the command, False for ArduPlane's.
         """
         name, support = command_name(item.command), command_support(item.command)
         treatment = support.px4 if as_px4 else support.arduplane
@@ -625,7 +646,7 @@ class _ItineraryBuilder:
         if treatment == Treatment.OPEN:
             self.add_open_item(f"{name}: not flown; {support.reason}", item.seq, arduplane=not as_px4, px4=as_px4)
         elif item.command in MARKS or item.command in CAMERA_SWITCHES:
-            # Others jump to a mark; by itself it is flown as written. The survey rule judges the photos.
+            # A mark needs no note, because it does nothing by itself. The survey rule judges camera switches.
             return
         elif support.reason == CAMERA_REASON:
             notes.add(f"{name}: {CAMERA_REASON}", item.seq)
@@ -657,7 +678,10 @@ class _ItineraryBuilder:
             self._note_unsimulated_command(item, as_px4=True)
 
     def _make_stop(self, item: MissionItem, acceptance: float = 0.0) -> RoutePoint:
-        """Return the stop of an item, with the current speeds and the gates since the last stop."""
+        """Return the stop of an item, with the current speeds and home, and the gates since the last stop.
+
+        acceptance: acceptance radius that the item states, m; 0 for none.
+        """
         lat = item.lat_deg
         lon = item.lon_deg
         loiter = stated_loiter(item)
@@ -814,13 +838,13 @@ class _ItineraryBuilder:
             self.add_open_item(f"{name}: not flown straight down", item.seq)
 
     def _set_home(self, item: MissionItem) -> None:
-        """Set home for all later altitudes and RTLs, as ArduPlane does (`Plane::do_set_home`)."""
+        """Apply a DO_SET_HOME to all later altitudes and RTLs, as ArduPlane does (`Plane::do_set_home`)."""
         name = command_name(item.command)
         if item.params[0] == 1.0:
             if self.stops:
                 self.add_open_item(f"{name} to the aircraft's current position: not flown", item.seq, px4=False)
             else:
-                self.notes.arduplane.add(f"{name} before the start: home is where the aircraft stands", item.seq)
+                self.notes.arduplane.add(f"{name} before the start: home is the position of the aircraft", item.seq)
             return
         if not item.has_position and abs(item.alt) >= _ALTITUDE_STEP_M:
             # `AP_AHRS::set_home` ignores a home only if its altitude is 0, too.
@@ -836,7 +860,7 @@ class _ItineraryBuilder:
         self.home = Home(item.lat_deg, item.lon_deg, altitude)
 
     def _change_speed_as_arduplane(self, item: MissionItem) -> None:
-        """Read a speed change as ArduPlane does (`Plane::do_change_speed`)."""
+        """Apply a DO_CHANGE_SPEED as ArduPlane does (`Plane::do_change_speed`)."""
         speed_type, speed, throttle = item.params[:3]
         notes = self.notes.arduplane
         sets_speed = speed_type == 1.0 or (speed_type == 0.0 and (speed > 0.0 or speed == -2.0))
@@ -861,7 +885,7 @@ class _ItineraryBuilder:
             notes.add(f"DO_CHANGE_SPEED to {speed:g} m/s: ignored", item.seq)
 
     def _change_speed_as_px4(self, item: MissionItem) -> None:
-        """Read a speed change as PX4 does (`navigator_main.cpp`, VEHICLE_CMD_DO_CHANGE_SPEED)."""
+        """Apply a DO_CHANGE_SPEED as PX4 does (`navigator_main.cpp`, VEHICLE_CMD_DO_CHANGE_SPEED)."""
         speed_type, speed, throttle = item.params[:3]
         notes = self.notes.px4
         if speed > 0.0:
@@ -878,7 +902,7 @@ class _ItineraryBuilder:
 
 
 def _first_position(mission: Mission) -> Home:
-    """Return the position of the first item that has one, with unknown altitude."""
+    """Return the position of the first item with a position as a home with unknown altitude."""
     for item in mission.items:
         if item.command in PLACES | TAKEOFFS | LANDINGS and item.has_position:
             return Home(item.lat_deg, item.lon_deg, math.nan)

@@ -49,9 +49,9 @@ def item_radius(loiter: Loiter) -> float:
 
 
 def unit_scale(up: float) -> float:
-    """Return 1, for an autopilot that flies a loiter's stated radius at every altitude.
+    """Return the ratio of a loiter's flown radius to its stated radius: 1 at every altitude.
 
-    up: m AMSL.
+    up: altitude, m AMSL. Some autopilots enlarge their loiters with altitude; this is the function for the others.
     """
     return 1.0
 
@@ -98,11 +98,11 @@ class LoiterRules:
         """Return a note for an autopilot that loiters about the last waypoint after the mission's end.
 
         >>> LoiterRules(80.0, "NAV_LOITER_RAD", ends_in_circle=True).end_note()
-        'after the last waypoint the aircraft circles it without end, with NAV_LOITER_RAD, 80 m: flown once'
+        'after the last waypoint the aircraft loiters around it without end, with NAV_LOITER_RAD, 80 m: ...'
         """
         name = f"{self.radius_name}, " if self.radius_name else ""
         circle = f"with {name}{abs(self.radius):g} m"
-        return f"after the last waypoint the aircraft circles it without end, {circle}: flown once"
+        return f"after the last waypoint the aircraft loiters around it without end, {circle}: one lap is flown"
 
 
 # Rules of an autopilot without loiter rules.
@@ -139,12 +139,14 @@ def lay_out_waypoints(
     slopes: function that returns the steepest climb and descent of the aircraft in a spiral.
     rules: loiter rules of the autopilot.
 
+    notes: receives a note on each stop that is not flown as written.
+
     A stop inside the previous or next circle is omitted with a note, because no tangent leads to it. Raises
     MissionError if a loiter is too wide or too long to lay out.
     """
     unjoined: list[UnjoinedStop] = []
     nodes = _make_nodes(source, stops, notes, default_radius, rules, unjoined)
-    courses = [tangent_course(a, b) for a, b in pairwise(nodes)]
+    courses = [tangent_course(node, next_node) for node, next_node in pairwise(nodes)]
     points: list[RoutePoint] = []
     up = stops[0].up
     for index, node in enumerate(nodes):
@@ -158,7 +160,7 @@ def lay_out_waypoints(
         min_radius = default_radius(node.airspeed, node.up) if rules.exits_on_heading else 0.0
         corners = _corners_around(source, node, entry_course, exit_course, up, leg_length, min_radius, slopes, rules)
         if not index:
-            corners.insert(0, node.at((*point_on_circle(node, entry_course), corners[0].up)))
+            corners.insert(0, node.placed_at((*point_on_circle(node, entry_course), corners[0].up)))
         up = corners[-1].up
         points += corners
         if len(points) > MAX_STOPS:
@@ -178,9 +180,11 @@ def _make_nodes(
 ) -> list[RoutePoint]:
     """Return the points and loiter circles of a route in flying order, each joined to the next by a tangent.
 
-    Stops that no tangent reaches are appended to ``unjoined``.
+    unjoined: receives the stops that are not at their stated positions in the result.
 
-    If the take-off is inside the first circle, the flight starts on that circle, without the take-off.
+    A point that lies inside the previous or next circle is omitted, with a note. If the take-off is inside the first
+    circle, the flight therefore starts on that circle. A loiter that no tangent joins to the previous circle is flown
+    on the previous circle, with a note.
     """
     nodes: list[RoutePoint] = []
     for stop in stops:
@@ -219,10 +223,10 @@ def _make_nodes(
             ):
                 unjoined.append(UnjoinedStop(stop.item, previous.item, is_circle=True))
             notes.add(
-                f"no tangent joins its circle to the circle of item {previous.item}: flown on that circle",
+                f"no tangent joins its circle to the circle of item {previous.item}: flown on the circle of that item",
                 stop.item,
             )
-            node = node.at((previous.east, previous.north, node.up), previous.arc_radius)
+            node = node.placed_at((previous.east, previous.north, node.up), previous.arc_radius)
         nodes.append(node)
     return nodes
 
@@ -243,6 +247,11 @@ def _signed_radius(
     rules: LoiterRules,
 ) -> float:
     """Return the radius of a loiter, m, negative to the left; add a note if it differs from the stated radius.
+
+    loiter: loiter of the stop.
+    up: altitude of the loiter, m AMSL.
+    default_radius: function that returns the aircraft's default loiter radius.
+    rules: loiter rules of the autopilot.
 
     Raises MissionError if the stated radius is too large.
     """
@@ -275,30 +284,31 @@ def _signed_radius(
     return math.copysign(radius * radius_scale, loiter.radius)
 
 
-def is_joined(a: RoutePoint, b: RoutePoint) -> bool:
+def is_joined(node: RoutePoint, next_node: RoutePoint) -> bool:
     """Return True if a tangent joins two circles or points, or if both are the same circle."""
-    distance = a.distance_to(b)
-    return distance > abs(b.arc_radius - a.arc_radius) + _MIN_TANGENT_CLEARANCE_M or (
-        distance < 1.0 and abs(a.arc_radius - b.arc_radius) < 1.0
+    distance = node.distance_to(next_node)
+    return distance > abs(next_node.arc_radius - node.arc_radius) + _MIN_TANGENT_CLEARANCE_M or (
+        distance < 1.0 and abs(node.arc_radius - next_node.arc_radius) < 1.0
     )
 
 
-def tangent_course(a: RoutePoint, b: RoutePoint) -> float:
+def tangent_course(node: RoutePoint, next_node: RoutePoint) -> float:
     """Return the course of the tangent from a circle or point to the next, rad.
 
     The result is 0 if both are the same circle.
     """
-    distance = a.distance_to(b)
+    distance = node.distance_to(next_node)
     if distance < 1.0:
         return 0.0
-    bearing = math.atan2(b.east - a.east, b.north - a.north)
-    # Across the tangent, the centers are b.turn - a.turn apart.
-    return bearing - math.asin(min(1.0, max(-1.0, (b.arc_radius - a.arc_radius) / distance)))
+    bearing = math.atan2(next_node.east - node.east, next_node.north - node.north)
+    # Perpendicular to the tangent, the distance between the centers is the difference of the signed radii.
+    return bearing - math.asin(min(1.0, max(-1.0, (next_node.arc_radius - node.arc_radius) / distance)))
 
 
 def point_on_circle(node: RoutePoint, course: float, radius_ratio: float = 1.0) -> tuple[float, float]:
-    """Return the point of a circle at which an aircraft has a course (rad): east and north, m.
+    """Return the point of a circle at which the aircraft flies on a course (rad): east and north, m.
 
+    node: the circle, by its center and its signed radius.
     radius_ratio: distance of the point from the center, in radii; 1 for a point on the circle itself.
     """
     return (
@@ -314,7 +324,7 @@ def circle_corners(node: RoutePoint, entry_course: float, sweep: float) -> list[
     sweep: angle that the aircraft flies around the circle, rad.
 
     >>> point = RoutePoint(1, 16, 0.0, 0.0, 0.0, 0, 25.0)
-    >>> [(round(e), round(n)) for e, n in circle_corners(point.at((100.0, 0.0, 0.0), 100.0), 0.0, math.pi / 2.0)]
+    >>> [(round(e), round(n)) for e, n in circle_corners(point.placed_at((100.0, 0.0, 0.0), 100.0), 0.0, math.pi / 2.0)]
     [(0, 41), (59, 100)]
     """
     count = max(1, math.ceil(sweep / MAX_CORNER_ANGLE_RAD - 1e-9))
@@ -336,8 +346,9 @@ def _corners_around(
     slopes: SpiralSlopes,
     rules: LoiterRules,
 ) -> list[RoutePoint]:
-    """Return the corners of the polygon around a circle, from its entry course to its exit course.
+    """Return the waypoints of a loiter: corners of a polygon around its circle, from entry to exit course.
 
+    node: center of the circle, at the altitude of the loiter, with its signed radius.
     entry_course, exit_course: courses at which the aircraft joins and leaves the circle, rad; ``exit_course`` is None
         at the mission's end.
     previous_altitude: altitude at the start of the leg to the circle, m AMSL.
@@ -361,7 +372,7 @@ def _corners_around(
             entry_altitude = min(max(node.up, previous_altitude - max_descent), previous_altitude + max_climb)
         altitude_change = max(0.0, abs(node.up - entry_altitude) - rules.altitude_tolerance)
         if altitude_change > 0.0:
-            # Altitudes are interpolated between the corners, of which there is one more than intervals.
+            # The altitude changes from the first to the last corner, which takes one corner angle less than the sweep.
             slope = climb_slope if node.up > entry_altitude else dive_slope
             required_sweep = altitude_change / slope / radius + MAX_CORNER_ANGLE_RAD
     elif loiter is not None:
@@ -386,7 +397,7 @@ def _corners_around(
     points = []
     for index, (east, north) in enumerate(corners):
         fraction = 1.0 if len(corners) == 1 else index / (len(corners) - 1)
-        points.append(node.at((east, north, entry_altitude + fraction * (node.up - entry_altitude)), radius))
+        points.append(node.placed_at((east, north, entry_altitude + fraction * (node.up - entry_altitude)), radius))
     if exit_course is None and sweep > 0.0:
-        points.append(node.at((*point_on_circle(node, entry_course + turn_sign * sweep), node.up)))
+        points.append(node.placed_at((*point_on_circle(node, entry_course + turn_sign * sweep), node.up)))
     return points

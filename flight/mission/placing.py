@@ -56,7 +56,7 @@ class PlacedLanding(NamedTuple):
     stops: stops in flying order, the landing last.
     ground: altitude of the landing point, m; None if unknown.
     notes: parts that are not flown as written.
-    open_items: items that leave the verdict open.
+    open_items: items that leave the verdict undecided.
     """
 
     start: LandingStart
@@ -103,7 +103,7 @@ def place_stops(
     vertical_legs: bool = False,
     resets_jump_counters: bool = False,
 ) -> PlacedMission:
-    """Place the stops of a mission's itinerary on the map about ``origin``.
+    """Place the stops of a mission's itinerary on the map about ``origin``, with altitudes AMSL.
 
     terrain: None if unknown; heights above terrain are then an error.
     itinerary: the mission's itinerary; None to make it.
@@ -203,7 +203,9 @@ def landing_starts(mission: Mission, origin: GeoOrigin, terrain: Terrain | None)
 def _landing_starts(
     mission: Mission, origin: GeoOrigin, heights: "_AltitudeConverter"
 ) -> Iterator[tuple[int, LandingStart]]:
-    """Yield the start of each landing sequence, with the list index of its DO_LAND_START.
+    """Yield the list index of each DO_LAND_START with the start of its landing sequence.
+
+    heights: converter that has the mission's home.
 
     A DO_LAND_START is left out if no position follows it.
     """
@@ -227,7 +229,9 @@ def _place_landings(
     heights: "_AltitudeConverter",
     numbered_starts: Sequence[tuple[int, LandingStart]],
 ) -> tuple[PlacedLanding, ...]:
-    """Return a mission's landing sequences.
+    """Return the landing sequences of a mission that can be simulated after an RTL.
+
+    numbered_starts: list index of each DO_LAND_START with the start of its sequence.
 
     A sequence is left out if it begins with the landing, or if it cannot be placed on the map.
     """
@@ -252,9 +256,9 @@ def _place_landings(
 def landing_sequence(
     mission: Mission, origin: GeoOrigin, terrain: Terrain | None, first: int
 ) -> tuple[LandingStart, ...]:
-    """Return the stops of a landing sequence from an item up to the landing, which is excluded.
+    """Return the stops of a landing sequence from an item up to the landing, without the landing.
 
-    first: number of the item with which the sequence starts.
+    first: number (seq) of the item with which the sequence starts.
 
     The result is empty for a mission without a home.
 
@@ -275,7 +279,7 @@ def landing_sequence(
 def _stops_to_landing(
     items: Sequence[MissionItem], origin: GeoOrigin, heights: "_AltitudeConverter"
 ) -> tuple[LandingStart, ...]:
-    """Return the stops of the items before the first landing item."""
+    """Return the stops of the items with a position before the first landing item."""
     stops = []
     for item in items:
         if item.command in LANDINGS:
@@ -291,16 +295,16 @@ def _is_navigation_target(item: MissionItem) -> bool:
 
 
 def _item_position(item: MissionItem, origin: GeoOrigin, heights: "_AltitudeConverter") -> tuple[float, float, float]:
-    """Return an item's position on the map, m; without a stated altitude, at the altitude of home."""
+    """Return an item's position on the map (east, north, up AMSL, m), at home's altitude if it states none."""
     stop = RoutePoint(item.seq, item.command, item.lat_deg, item.lon_deg, item.alt, item.frame, math.nan)
     east, north = project_stops(heights.source, (stop,), origin)[0].tolist()
-    return east, north, heights.amsl(stop, east, north, heights.home_amsl())
+    return east, north, heights.stop_altitude(stop, east, north, heights.home_amsl())
 
 
 def _landing_stop(item: MissionItem, origin: GeoOrigin, heights: "_AltitudeConverter") -> LandingStart:
-    """Return a landing sequence that starts at an item, without its next stops.
+    """Return a stop of a landing sequence: its position, its loiter if it is one, and the altitude of home.
 
-    Distances to the sequence are measured to the item's position.
+    The field ``next_stops`` is empty, and the distance to the sequence is measured to the item's position.
     """
     position, loiter = _item_position(item, origin, heights), stated_loiter(item)
     stated = loiter or Loiter(0.0)
@@ -350,7 +354,9 @@ def rally_stops(mission: Mission) -> tuple[RoutePoint, ...]:
 def _place_return_points(
     mission: Mission, home: Home, origin: GeoOrigin, heights: "_AltitudeConverter"
 ) -> tuple[ReturnPoint, ...]:
-    """Return home and the rally points on the map.
+    """Return home and the rally points on the map, home first.
+
+    heights: converter that has this home.
 
     Raises MissionError, which names the rally point, if it is beyond the maximum extent of the map.
     """
@@ -362,7 +368,7 @@ def _place_return_points(
     rally_positions = project_stops(mission.source, stops, origin).tolist()
     for number, stop, (point_east, point_north) in zip(numbers, stops, rally_positions, strict=True):
         # Ground stations always write a rally point's height; a point without height gets home's altitude.
-        up = heights.amsl(stop, point_east, point_north, launch.up)
+        up = heights.stop_altitude(stop, point_east, point_north, launch.up)
         base = launch.up if stop.frame in OVER_HOME else 0.0
         return_points.append(ReturnPoint(point_east, point_north, up, base, number))
     return tuple(return_points)
@@ -371,13 +377,17 @@ def _place_return_points(
 def _place_stops(
     source: str, itinerary: Itinerary, origin: GeoOrigin, heights: "_AltitudeConverter", vertical_legs: bool
 ) -> list[RoutePoint]:
-    """Return the stops on the map; successive stops at the same position are merged into one."""
+    """Return the stops of an itinerary on the map; successive stops at the same position are merged into one.
+
+    heights: converter that also receives the notes.
+    vertical_legs: True to accept a position straight above or below the previous one; see `place_stops`.
+    """
     notes = heights.notes
     map_positions = project_stops(source, itinerary.stops, origin)
     placed_stops: list[RoutePoint] = []
     for stop, (east, north) in zip(itinerary.stops, map_positions.tolist(), strict=True):
         previous_altitude = placed_stops[-1].map_position[2] if placed_stops else math.nan
-        placed_stop = stop.at((east, north, heights.amsl(stop, east, north, previous_altitude)))
+        placed_stop = stop.placed_at((east, north, heights.stop_altitude(stop, east, north, previous_altitude)))
         is_loiter_or_return = stop.loiter is not None or bool(placed_stops and placed_stops[-1].loiter is not None)
         is_loiter_or_return = is_loiter_or_return or stop.command == Command.NAV_RETURN_TO_LAUNCH
         if (
@@ -387,17 +397,19 @@ def _place_stops(
         ):
             is_vertical = abs(placed_stop.map_position[2] - previous_altitude) >= SAME_POSITION_DISTANCE_M
             if vertical_legs and is_vertical and stop.command not in TAKEOFFS:
-                placed_stops.append(stop.at(_vertical_leg_end(placed_stops, placed_stop.map_position[2])))
+                placed_stops.append(stop.placed_at(_vertical_leg_end(placed_stops, placed_stop.map_position[2])))
                 continue
             merged_stop = _merge_stops(source, placed_stops[-1], placed_stop, notes)
-            placed_stops[-1] = merged_stop.at(placed_stops[-1].map_position)
+            placed_stops[-1] = merged_stop.placed_at(placed_stops[-1].map_position)
         else:
             placed_stops.append(placed_stop)
     return placed_stops
 
 
 def project_stops(source: str, stops: tuple[RoutePoint, ...], origin: GeoOrigin) -> Floats:
-    """Return east and north of each stop, (n, 2) m.
+    """Return east and north of each stop on the map about an origin, (n, 2) m.
+
+    source: name of the mission in errors.
 
     Raises MissionError, which names the item, if a stop is beyond the maximum extent of the map.
     """
@@ -418,7 +430,7 @@ def project_stops(source: str, stops: tuple[RoutePoint, ...], origin: GeoOrigin)
 
 
 class _AltitudeConverter:
-    """Converter of altitudes and heights in any frame to altitudes AMSL."""
+    """Converter of altitudes in the frame of their item to altitudes AMSL, for one home and one terrain."""
 
     def __init__(self, source: str, home: Home, origin: GeoOrigin, terrain: Terrain | None, notes: Notes) -> None:
         self.source = source
@@ -428,7 +440,7 @@ class _AltitudeConverter:
         self.home = home
         self._home_amsl: float | None = None
 
-    def amsl(self, stop: RoutePoint, east: float, north: float, previous_altitude: float) -> float:
+    def stop_altitude(self, stop: RoutePoint, east: float, north: float, previous_altitude: float) -> float:
         """Return the altitude of a stop, m AMSL.
 
         A stop without an altitude keeps the altitude of the previous stop.
@@ -464,7 +476,7 @@ class _AltitudeConverter:
         return ground
 
     def home_amsl(self) -> float:
-        """Return the altitude from which heights above home are measured, m AMSL."""
+        """Return the altitude from which heights above home are measured, m AMSL; it is determined only once."""
         if self._home_amsl is None:
             self._home_amsl = self._find_home_amsl(self.home)
         return self._home_amsl
@@ -483,7 +495,7 @@ class _AltitudeConverter:
             previous_frame = itinerary.stops[-2].frame if len(itinerary.stops) > 1 else stop.frame
             is_known = is_known or not math.isnan(self.home.alt) or previous_frame in OVER_HOME
         east, north = to_map(self.origin, stop.lat_deg, stop.lon_deg)
-        return self.amsl(stop, float(east), float(north), math.nan) if is_known else None
+        return self.stop_altitude(stop, float(east), float(north), math.nan) if is_known else None
 
     def ground_at_home(self) -> float:
         """Return the altitude of the ground at home, m AMSL; NaN if unknown."""
@@ -506,10 +518,10 @@ class _AltitudeConverter:
         ground = self.ground_at_home()
         if not math.isnan(home.alt):
             if abs(home.alt - ground) > _HOME_ALTITUDE_TOLERANCE_M:
-                hint = "" if home.alt else "; ground stations write 0 where no home was set"
+                hint = "" if home.alt else ". Ground stations write 0 if no home was set"
                 self.notes.add(
-                    f"home is at {home.alt:.1f} m AMSL, but the ground there is at {ground:.1f} m: "
-                    "heights above home are measured from home's altitude; for a launch from that ground, set home to"
+                    f"home is at {home.alt:.1f} m AMSL, but the ground there is at {ground:.1f} m AMSL. "
+                    "Heights above home are measured from home's altitude. For a launch from that ground, set home to"
                     f" {ground:.1f} m AMSL{hint}"
                 )
             return home.alt
@@ -538,10 +550,10 @@ def _vertical_leg_end(stops: list[RoutePoint], up: float) -> Position:
 
 
 def _merge_stops(source: str, previous: RoutePoint, stop: RoutePoint, notes: Notes) -> RoutePoint:
-    """Merge a stop with the previous stop at the same position, and return the merged stop.
+    """Merge a stop with the previous stop at the same horizontal position, add a note, and return the merged stop.
 
-    A note is added. Raises MissionError if the stop is straight above or below the previous stop, unless the stop is a
-    take-off.
+    The result is the previous stop, or the new stop if the previous stop has no mission item. Raises MissionError if
+    the stop is straight above or below the previous stop, unless the stop is a take-off.
     """
     climb = stop.map_position[2] - previous.map_position[2]
     if abs(climb) >= SAME_POSITION_DISTANCE_M:

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from flight.mission.altitude_frames import misread_altitudes
+from flight.mission.altitude_frames import find_misread_altitudes
 from flight.mission.items import Command, Mission
 from flight.mission.placing import return_points
 from flight.mission.return_path import ReturnPoint, ReturnRules
@@ -70,7 +70,7 @@ def preflight_notes(
 
 
 def _note_tail_winds(route: Route, scenario: Scenario) -> Iterator[str]:
-    """Yield a note on the tailwind at a launch or a landing that the scenario states."""
+    """Yield a note on the tailwind at the scenario's launch, and one on the tailwind at its landing."""
     courses = leg_courses(route.positions)
     launch, landing = scenario.launch, scenario.landing
     ends = []
@@ -102,9 +102,9 @@ def _note_distant_home(mission: Mission, scenario: Scenario) -> Iterator[str]:
 def _note_misread_altitudes(mission: Mission, scenario: Scenario) -> Iterator[str]:
     """Yield notes on items whose altitudes fit the terrain only in the other altitude frame.
 
-    They state AMSL and fit only as heights above home, or the opposite.
+    One note is for altitudes AMSL that fit only as heights above home, the other for the opposite.
     """
-    below_ground, too_high = misread_altitudes(mission, scenario.origin, scenario.terrain)
+    below_ground, too_high = find_misread_altitudes(mission, scenario.origin, scenario.terrain)
     amsl, over_home = "altitudes above mean sea level (frame 0)", "heights above home (frame 3)"
     for readings, stated_as, other in ((below_ground, amsl, over_home), (too_high, over_home, amsl)):
         if readings:
@@ -117,7 +117,7 @@ def _note_misread_altitudes(mission: Mission, scenario: Scenario) -> Iterator[st
 
 
 def _heights_text(heights: list[float]) -> str:
-    """Describe heights above ground, m, by their lowest and highest.
+    """Describe the range of heights above ground (m, negative below it) in rounded numbers.
 
     >>> _heights_text([-20.4, -330.0]), _heights_text([12.3])
     ('330 to 20 m below ground', '12 m above ground')
@@ -132,7 +132,11 @@ def _heights_text(heights: list[float]) -> str:
 def _note_rally_points(
     points: tuple[ReturnPoint, ...], route: Route, scenario: Scenario, rules: ReturnRules
 ) -> Iterator[str]:
-    """Yield notes on rally points that are below ground, or too far away for an RTL from the route."""
+    """Yield notes on rally points that are below ground, or too far away for an RTL from the route.
+
+    points: the rally points on the map.
+    rules: RTL rules of the autopilot.
+    """
     for point in points:
         name = f"rally point {point.number}"
         ground = math.nan if scenario.terrain is None else float(scenario.terrain.height(point.east, point.north))
@@ -186,6 +190,9 @@ def _note_autoland(
 ) -> Iterator[str]:
     """Yield a note on a landing sequence if RTL_AUTOLAND is 0, because ArduPlane then refuses to arm.
 
+    parameters: stated parameters of the autopilot, by name.
+    assumed_parameters: parameters that are assumed for the mission's landing, by name.
+
     Arming is checked in AP_Arming.cpp. There is no note on an assumed value if the scenario has a landing, because
     planfly writes RTL_AUTOLAND for its plan.
     """
@@ -205,7 +212,7 @@ _LEVEL_TEXT = "is level"
 
 
 def _slope_text(slope: float) -> str:
-    """Return the end of a sentence that describes a slope of the ground, m per m."""
+    """Describe a slope of the ground (m per m, positive uphill) as the end of a sentence: "rises by 2.0%"."""
     percent_text = f"{abs(slope):.1%}"
     return _LEVEL_TEXT if percent_text == "0.0%" else f"{'rises' if slope > 0.0 else 'falls'} by {percent_text}"
 
@@ -237,17 +244,17 @@ def _note_landing_ground(mission: Mission, route: Route, scenario: Scenario) -> 
         tail_wind = scenario.wind.components_on_course(course, route.landing_ground)[0]
         wind = f", with {tail_wind:.1f} m/s of tailwind" if tail_wind > MIN_NOTED_WIND_MPS else wind
         wind = f", against {-tail_wind:.1f} m/s of wind" if tail_wind < -MIN_NOTED_WIND_MPS else wind
-    ground = "the terrain there is unknown"
+    ground = "The terrain there is unknown"
     length = LandingStrip(0.0, 0.0).length
     if not any(math.isnan(slope) for slope in slopes):
         along, across = (_slope_text(slope) for slope in slopes)
         ground = (
-            f"over {length:.0f} m around the landing point the ground {along} in the landing direction, and {across} to"
+            f"Over {length:.0f} m around the landing point the ground {along} in the landing direction, and {across} to"
             " the right"
         )
         if along == across == _LEVEL_TEXT:
-            ground = f"over {length:.0f} m around the landing point the ground {_LEVEL_TEXT}"
+            ground = f"Over {length:.0f} m around the landing point the ground {_LEVEL_TEXT}"
         if max(abs(slope) for slope in slopes) > STEEPEST_STRIP_SLOPE:
             ground += f" (plans land on slopes of up to {STEEPEST_STRIP_SLOPE:.0%})"
-    strip_text = "touchdown and roll-out are not judged, because the scenario has no [landing]"
-    yield f"item {last_item}: lands on course {round(math.degrees(course)) % 360}°{wind}; {ground}; {strip_text}"
+    strip_text = "Touchdown and roll-out are not judged, because the scenario has no [landing]"
+    yield f"item {last_item}: lands on course {round(math.degrees(course)) % 360}°{wind}. {ground}. {strip_text}"

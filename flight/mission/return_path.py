@@ -220,15 +220,19 @@ def choose_target(
     that may return to a mission's landing chooses the first landing if it is nearer than both.
 
     start: east, north, up at the start of the RTL, m AMSL.
-    landings: the mission's landing sequences; only those that lead to a landing count.
+    rally: the rally points.
+    landings: the mission's landing sequences; sequences without a landing are ignored.
 
-    >>> home, near, far = (ReturnPoint(*at) for at in ((300.0, 0.0, 400.0), (1000.0, 0.0, 500.0), (0.0, 5000.0, 500.0)))
+    >>> positions = (300.0, 0.0, 400.0), (1000.0, 0.0, 500.0), (0.0, 5000.0, 500.0)
+    >>> home, near, far = (ReturnPoint(*position) for position in positions)
     >>> choose_target(ReturnRules(), (0.0, 0.0, 700.0), home, [far, near])[:3]
     ((1000.0, 0.0, 500.0), 'rally point 2', 'the nearest of 2 rally points')
     >>> choose_target(ReturnRules(rally_limit=900.0), (0.0, 0.0, 700.0), home, [near])[:2]
     ((300.0, 0.0, 500.0), 'home')
     """
-    landing = next((one for one in landings if one.landing is not None), None) if rules.may_use_landing else None
+    landing = None
+    if rules.may_use_landing:
+        landing = next((sequence for sequence in landings if sequence.landing is not None), None)
     home_target = _home_target(rules, start, home)
     if landing is not None:
         return _nearest_with_landing(rules, start, home_target, rally, landing)
@@ -254,7 +258,7 @@ def choose_target(
 
 def _home_target(rules: ReturnRules, start: Position, home: ReturnPoint) -> ReturnTarget:
     """Return home as the destination of an RTL from a start."""
-    transit, end = _altitudes(rules, start, home.up, rules.height)
+    transit, end = _transit_and_end_altitudes(rules, start, home.up, rules.height)
     return ReturnTarget((home.east, home.north, end), "home", "", _distance(start, home), transit_altitude=transit)
 
 
@@ -266,17 +270,17 @@ def rally_target(rules: ReturnRules, start: Position, point: ReturnPoint) -> Ret
     >>> target.position, target.transit_altitude
     ((1000.0, 0.0, 600.0), 800.0)
     """
-    transit, end = _altitudes(rules, start, point.up, rules.rally_height)
+    transit, end = _transit_and_end_altitudes(rules, start, point.up, rules.rally_height)
     slope_base = point.base if rules.slope_to_stated_height else 0.0
     return ReturnTarget(
         (point.east, point.north, end), "", "", _distance(start, point), slope_base, transit_altitude=transit
     )
 
 
-def _altitudes(rules: ReturnRules, start: Position, base: float, height: float) -> tuple[float, float]:
-    """Return the altitudes of an RTL on the way to its destination and at its end, m AMSL.
+def _transit_and_end_altitudes(rules: ReturnRules, start: Position, base: float, height: float) -> tuple[float, float]:
+    """Return the altitude of an RTL on its way to the destination, and its altitude at the end, m AMSL.
 
-    For an RTL that descends on a slope, the altitude on the way is NaN.
+    The first altitude is NaN for an RTL that does not hold its altitude.
 
     base: altitude of the destination, m AMSL.
     height: height above the destination at the end, m; NaN to keep the altitude of the start.
@@ -296,12 +300,12 @@ def _nearest_with_landing(
     rally: Sequence[ReturnPoint],
     landing: LandingStart,
 ) -> ReturnTarget:
-    """Return the nearest of the mission's landing, the rally points and, if the rules include it, home.
+    """Return the nearest destination: the mission's landing, a rally point or, if the rules include it, home.
 
     The distance to the landing is measured to its landing point (`RTL::findRtlDestination` in PX4's `rtl.cpp`).
     """
     point = ReturnPoint(*(landing.landing or landing.position))
-    transit, _ = _altitudes(rules, start, point.up, 0.0)
+    transit, _ = _transit_and_end_altitudes(rules, start, point.up, 0.0)
     name = f"the landing sequence at item {landing.item}"
     targets = [
         ReturnTarget(
@@ -324,7 +328,7 @@ def _nearest_with_landing(
 
 
 def rtl_note(target: ReturnTarget, rules: ReturnRules, start_altitude: float, continuation: str = "") -> str:
-    """Return a note that describes an RTL.
+    """Describe an RTL in one note: destination, distance, altitude change, and what follows.
 
     start_altitude: altitude at the start of the RTL, m AMSL.
     continuation: name of the sequence after the loiter; "" if the RTL stays in the loiter.
@@ -366,7 +370,10 @@ def rtl_note(target: ReturnTarget, rules: ReturnRules, start_altitude: float, co
 
 
 def _held_altitude_text(target: ReturnTarget, start_altitude: float) -> str:
-    """Return the beginning of a text on an RTL that holds its altitude; its end altitude follows the text."""
+    """Describe the altitude changes of an RTL that descends only at its destination.
+
+    The caller appends the end altitude to the text.
+    """
     first_climb, sink = target.transit_altitude - start_altitude, target.transit_altitude - target.position[2]
     sink_text = f"descending {sink:.0f} m in a loiter there, to"
     if first_climb < 1.0:
@@ -404,9 +411,9 @@ def rtl_waypoints(
     )
     stated_radius = ability.loiter_radius_scale * abs(rules.radius)
     radius = math.copysign(max(stated_radius, ability.min_loiter_radius), rules.radius)
-    circle = stop.at(target.position, radius)
+    circle = stop.placed_at(target.position, radius)
     transit_circle = (
-        circle.at((circle.east, circle.north, target.transit_altitude), radius) if rules.holds_height else circle
+        circle.placed_at((circle.east, circle.north, target.transit_altitude), radius) if rules.holds_height else circle
     )
     dive = min(ability.dive_slope, rules.max_sink_rate / ability.airspeed)
     builder = _ReturnBuilder(
@@ -422,7 +429,7 @@ def rtl_waypoints(
 
 
 class _ReturnBuilder:
-    """Builder of the waypoints of an RTL."""
+    """Builder of the waypoints of an RTL, piece by piece from its current position and altitude."""
 
     def __init__(
         self,
@@ -435,6 +442,14 @@ class _ReturnBuilder:
         start: Position,
         next_position: Position | None,
     ) -> None:
+        """Start the RTL at a position, without waypoints.
+
+        circle: loiter at the end, at the altitude of the way there.
+        end_altitude: altitude of the loiter's end, m AMSL.
+        slope_base, min_slope_height: see `ReturnTarget` and `ReturnRules`.
+        dive_slope: steepest descent (tangent).
+        next_position: position to which the RTL continues after the loiter, or None.
+        """
         self.points: list[RoutePoint] = []
         self._stop, self._circle, self._slope_base = circle, circle, slope_base
         self._end_altitude = end_altitude
@@ -447,8 +462,8 @@ class _ReturnBuilder:
         self._first_climb_altitude = -math.inf
 
     @property
-    def _is_line_point(self) -> bool:
-        """True if the descent is too small for a slope, so that the altitude changes at once."""
+    def _is_altitude_step(self) -> bool:
+        """True if the descent is too small for a slope, so that the altitude changes in one step."""
         return abs(self._slope_start[2] - self._circle.up + self._slope_base) < self._min_slope_height
 
     @property
@@ -495,7 +510,7 @@ class _ReturnBuilder:
         """Add the turn to the target, the straight leg to the target, and the loiter there."""
         bearing = _course(self._position, (self._circle.east, self._circle.north, 0.0))
         arc = self._turn_to_tangent(course, self._ability.turn_radius(course, bearing, self._position[2]))
-        point = self._stop.at(self._position)
+        point = self._stop.placed_at(self._position)
         if arc is None:
             # No tangent leads from the turn to the loiter: use a sharp corner.
             leg_course = tangent_course(point, self._circle)
@@ -515,7 +530,7 @@ class _ReturnBuilder:
         leg_length = math.hypot(join_point[0] - self._position[0], join_point[1] - self._position[1])
         if self._altitude_difference > 0.0:
             break_distance = self._altitude_difference / self._ability.climb_slope
-        elif self._is_line_point:
+        elif self._is_altitude_step:
             break_distance = -self._altitude_difference / self._dive_slope
         else:
             descent = self._slope_start[2] - self._circle.up
@@ -530,10 +545,14 @@ class _ReturnBuilder:
             self._add_waypoint(east, north, 0.0)
 
     def add_loiter(self, east: float, north: float, course: float) -> None:
-        """Add the leg to a point on the circle, and the loiter until its altitude and its time are reached."""
+        """Add the leg to a point on the circle, and the loiter until its altitude and its time are reached.
+
+        east, north: point on the circle, m.
+        course: course along the circle at this point, rad.
+        """
         if math.hypot(east - self._position[0], north - self._position[1]) > _MIN_TANGENT_M:
             self._add_waypoint(east, north, 0.0)
-        self._circle = self._circle.at(
+        self._circle = self._circle.placed_at(
             (self._circle.east, self._circle.north, self._end_altitude), self._circle.arc_radius
         )
         radius = abs(self._circle.arc_radius)
@@ -550,7 +569,7 @@ class _ReturnBuilder:
         self._add_circle(course, sweep)
 
     def _add_circle(self, course: float, sweep: float) -> None:
-        """Add the part of the loiter that starts at a course (rad) and covers an angle (rad)."""
+        """Add the part of the loiter from the point with a course (rad) over an angle ``sweep`` around it (rad)."""
         self._add_arc(self._circle, course, sweep, on_circle=True)
         self._add_waypoint(
             *point_on_circle(self._circle, course + math.copysign(sweep, self._circle.arc_radius)),
@@ -561,12 +580,14 @@ class _ReturnBuilder:
     def _add_exit(self, course: float, spiral_angle: float, next_position: Position) -> None:
         """Add the loiter until its altitude is reached, then the turn towards the next position.
 
-        The turn takes the shorter direction.
+        course: course at which the aircraft joins the loiter, rad.
+        spiral_angle: angle around the loiter until its altitude is reached, rad.
+        next_position: east, north, up, m.
         """
         if spiral_angle > 0.0:
             self._add_circle(course, spiral_angle)
             course += math.copysign(spiral_angle, self._circle.arc_radius)
-        self._circle = self._stop.at((next_position[0], next_position[1], self._position[2]))
+        self._circle = self._stop.placed_at((next_position[0], next_position[1], self._position[2]))
         radius = self._ability.turn_radius(course, _course(self._position, next_position), self._position[2])
         arc = self._turn_to_tangent(course, radius)
         if arc is not None and radius * math.tan(0.5 * min(arc[1], MAX_CORNER_ANGLE_RAD)) > _MIN_TANGENT_M:
@@ -575,13 +596,13 @@ class _ReturnBuilder:
             self._add_waypoint(*point_on_circle(node, exit_course), 0.0, on_circle=True)
 
     def _turn_to_tangent(self, course: float, radius: float) -> tuple[RoutePoint, float, float] | None:
-        """Return the arc from the current position to a tangent of the target's loiter, in the shorter direction.
+        """Return the arc from the current position to the tangent that leads to the target's loiter.
 
         course: course at the start of the arc, rad.
         radius: radius of the arc, m.
 
-        Returns the circle of the arc, the angle of the arc (rad), and the course at its end (rad). Returns None if
-        there is no such tangent.
+        The turn takes the shorter direction, unless that arc exceeds 270 degrees. Returns the circle of the arc, the
+        angle of the arc (rad), and the course at its end (rad). Returns None if there is no such tangent.
         """
         course_error = float(wrap(_course(self._position, (self._circle.east, self._circle.north, 0.0)) - course))
         turn_sign = math.copysign(1.0, course_error)
@@ -593,13 +614,16 @@ class _ReturnBuilder:
         return next((arc for arc in arcs if arc[1] < _MAX_TURN_ANGLE_RAD), None)
 
     def _turn_on_side(self, course: float, signed_radius: float) -> tuple[RoutePoint, float, float] | None:
-        """Return the arc of `_turn_to_tangent` for a turn to one side.
+        """Return the arc to the tangent that leads to the target's loiter, for a turn to one side.
 
-        A positive radius means a turn to the right.
+        course: course at the start of the arc, rad.
+        signed_radius: radius of the arc, m, positive for a turn to the right.
+
+        Returns the circle, angle and end course as `_turn_to_tangent` does, or None without a tangent.
         """
         east, north, up = self._position
         center = (east + signed_radius * math.cos(course), north - signed_radius * math.sin(course), up)
-        node = self._stop.at(center, signed_radius)
+        node = self._stop.placed_at(center, signed_radius)
         if not is_joined(node, self._circle):
             return None
         tangent = tangent_course(node, self._circle)
@@ -616,9 +640,10 @@ class _ReturnBuilder:
             self._add_waypoint(east, north, abs(node.arc_radius), on_circle=on_circle)
 
     def _add_waypoint(self, east: float, north: float, arc: float, *, on_circle: bool = False) -> None:
-        """Add a waypoint at the altitude that the RTL has at this position.
+        """Add a waypoint at a position on the map (m), at the altitude that the RTL reaches there.
 
         arc: radius of the turn at the waypoint, m; 0 for a sharp corner.
+        on_circle: True for a waypoint of the loiter, on which no slope applies.
         """
         distance = math.hypot(east - self._position[0], north - self._position[1])
         altitude, climb_altitude = self._position[2], max(self._circle.up, self._first_climb_altitude)
@@ -628,7 +653,7 @@ class _ReturnBuilder:
             target_altitude = self._circle.up if on_circle else self._slope_altitude(east, north)
             altitude = max(min(altitude, target_altitude), altitude - self._dive_slope * distance)
         self._position = (east, north, altitude)
-        self.points.append(self._stop.at(self._position, arc))
+        self.points.append(self._stop.placed_at(self._position, arc))
 
     def _slope_altitude(self, east: float, north: float) -> float:
         """Return the altitude of the slope to the target at a position, m AMSL.
@@ -636,7 +661,7 @@ class _ReturnBuilder:
         If the altitude changes in a step, the result is the target's altitude.
         """
         start_altitude, end_altitude = self._slope_start[2], self._circle.up
-        if self._is_line_point:
+        if self._is_altitude_step:
             return end_altitude
         remaining_fraction = 1.0 - min(1.0, max(0.0, self._slope_fraction(east, north)))
         return min(
@@ -656,10 +681,11 @@ class _ReturnBuilder:
 
 
 def _rim_point_ahead(position: Position, course: float, circle: RoutePoint) -> tuple[float, float, float]:
-    """Return the point at which a straight path from inside a circle crosses the circle, and the course there.
+    """Return the point at which a straight path from inside a circle meets the circle: east and north, m.
 
-    course: course of the straight path, rad. Returns east and north of the point, m, and the course along the circle at
-        the point, rad.
+    course: course of the straight path, rad.
+
+    The third value is the course along the circle at this point, rad.
     """
     offset_east, offset_north = position[0] - circle.east, position[1] - circle.north
     distance_past_center = offset_east * math.sin(course) + offset_north * math.cos(course)
@@ -677,14 +703,14 @@ def _rim_point_ahead(position: Position, course: float, circle: RoutePoint) -> t
     return east, north, bearing + math.copysign(0.5 * math.pi, circle.arc_radius)
 
 
-def _course(a: Position, b: Position) -> float:
-    """Return the course from a to b, rad."""
-    return math.atan2(b[0] - a[0], b[1] - a[1])
+def _course(start: Position, end: Position) -> float:
+    """Return the course from a start to an end, rad."""
+    return math.atan2(end[0] - start[0], end[1] - start[1])
 
 
-def _distance(a: Position, b: Position | ReturnPoint) -> float:
+def _distance(start: Position, end: Position | ReturnPoint) -> float:
     """Return the horizontal distance between two positions, m."""
-    return math.hypot(b[0] - a[0], b[1] - a[1])
+    return math.hypot(end[0] - start[0], end[1] - start[1])
 
 
 def _distance_text(distance: float) -> str:

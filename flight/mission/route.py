@@ -78,12 +78,12 @@ _FIELDS_NOT_STATED = ("airspeed", "above_ground", "min_ground_speed", "home_up")
 
 
 def route_points(position: ArrayLike, airspeed: ArrayLike, **fields: ArrayLike) -> Records:
-    """Return the points of a route, (w,) of `ROUTE_POINT`.
+    """Build the points of a route, (w,) records of `ROUTE_POINT`.
 
     position: (w, 3) east, north, up, m.
     airspeed: airspeed on each leg, m/s, (w - 1,) or one number.
-    fields: other fields of `ROUTE_POINT`, each (w,) or one value. By default a point belongs to no item and its other
-        fields state nothing. Successive points of one item are one stop.
+    fields: other fields of `ROUTE_POINT`, each (w,) or one value. By default a point belongs to no item, and its other
+        fields are 0, False or `NOT_STATED`. Without the field "stop", successive points of one item are one stop.
 
     >>> points = route_points(np.eye(3), 25.0, item=[1, 2, 2])
     >>> points["airspeed"].tolist(), points["stop"].tolist()
@@ -147,7 +147,7 @@ class Route:
         object.__setattr__(self, "points", points)
 
     def with_fields(self, **fields: ArrayLike) -> "Route":
-        """Return the route with other values in some fields of its points; fields as for `route_points`."""
+        """Return a copy of the route with new values in some fields of its points; fields as for `route_points`."""
         points = self.points.copy()
         _set_fields(points, fields)
         return replace(self, points=points)
@@ -189,14 +189,14 @@ class Route:
 
     @property
     def leg_numbers(self) -> Ints:
-        """Number of each leg in messages, (w - 1,).
+        """Number by which messages name each leg, (w - 1,).
 
         All legs around a loiter have the number of the leg that leads to it.
         """
         return np.maximum(self.stops[1:] - 1, 0)
 
     def leg_numbers_of(self, legs: NDArray[np.integer[Any]]) -> Ints:
-        """Return the numbers in messages of legs that are given by their indices, (n,).
+        """Return the numbers by which messages name the legs with these indices, (n,).
 
         An index beyond the route gives the number of the last leg.
 
@@ -239,8 +239,8 @@ def ends_at_plain_waypoint(route: Route, mission: Mission) -> bool:
 def part_of_route(route: Route, first: int, last: int) -> Route:
     """Return the part of a route from waypoint ``first`` to waypoint ``last``, inclusive.
 
-    >>> way = np.array([[0.0, 1000.0 * k, 300.0] for k in range(4)])
-    >>> whole = Route(route_points(way, 25.0, item=np.arange(4)), "")
+    >>> waypoints = np.array([[0.0, 1000.0 * k, 300.0] for k in range(4)])
+    >>> whole = Route(route_points(waypoints, 25.0, item=np.arange(4)), "")
     >>> part_of_route(whole, 1, 3).items.tolist()
     [1, 2, 3]
     """
@@ -295,16 +295,17 @@ SHARPEST_FLY_BY_RAD = math.radians(150.0)
 def fly_over_waypoints(
     points: Records, limits: Limits | None, turn_distance: Callable[[float, float], float] | None = None
 ) -> Flags:
-    """Return a mask of the waypoints that must be flown over, (w,).
+    """Return a mask of the waypoints that must be flown over, because a fly-by arc would pass too far away, (w,).
 
     points: points of a route, (w,) of `ROUTE_POINT`.
     limits: limits of the aircraft; None if unknown, for a result of False.
-    turn_distance: see `RouteRules`.
+    turn_distance: function that returns the distance before a waypoint at which the autopilot turns to the next leg, m;
+        see `RouteRules`.
 
     A fly-by arc with a turn angle ``turn`` passes its waypoint at the distance R(1/cos(turn/2) - 1). At 25 m/s and 30
-    degrees of bank R is 110 m, and the distance is 46 m for a turn of 90 degrees, 110 m for 120 degrees, and 2 km for
+    degrees of bank R is 110 m. The distance is then 46 m for a turn of 90 degrees, 110 m for 120 degrees, and 2 km for
     174 degrees. The limit of this distance is the acceptance radius that the mission states, or else the autopilot's
-    turn distance. If the arc would pass further away, the autopilot flies on to the limit before it turns.
+    turn distance. If neither is known, the limit is a turn of `SHARPEST_FLY_BY_RAD`.
 
     >>> from types import SimpleNamespace
     >>> from aircraft.path_limits import PerformanceTable
@@ -407,7 +408,7 @@ def with_end_courses(route: Route, scenario: Scenario, limits: Limits) -> Route:
 def _lead_point(
     point: np.ndarray, course: float, leg_course: float, limits: Limits, end_sign: float
 ) -> np.ndarray | None:
-    """Return the outer end of a lead-in or lead-out leg, (3,) m; None if no such leg is needed.
+    """Return the outer end of a level lead-in or lead-out leg at an end of a route, (3,) m; None if not needed.
 
     point: (3,) m, end of the route.
     course: the scenario's course at this end, rad.
@@ -418,7 +419,7 @@ def _lead_point(
     if turn < _MIN_COURSE_CHANGE_RAD:
         return None
     radius = limits.turn_radius(*((course, leg_course) if end_sign < 0.0 else (leg_course, course)), float(point[2]))
-    # A reversal has an infinite tangent length; with twice the radius it becomes a sharp corner.
+    # Limit the tangent length, which is infinite for a reversal, to twice the radius.
     tangent_length = radius * min(math.tan(min(turn, math.radians(170.0)) / 2.0), 2.0)
     step = end_sign * ((tangent_length if math.isfinite(tangent_length) else 0.0) + END_LEG_LENGTH_M)
     return point + step * np.array([math.sin(course), math.cos(course), 0.0])
@@ -447,11 +448,11 @@ def make_route(
     """Return the route of a mission on the map about ``origin``: `place_stops`, then `route_through_stops`.
 
     terrain: None if unknown; heights above terrain are then an error.
-    default_airspeed: airspeed until the mission sets one, m/s (the cruiseSpeed of a `.plan` file, a ground station's
-        estimate, sets none).
+    default_airspeed: airspeed until the mission sets one, m/s. The cruiseSpeed of a `.plan` file does not set it,
+        because it is only the ground station's estimate.
     fly_over: True to fly over all waypoints; otherwise only over the waypoints of `fly_over_waypoints`.
-    limits: limits of the aircraft for those arcs, for the default loiter radius (80 m if None), and for the slope of a
-        spiral (5 % if None).
+    limits: limits of the aircraft: they determine the turns, the default loiter radius (80 m if None) and the slope of
+        a spiral (5 % if None).
     rules: rules by which the autopilot flies a route.
 
     The route starts at the first item with a position. With a take-off item it starts above home, at the altitude of
@@ -542,9 +543,9 @@ def route_through_stops(
 
 
 def _point_records(points: list[RoutePoint], acceptance_limit: float, home_up: float) -> Records:
-    """Return points on the map as `ROUTE_POINT` records; the field `fly_over` is not set.
+    """Convert placed points to `ROUTE_POINT` records; the field `fly_over` is not set.
 
-    acceptance_limit: see `RouteRules`.
+    acceptance_limit: maximum acceptance radius that the autopilot accepts from an item, m.
     home_up: altitude of home for a point that states none, m AMSL.
     """
     return route_points(
@@ -553,7 +554,7 @@ def _point_records(points: list[RoutePoint], acceptance_limit: float, home_up: f
         acceptance_radius=np.minimum([point.acceptance_radius for point in points], acceptance_limit),
         item=[point.item for point in points],
         arc_radius=[point.arc_radius for point in points],
-        stop=np.cumsum([False, *(a.stop != b.stop for a, b in pairwise(points))]),
+        stop=np.cumsum([False, *(point.stop != next_point.stop for point, next_point in pairwise(points))]),
         # Only the leg to a place above terrain holds a height above ground.
         above_ground=[
             point.alt if point.frame in OVER_TERRAIN and point.command in PLACES else NOT_STATED for point in points
@@ -566,7 +567,7 @@ def _point_records(points: list[RoutePoint], acceptance_limit: float, home_up: f
 def _find_direct_landing(
     placed_mission: PlacedMission, stops: list[RoutePoint], rules: ReturnRules, notes: Notes
 ) -> PlacedLanding | None:
-    """Return the landing sequence to which the mission's RTL flies without a loiter, or None.
+    """Return the landing sequence to which the mission's RTL flies without a loiter, or None; add a note on it.
 
     stops: stops before the RTL.
     """
@@ -599,7 +600,10 @@ def _find_landing(
 
 
 def _landing_choice_text(placed_mission: PlacedMission) -> str:
-    """Return a text on how many landing sequences the nearest was chosen from; "" for a single one."""
+    """Describe the choice of a landing sequence, " (the nearest of 2, with height differences)"; "" for a single one.
+
+    ArduPlane compares distances in three dimensions.
+    """
     count = len(placed_mission.landing_starts)
     return f" (the nearest of {count}, with height differences)" if count > 1 else ""
 
@@ -635,9 +639,12 @@ def _append_rtl(
     limits: Limits | None,
     notes: Notes,
 ) -> tuple[dict[str, Any], PlacedLanding | None]:
-    """Append the waypoints of an RTL to the points of a route.
+    """Append the waypoints of an RTL to the points of a route, and add notes on it.
 
-    Return the keyword arguments of `Route` for the RTL, and the landing sequence that follows. The sequence is None if
+    stop: itinerary stop of the RTL.
+    points: points of the route up to the RTL, which are extended.
+
+    Returns the keyword arguments of `Route` for the RTL, and the landing sequence that follows. The sequence is None if
     the RTL stays in its loiter. Raises MissionError if the RTL's altitude is outside the allowed range.
     """
     source, start = placed_mission.mission.source, points[-1].map_position
@@ -651,8 +658,8 @@ def _append_rtl(
         raise MissionError.at(source, location, target_altitude, allowed, shown=f"{target_altitude:.1f} m AMSL")
     climb_slope, dive_slope = _spiral_slope_function(limits)(stop.airspeed, max(start[2], target_altitude))
     ability = ReturnAbility(
-        turn_radius=lambda a, b, amsl: (
-            DEFAULT_LOITER_RADIUS_M if limits is None else limits.turn_radius(a, b, amsl, stop.airspeed)
+        turn_radius=lambda course, end_course, amsl: (
+            DEFAULT_LOITER_RADIUS_M if limits is None else limits.turn_radius(course, end_course, amsl, stop.airspeed)
         ),
         min_loiter_radius=_tightest_circle_radius(limits, stop.airspeed, target_altitude) or 0.0,
         climb_slope=climb_slope,
@@ -690,7 +697,7 @@ _MAX_GATE_DISTANCE_M = 10.0
 
 
 def _insert_gates(placed_mission: PlacedMission, notes: Notes) -> list[RoutePoint]:
-    """Return the stops of a mission with the gates between them at which PX4 changes airspeed or camera.
+    """Return the placed stops of a mission, with a stop for each gate at which PX4 changes airspeed or camera.
 
     PX4 passes a gate when the aircraft crosses the plane through the gate that is perpendicular to the line from the
     gate to the next stop. Each gate is placed where this plane cuts the leg.
@@ -723,27 +730,27 @@ def _insert_gates(placed_mission: PlacedMission, notes: Notes) -> list[RoutePoin
                 gate_stop = replace(
                     next_stop, item=gate.item, command=int(Command.CONDITION_GATE), px4_airspeed=gate.airspeed, gates=()
                 )
-                placed_stops.append(gate_stop.at((east, north, up)))
+                placed_stops.append(gate_stop.placed_at((east, north, up)))
         placed_stops.append(next_stop)
     return placed_stops
 
 
-def _distance_to_line(a: Floats, b: Floats, position: tuple[Any, Any]) -> float:
-    """Return the horizontal distance of a position, east and north, m, from the line through a and b, m."""
-    (east, north), (offset_east, offset_north) = (b - a)[:2], np.array(position, dtype=float) - a[:2]
+def _distance_to_line(start: Floats, end: Floats, position: tuple[Any, Any]) -> float:
+    """Return the horizontal distance of a position (east, north, m) from the line through two points, m."""
+    (east, north), (offset_east, offset_north) = (end - start)[:2], np.array(position, dtype=float) - start[:2]
     return abs(float(east * offset_north - north * offset_east)) / max(math.hypot(east, north), 1e-9)
 
 
-def _gate_fraction(a: Floats, b: Floats, gate: tuple[Any, Any]) -> float:
-    """Return the fraction of the leg from a to b at which the aircraft passes a gate.
+def _gate_fraction(start: Floats, end: Floats, gate: tuple[Any, Any]) -> float:
+    """Return the fraction of a leg at which the aircraft passes a gate, as PX4 decides it.
 
-    The plane of the gate cuts the leg there; see `_insert_gates`.
+    The gate is a vertical plane through the gate's position, perpendicular to the line from there to the leg's end.
 
     gate: east and north, m.
     """
-    gate_to_end = b[:2] - np.array([float(gate[0]), float(gate[1])])
-    length_along_normal = float((b[:2] - a[:2]) @ gate_to_end)
-    # Measured backwards from b, whose distance from the plane is its distance from the gate.
+    gate_to_end = end[:2] - np.array([float(gate[0]), float(gate[1])])
+    length_along_normal = float((end[:2] - start[:2]) @ gate_to_end)
+    # Measured backwards from the leg's end, whose distance from the plane is its distance from the gate.
     return 1.0 - float(gate_to_end @ gate_to_end) / length_along_normal if length_along_normal > 0.0 else 0.0
 
 
@@ -752,7 +759,9 @@ def _read_stops(
 ) -> list[RoutePoint]:
     """Return placed stops with their numbers, and with the airspeed that the autopilot reads from the mission.
 
-    default_airspeed: airspeed for a stop without a stated one, m/s.  first_number: number of the first stop.
+    default_airspeed: airspeed for a stop without a stated one, m/s.
+    as_px4: True for the airspeeds as PX4 reads them, False for ArduPlane.
+    first_number: number of the first stop.
     """
     stated_airspeeds = [stop.px4_airspeed if as_px4 else stop.airspeed for stop in stops]
     return [
@@ -769,7 +778,8 @@ MAX_CRUISE_SPEED_DIFFERENCE = 0.2
 def _note_cruise_speed(mission: Mission, airspeed: float, first_stop: RoutePoint, notes: Notes) -> None:
     """Add a note if a mission states a cruise speed (cruiseSpeed) that its first leg does not use.
 
-    airspeed: default airspeed, m/s.
+    airspeed: airspeed until the mission sets one, m/s.
+    first_stop: route point at the end of the first leg.
     """
     if mission.cruise_speed is not None and mission.cruise_speed != airspeed and first_stop.airspeed == airspeed:
         text = (
@@ -830,7 +840,11 @@ def _spiral_slope_function(limits: Limits | None) -> SpiralSlopes:
 
 
 def _start_text(itinerary: Itinerary, first_stop: RoutePoint, origin: GeoOrigin, waypoints: Floats) -> str:
-    """Return a description of the flight's start: its item, position, altitude and course."""
+    """Describe the start of a flight in the air: its item, position, altitude and course.
+
+    first_stop: route point at the start.
+    waypoints: waypoints of the route, (w, 3) m.
+    """
     course = math.degrees(float(leg_courses(waypoints)[0])) % 360.0
     lat, lon = first_stop.lat_deg, first_stop.lon_deg
     if first_stop.loiter is not None:

@@ -52,8 +52,10 @@ class SurveyLayout(NamedTuple):
 
 
 class _Line(NamedTuple):
-    """A line to fly: corners (k, 2) m in flying order, and the items from its first waypoint to its last.
+    """A survey line to fly.
 
+    corners: corners of the line in flying order, (k, 2) m.
+    items: mission items from its first waypoint to its last, with the commands after the last.
     flown: numbers of the items that the route leads to.
     """
 
@@ -94,7 +96,10 @@ def _lead_lengths(route: Route, survey: Survey) -> list[float]:
 
 
 def fixed_layout_reason(mission: Mission, route: Route, survey: Survey) -> str:
-    """Return the reason why the layout of a survey cannot be changed, or "" if it can."""
+    """Return the reason why the layout of a survey cannot be changed, or "" if it can be changed.
+
+    route: the mission's route, in which the survey was found.
+    """
     if any(item.command in (Command.DO_JUMP, Command.DO_JUMP_TAG, Command.JUMP_TAG) for item in mission.items):
         return "the mission contains jumps"
     index_by_seq = {item.seq: index for index, item in enumerate(mission.items)}
@@ -167,14 +172,14 @@ def _is_line_point(item: MissionItem, flown: Collection[int]) -> bool:
 def _survey_items(mission: Mission, route: Route, survey: Survey) -> _SurveyItems:
     """Return the indices of a survey's items, line by line.
 
-    The items of a line include the commands that switch something, such as a camera, at its ends.
+    The items of a line include the commands after its last waypoint, such as one that switches the camera.
     """
     index_by_seq = {item.seq: item_index for item_index, item in enumerate(mission.items)}
     item_count = len(mission.items)
     seqs, flown = [int(seq) for seq in route.items], _flown_items(route)
 
     def index(waypoint: int) -> int:
-        """Return the list index of a waypoint's item; the number of items without such an item."""
+        """Return the list index of a waypoint's item; the length of the list for a waypoint without an item."""
         return index_by_seq.get(seqs[waypoint], item_count) if 0 <= waypoint < len(seqs) else item_count
 
     lines = []
@@ -197,9 +202,9 @@ def _survey_items(mission: Mission, route: Route, survey: Survey) -> _SurveyItem
 
 
 def _waypoint_of_item(mission: Mission, route: Route) -> dict[int, int]:
-    """Return the waypoint of each navigation item and gate, by item number.
+    """Return the index of the waypoint of each navigation item and gate, by item number.
 
-    For an item without a waypoint it is the waypoint before it.
+    For an item without a waypoint the result has the previous waypoint.
     """
     waypoint_by_seq, waypoint, waypoints = {int(seq): i for i, seq in enumerate(route.items)}, 0, dict[int, int]()
     for item in mission.items:
@@ -214,6 +219,7 @@ def _without_lead_waypoints(
 ) -> list[MissionItem]:
     """Return the items before or after a survey without its lead waypoints, which the new layout replaces.
 
+    items: items between the first or last line of the survey and the transit.
     end: index of the waypoint at that end of the survey.
     max_lead_length: distance from that waypoint within which a waypoint is a lead waypoint, m. More distant waypoints
         belong to the transit, and are kept.
@@ -229,9 +235,9 @@ def _without_lead_waypoints(
 
 
 def _order_lines(lines: Sequence[_Line], layout: SurveyLayout) -> list[_Line]:
-    """Return the lines in flying order and alternating directions; the first line keeps its direction.
+    """Return the lines in the flying order of a layout, in alternating directions.
 
-    The lines are unchanged if the layout keeps their order.
+    The first line keeps its direction. The lines are unchanged if the layout keeps their order.
     """
     if layout.every == 1 and layout.course is None and not layout.backwards:
         return list(lines)
@@ -262,18 +268,22 @@ def _reverse_line(line: _Line) -> _Line:
 
 
 def _items_with_turn_arounds(line: _Line, turn_around: float, lead_in: float, origin: GeoOrigin) -> list[MissionItem]:
-    """Return the items of a line, extended for its turn-arounds and for a longer lead-in."""
-    steps = line.point_items
+    """Return the items of a line, with added waypoints on its straight extensions before and after it.
+
+    turn_around: length of both extensions, m; 0 for none.
+    lead_in: length of the extension before the line, m, if it exceeds ``turn_around``.
+    """
+    point_items = line.point_items
     entry_direction, exit_direction = line.corners[0] - line.corners[1], line.corners[-1] - line.corners[-2]
     entry_direction, exit_direction = (
         direction / max(float(np.hypot(*direction)), 1e-9) for direction in (entry_direction, exit_direction)
     )
     leads = sorted({turn_around, max(turn_around, lead_in)} - {0.0}, reverse=True)
-    items = [_make_waypoint(steps[0], line.corners[0] + length * entry_direction, origin) for length in leads]
+    items = [_make_waypoint(point_items[0], line.corners[0] + length * entry_direction, origin) for length in leads]
     if turn_around > 0.0:
-        exit_waypoint = _make_waypoint(steps[-1], line.corners[-1] + turn_around * exit_direction, origin)
+        exit_waypoint = _make_waypoint(point_items[-1], line.corners[-1] + turn_around * exit_direction, origin)
         return [*items, *line.items, exit_waypoint]
-    # Without waypoints beyond them, gates lead to no end of the line.
+    # No autopilot flies to a gate: without waypoints beyond the line, its gates must become waypoints.
     return [*items, *(_as_waypoint(item) if _is_line_point(item, line.flown) else item for item in line.items)]
 
 
@@ -285,14 +295,19 @@ def _as_waypoint(item: MissionItem) -> MissionItem:
 
 
 def _make_waypoint(model_item: MissionItem, position: Floats, origin: GeoOrigin) -> MissionItem:
-    """Return a plain waypoint at the altitude of another item."""
+    """Return a plain waypoint at a position (east, north, m), with the altitude and number of another item."""
     lat, lon = (round_to_grid(float(value)) for value in to_geo(origin, float(position[0]), float(position[1])))
     params = (0.0, 0.0, 0.0, model_item.params[3] if math.isnan(model_item.params[3]) else 0.0)
     return replace(model_item, command=int(Command.NAV_WAYPOINT), params=params, lat_deg=lat, lon_deg=lon)
 
 
 def _lines_on_course(lines: Sequence[_Line], survey: Survey, course: float, origin: GeoOrigin) -> list[_Line] | None:
-    """Return lines on another course that cover the hull of the present lines; None if impossible."""
+    """Return lines on another course that cover the convex hull of the present lines; None if impossible.
+
+    course: course of the new lines, rad.
+
+    It is impossible if the lines differ in altitude, if a line bends, or if no new line is long enough.
+    """
     waypoint_items = [item for line in lines for item in line.point_items]
     if len({(item.frame, item.alt) for item in waypoint_items}) != 1 or any(_is_bent(line.corners) for line in lines):
         return None
@@ -346,14 +361,14 @@ def convex_hull(points: Floats) -> Floats | None:
 
 
 def _is_bent(corners: Floats) -> bool:
-    """Return True if a line deviates from the straight line between its ends by more than rounding."""
+    """Return True if a line deviates from the straight line between its ends by more than `_BEND_TOLERANCE_M`."""
     start, step = corners[0], corners[-1] - corners[0]
     lateral_offsets = (corners - start) @ np.array([step[1], -step[0]]) / max(float(np.hypot(*step)), 1e-9)
     return bool(np.abs(lateral_offsets).max() > _BEND_TOLERANCE_M)
 
 
 def _line_within_outline(lateral: Floats, longitudinal: Floats, offset: float) -> tuple[float, float] | None:
-    """Return where a line enters and leaves a convex outline, m along the line; None if it misses it.
+    """Return where a line enters and leaves a convex outline, m along the line; None if it misses the outline.
 
     lateral, longitudinal: coordinates of the outline's corners across and along the line, m.
     offset: lateral coordinate of the line, m.
@@ -372,7 +387,9 @@ def _line_within_outline(lateral: Floats, longitudinal: Floats, offset: float) -
 
 
 def _move_items(line: _Line, ends: Floats, origin: GeoOrigin) -> tuple[MissionItem, ...]:
-    """Return a line's items moved to another line; waypoints between its ends are left out.
+    """Return a line's items with its first and last waypoint moved to the ends of another line.
+
+    Waypoints between the ends are left out.
 
     ends: ends of the other line, (2, 2) m.
     """

@@ -122,15 +122,15 @@ class Survey:
         return self.lines[0].begins - 1 <= leg <= self.lines[-1].ends
 
     def takes_photos(self) -> bool:
-        """Return True if the mission's items switch the camera on or off on at least one line."""
+        """Return True if the mission's items trigger or switch the camera on at least one line."""
         return any(line.camera_on_at >= 0 or line.camera_off_at >= 0 or line.photo > 0.0 for line in self.lines)
 
     def turn_arounds(self) -> list[tuple[int, int]]:
-        """Index of the first and last waypoint of each turn-around between two lines."""
+        """Return the indices of the first and last waypoint of each turn-around between two lines."""
         return [(line.last, following.first) for line, following in zip(self.lines[:-1], self.lines[1:], strict=True)]
 
     def transitions(self) -> list[tuple[int, int]]:
-        """Index of the first and last waypoint of the entry, of each turn-around, and of the exit.
+        """Return the indices of the first and last waypoint of the entry, each turn-around, and the exit.
 
         The entry leads to the first line, and the exit leads away from the last line. Between the two waypoints of a
         pair the autopilot chooses the path.
@@ -187,7 +187,7 @@ class LineAxis:
 
 
 def camera_spacing(mission: Mission, route: Route) -> Floats:
-    """Return the distance between photos on the leg after each of the route's w waypoints, m, (w,).
+    """Return the distance between photos on the leg that follows each of the route's w waypoints, m, (w,).
 
     The distance is 0 with the camera off, and NaN if the camera is on and no item states the distance. Items that
     follow the item of a waypoint or gate switch the camera as soon as the aircraft is at this waypoint or gate.
@@ -239,7 +239,7 @@ def _max_ground_speed(
     """Return the highest ground speed on legs with the mean wind, m/s; NaN if none of their courses can be held.
 
     legs: indices of the legs.
-    airspeed_factor: see `camera_notes`.
+    airspeed_factor: function of the altitude, m AMSL, that returns the ratio of the true airspeed to the route's.
     """
     courses, speeds = leg_courses(route.positions), []
     for leg in legs:
@@ -252,7 +252,7 @@ def _max_ground_speed(
 def camera_notes(
     mission: Mission, route: Route, wind: Wind, airspeed_factor: Callable[[float], float]
 ) -> tuple[str, ...]:
-    """Return notes on trigger distances that contradict the camera's settings, or that are too short for it.
+    """Return notes on trigger distances that contradict the camera's settings, or are too short for the camera.
 
     airspeed_factor: function of the altitude, m AMSL, that returns the ratio of the true airspeed to the route's.
     """
@@ -333,7 +333,7 @@ def find_surveys(route: Route, camera: Floats, turn_arounds: Sequence[tuple[floa
 
 
 def _straight_runs(route: Route) -> list[tuple[int, int]]:
-    """Return the index of the first and last waypoint of each straight run.
+    """Return the indices of the first and last waypoint of each straight run: successive legs on one course.
 
     The legs of a take-off, a landing, a loiter and an RTL are left out.
     """
@@ -363,12 +363,12 @@ _Line = tuple[int, int]
 class _Runs:
     """Straight runs of a route in flying order, addressed by index.
 
-    Results for pairs of runs are cached, because each pair is looked up from every possible start of a survey. A
-    mission that repeats its items a hundred times has a hundred times as many starts.
+    A line of a survey is one run or several successive runs, given by the indices of its first and last run. Results
+    for pairs of runs are cached, because each pair is looked up from every possible start of a survey.
     """
 
     def __init__(self, points: Floats, runs: Sequence[tuple[int, int]]) -> None:
-        """Store waypoints (w, 3) m, and runs as pairs of the index of their first and last waypoint."""
+        """Store waypoints (w, 3) m, and runs, each as the indices of its first and last waypoint."""
         self.points, self.runs = points, runs
         self._distances = np.concatenate([[0.0], np.cumsum(leg_runs(points))]).tolist()
         # Positions, directions and lengths are plain numbers: computing with arrays of two elements takes ten times as
@@ -412,7 +412,7 @@ class _Runs:
         return self._spacings[run, other_run]
 
     def _compute_spacing(self, run: int, other_run: int) -> float | None:
-        """Return the result of `spacing`, computed without the cache."""
+        """Return the distance between two runs (m) without using the cache; None if they cannot be neighbors."""
         length, other_length = self.run_lengths[run], self.run_lengths[other_run]
         min_length = min(length, other_length)
         if min_length < _MIN_LINE_LENGTH_M:
@@ -444,14 +444,14 @@ class _Runs:
         return self._next_lines[run]
 
     def _find_next_lines(self, run: int) -> list[int]:
-        """Return the result of `next_lines`, computed without the cache."""
-        candidates, own_length = list[tuple[int, float, float]](), self.length((run, run))
+        """Return the runs with which the next line after a run may start, without using the cache."""
+        candidates, run_length = list[tuple[int, float, float]](), self.length((run, run))
         for next_run in range(run + 1, min(len(self.runs), run + 2 + _MAX_TURN_AROUND_RUNS)):
             link_length = self._distances[self.runs[next_run][0]] - self._distances[self.runs[run][1]]
             length = self.length((next_run, next_run))
             spacing = self.spacing(run, next_run)
             if spacing is None or link_length > max(
-                _MAX_TURN_AROUND_RATIO * max(own_length, length), _SHORT_TURN_AROUND_M
+                _MAX_TURN_AROUND_RATIO * max(run_length, length), _SHORT_TURN_AROUND_M
             ):
                 continue
             candidates.append((next_run, spacing, length))
@@ -469,7 +469,10 @@ class _Runs:
 
 
 def _find_chain(runs: _Runs, start: int) -> list[_Line]:
-    """Return the lines of the survey that starts at a run, or a few runs before or after it."""
+    """Return the lines of the survey that starts at a run or a few runs before or after it, in flying order.
+
+    start: index of the run.
+    """
     chain = _follow_lines(runs, start)
     if len(chain) > 1:
         # The entry to the first line may be parallel to the second line.
@@ -497,9 +500,10 @@ def _is_turn_around(chain: Sequence[_Line], line: _Line, runs: _Runs) -> bool:
 
 
 def _follow_lines(runs: _Runs, start: int) -> list[_Line]:
-    """Return the successive parallel lines that start at a run.
+    """Return the successive parallel lines that start at a run, in flying order.
 
-    The first line may begin before this run. Only the first line is returned if no later run can be the next line.
+    The first line may begin before this run, if it bends. A bend makes one line of several runs; the runs of the next
+    line then bend likewise. Only the first line is returned if no later run can be the next line.
     """
     chain = [(start, start)]
     while True:
@@ -521,9 +525,10 @@ def _follow_lines(runs: _Runs, start: int) -> list[_Line]:
 
 
 def _are_parallel(runs: _Runs, run: int, next_run: int, bend_count: int) -> bool:
-    """Return True if two lines are still parallel ``bend_count`` runs away from the turn-around between them.
+    """Return True if two lines that bend are still parallel some runs away from the turn-around between them.
 
     run, next_run: last run of the first line, and first run of the second line.
+    bend_count: number of bends between the turn-around and the runs that are compared.
     """
     run_before, run_after = run - bend_count, next_run + bend_count
     if (
@@ -549,7 +554,11 @@ def _are_parallel(runs: _Runs, run: int, next_run: int, bend_count: int) -> bool
 def _make_survey(
     runs: _Runs, chain: Sequence[_Line], camera: Floats, turn_arounds: Sequence[tuple[float, float]]
 ) -> Survey | None:
-    """Build a survey from a chain of lines; return None for too few different lateral positions."""
+    """Build a survey from successive lines; return None if they have too few different lateral positions.
+
+    camera: distance between photos on each leg, (w,) m.
+    turn_arounds: two distances for each survey of the ground station; see `find_surveys`.
+    """
     points, (run_start, run_end) = runs.points, runs.ends(chain[0])
     midpoints = np.array([runs.midpoint(line) for line in chain])
     _, offsets, _ = LineAxis(points[run_start : run_end + 1]).project(midpoints)
@@ -581,7 +590,11 @@ def _line_gaps(positions: Floats) -> list[float]:
 
 
 def _make_photo_line(run: tuple[int, int], camera: Floats) -> PhotoLine:
-    """Return the part of a run on which the camera is on, as a line; the whole run if it is never on."""
+    """Return the part of a run on which the camera is on, as a line; the whole run if the camera is never on.
+
+    run: indices of the first and last waypoint.
+    camera: distance between photos on the leg after each waypoint, (w,) m; 0 with the camera off.
+    """
     first_waypoint, last_waypoint = run
     photo_legs = np.flatnonzero(camera[first_waypoint:last_waypoint] != 0.0)
     if not photo_legs.size:
@@ -602,6 +615,8 @@ def _remove_leads(
     points: Floats, lines: tuple[PhotoLine, ...], turn_arounds: Sequence[tuple[float, float]]
 ) -> tuple[PhotoLine, ...]:
     """Return the lines without their lead-in and lead-out legs; unchanged if no such legs are found.
+
+    turn_arounds: two distances for each survey of the ground station: between photos, and of a lead, m.
 
     A lead is a leg before a line's first photo or after its last photo. Its length is the length that the ground
     station stores. Without a stored length, the first and last legs are leads if they have the same length on all

@@ -41,7 +41,7 @@ _UTF16_MARKS = (b"\xff\xfe", b"\xfe\xff")
 
 
 def mission_kind(path: Path) -> FileKind:
-    """Return the format of a mission file, judged by its suffix. Raises MissionError for an unknown suffix.
+    """Return the format of a mission file by its suffix. Raises MissionError for an unknown suffix.
 
     >>> mission_kind(Path("survey.plan")), mission_kind(Path("survey.txt"))
     ('plan', 'waypoints')
@@ -107,11 +107,10 @@ class FenceContents(NamedTuple):
 
 
 def read_fence(path: Path) -> FenceContents:
-    r"""Read the fence in a mission file of any format, or the rally points.
+    r"""Read the fence of a mission file of any format, or its rally points if it has no fence.
 
-    The older tools' lists of fence points are read, too. All other contents of the file are ignored, such as rally
-    points in a file with a fence. Raises MissionError as `read_mission` does, and if the file has neither a fence nor
-    rally points.
+    Lists of fence points from ArduPilot's older tools are read, too. All other contents of the file are ignored. Raises
+    MissionError as `read_mission` does, and if the file has neither a fence nor rally points.
 
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder:

@@ -52,10 +52,12 @@ _COORDINATE_TEXT = "expected latitude, longitude and altitude"
 
 
 def expand_items(items: list[Any], source: str, warnings: list[str], plans: list[SurveyPlan]) -> list[Any]:
-    """Return the items of a `.plan` with each ComplexItem replaced by its simple items.
+    """Return the items of a `.plan` with each ComplexItem, such as a survey, replaced by its simple items.
 
-    warnings: list; a warning for each replaced item is appended.
-    plans: list; the settings of each survey are appended.
+    items: JSON values of the file's items.
+    source: name of the file in messages.
+    warnings: receives a warning for each replaced item.
+    plans: receives the settings of each survey.
 
     Raises MissionError, naming the kind, if an item cannot be expanded. The contents of an item are checked later.
     """
@@ -86,12 +88,12 @@ def expand_items(items: list[Any], source: str, warnings: list[str], plans: list
 
 
 def _to_current_form(item: Any, location: str, warnings: list[str]) -> Any:
-    """Convert a simple item of an older version, or without an altitude, to QGroundControl's present form.
+    """Convert a simple item of an older version, or without an altitude, to QGroundControl's current form.
 
-    Until 2018 a position was in ``coordinate``, next to four parameters (`MissionItem::_convertJsonV2ToV3`). If
-    QGroundControl computes an altitude from the terrain, the altitude is null in the parameters until QGroundControl
-    knows the terrain. Then ``Altitude`` is the height above ground at the item's position, as in an item in a terrain
-    frame.
+    Until 2018 an item had four parameters, and its position in ``coordinate`` (`MissionItem::_convertJsonV2ToV3`).
+
+    An item above terrain has no altitude in its parameters until QGroundControl knows the terrain. Its height above
+    ground is then in ``Altitude``. Such an item is converted to a frame above terrain, with a warning.
     """
     if not isinstance(item, dict) or not isinstance(params := item.get("params"), list):
         return item
@@ -107,7 +109,7 @@ def _to_current_form(item: Any, location: str, warnings: list[str]) -> Any:
         and has_height
     ):
         warnings.append(
-            f"{location}: QGroundControl has not calculated its altitude: taken as {height:g} m above the terrain there"
+            f"{location}: QGroundControl has not calculated its altitude: flown {height:g} m above the terrain there"
         )
         return {**item, "frame": int(Frame.GLOBAL_TERRAIN_ALT), "params": [*params[:6], height]}
     return item
@@ -164,6 +166,9 @@ class _CameraCalc(BaseModel):
 def _survey_plan(settings: dict[str, Any], items: list[Any], location: str, warnings: list[str]) -> SurveyPlan:
     """Return the settings that a survey stores in addition to its items: line extension and camera.
 
+    settings: content of the survey's TransectStyleComplexItem.
+    items: simple items of the survey, which state the distance between photos.
+
     An invalid camera is left out, and a warning is added.
     """
     turn_around = settings.get("TurnAroundDistance")
@@ -178,7 +183,7 @@ def _survey_plan(settings: dict[str, Any], items: list[Any], location: str, warn
             fault = error.errors()[0]
             field = ".".join(map(str, fault["loc"]))
             shown = "missing" if fault["type"] == "missing" else json.dumps(fault["input"])[:40]
-            warnings.append(f"{location}: CameraCalc.{field}: {shown}: its camera is ignored, and no overlap is judged")
+            warnings.append(f"{location}: CameraCalc.{field}: {shown}: the camera is ignored, and no overlap is judged")
     stated_photo = calc.get("AdjustedFootprintFrontal") if isinstance(calc, dict) else 0.0
     if isinstance(stated_photo, bool) or not isinstance(stated_photo, int | float) or not 0.0 < stated_photo <= 1e6:
         stated_photo = 0.0
@@ -214,6 +219,7 @@ def _landing_items(item: dict[str, Any], source: str, location: str, number: int
     """
 
     def read_position(key: str) -> list[Any] | None:
+        """Return the latitude, longitude and altitude under a key of the pattern, or None if it is missing."""
         return _read_coordinate(item, key, source, location)
 
     approach = read_position("landingApproachCoordinate") or read_position("loiterCoordinate")
@@ -257,7 +263,10 @@ def _landing_items(item: dict[str, Any], source: str, location: str, number: int
 
 
 def _landing_commands(item: dict[str, Any], source: str, location: str) -> list[tuple[int, int, list[Any]]]:
-    """Return the optional commands of a landing pattern, as command, frame and parameters.
+    """Return the optional commands of a landing pattern, each as MAV_CMD, MAV_FRAME and seven parameters.
+
+    item: JSON object of the pattern.
+    location: location of the item in the file, for messages.
 
     Raises MissionError for an approach speed that is not a number above 0, or that is too high.
     """
@@ -379,7 +388,11 @@ _UNNAMED_FIRMWARES = (0, 8)
 
 
 def _check_vehicle(kind: int | None, source: str) -> None:
-    """Raise MissionError if a plan is for a vehicle other than an airplane."""
+    """Raise MissionError if a plan is for a vehicle other than a fixed-wing aircraft.
+
+    kind: MAV_TYPE of the vehicle; None if missing.
+    source: name of the file in messages.
+    """
     for kinds, name in _OTHER_VEHICLES:
         if kind in kinds:
             allowed = f"{name}: planfly flies fixed-wing aircraft (1)"
@@ -390,9 +403,11 @@ def _check_vehicle(kind: int | None, source: str) -> None:
 
 
 def _autopilot_name(firmware: int | None, source: str) -> str:
-    """Return the autopilot's name for a firmwareType; "" if the plan names no autopilot.
+    """Return the name in scenarios of the autopilot that a firmwareType states; "" if the plan names none.
 
-    The name is that used in scenarios. Raises MissionError for an unknown firmwareType.
+    firmware: MAV_AUTOPILOT; None if missing.
+
+    Raises MissionError for an unknown firmwareType.
     """
     if firmware is None or firmware in _UNNAMED_FIRMWARES:
         return ""
@@ -424,7 +439,7 @@ def parse_plan_file(text: str, source: str) -> Mission:
         raise MissionError(f"{source}: mission.items: no items", file=source, field="mission.items")
     for index, (previous, following) in enumerate(pairwise(items), 1):
         if following.seq <= previous.seq:
-            allowed = f"must be above the one before, {previous.seq}"
+            allowed = f"must be above the doJumpId of the previous item, {previous.seq}"
             raise MissionError.at(source, f"mission.items.{index}.doJumpId", following.seq, allowed)
     numbered_items = enumerate(items, 1)
     unplaced = [
@@ -439,7 +454,9 @@ def parse_plan_file(text: str, source: str) -> Mission:
     if home is None and file.mission.plannedHomePosition is not None:
         warnings.append(f"{source}: plannedHomePosition is not a position: the mission has no home")
     if [item.seq for item in items] != list(range(1, len(items) + 1)):
-        warnings.append(f"{source}: the doJumpId are not 1 to {len(items)}: items are numbered by their order instead")
+        warnings.append(
+            f"{source}: the values of doJumpId are not 1 to {len(items)}: items are numbered by their order instead"
+        )
     mission = Mission(
         home=home,
         items=tuple(items),
@@ -477,7 +494,10 @@ def _expand_complex_items(data: Any, source: str) -> tuple[list[str], list[Surve
 
 
 def _read_item(item: _Item, index: int, source: str) -> MissionItem:
-    """Return a mission item; without a doJumpId its number is its index + 1. Raises MissionError if it is invalid."""
+    """Convert an item of the file to a mission item. Raises MissionError if it is invalid.
+
+    index: index in the file's list; without a doJumpId the item's number is the index + 1.
+    """
     p1, p2, p3, p4, lat, lon, alt = (math.nan if value is None else value + 0.0 for value in item.params)
     if is_located(item.command, item.frame) and position_problem(lat, lon) is None:
         lat, lon = round_to_grid(lat), round_to_grid(lon)
@@ -485,12 +505,15 @@ def _read_item(item: _Item, index: int, source: str) -> MissionItem:
     mission_item = MissionItem(seq, item.command, item.frame, (p1, p2, p3, p4), lat, lon, alt, item.autoContinue)
     problem = item_problem(mission_item)
     if problem is not None:
-        raise MissionError(**problem.at(source, f"{source}: mission.items.{index} (item {seq})"))
+        raise MissionError(**problem.error_arguments(source, f"{source}: mission.items.{index} (item {seq})"))
     return mission_item
 
 
 def _read_home(values: list[float | None] | None, source: str) -> Home | None:
-    """Return the planned home, or None if it is missing or at 0, 0; a missing altitude is NaN."""
+    """Return the planned home, or None if it is missing or at 0, 0; a missing altitude is NaN.
+
+    values: latitude and longitude, degrees, and altitude, m AMSL, each None where it is null.
+    """
     if values is None or values[0] is None or values[1] is None:
         return None
     lat, lon, alt = values[0], values[1], math.nan if values[2] is None else values[2] + 0.0
@@ -498,7 +521,7 @@ def _read_home(values: list[float | None] | None, source: str) -> Home | None:
     home_item = MissionItem(0, Command.NAV_WAYPOINT, Frame.GLOBAL, (0.0, 0.0, 0.0, 0.0), lat, lon, known_alt)
     problem = item_problem(home_item)
     if problem is not None:
-        raise MissionError(**problem.at(source, f"{source}: mission.plannedHomePosition"))
+        raise MissionError(**problem.error_arguments(source, f"{source}: mission.plannedHomePosition"))
     return Home(round_to_grid(lat), round_to_grid(lon), alt) if home_item.has_position else None
 
 
@@ -507,7 +530,12 @@ def _read_fences(fence: _GeoFence, source: str) -> tuple[MissionItem, ...]:
     fences: list[MissionItem] = []
 
     def add(command: Command, p1: float, point: list[float], location: str) -> None:
-        """Add a fence item. Raises MissionError for an invalid position."""
+        """Append a fence item (a corner or a circle). Raises MissionError for an invalid position.
+
+        p1: number of corners, or radius, m.
+        point: latitude and longitude, degrees.
+        location: location of the shape in the file, for messages.
+        """
         item = MissionItem(
             len(fences),
             int(command),
@@ -519,7 +547,7 @@ def _read_fences(fence: _GeoFence, source: str) -> tuple[MissionItem, ...]:
         )
         problem = item_problem(item)
         if problem is not None:
-            raise MissionError(**problem.at(source, f"{source}: geoFence.{location}"))
+            raise MissionError(**problem.error_arguments(source, f"{source}: geoFence.{location}"))
         fences.append(item)
 
     for index, shape in enumerate(fence.polygons):
@@ -551,7 +579,7 @@ def _read_rally(rally: _Rally, source: str) -> tuple[MissionItem, ...]:
         )
         problem = item_problem(item)
         if problem is not None:
-            raise MissionError(**problem.at(source, f"{source}: rallyPoints.points.{number}"))
+            raise MissionError(**problem.error_arguments(source, f"{source}: rallyPoints.points.{number}"))
         points.append(item)
     return tuple(points)
 
@@ -559,9 +587,8 @@ def _read_rally(rally: _Rally, source: str) -> tuple[MissionItem, ...]:
 def plan_file_text(mission: Mission) -> str:
     """Return a mission as the text of a `.plan` file; equal missions give equal bytes.
 
-    cruiseSpeed is `stated_cruise_speed`, or QGC's default if the mission states none. cruiseSpeed and hoverSpeed are
-    written in whole m/s, because they are integers in Mission Planner's `MissionFile.Mission`, whose reader refuses
-    "25.0". QGC reads both as numbers, and sends neither of them to an aircraft. firmwareType names the mission's
+    cruiseSpeed is `stated_cruise_speed`, or QGC's default if the mission states none. It is written in whole m/s,
+    because Mission Planner's reader refuses "25.0". QGC sends it to no aircraft. firmwareType names the mission's
     autopilot; it is 0 for planfly's guidance, which no ground station knows.
     """
     mission = renumber_items(mission)

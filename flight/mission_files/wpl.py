@@ -39,7 +39,7 @@ from world.wording import count_text
 # First line of the file.
 HEADER = "QGC WPL 110"
 # Clause in the warning about a home in a frame of items.
-HOME_LINE_MISSING_TEXT = "the file probably has no home line"
+HOME_LINE_MISSING_TEXT = "the file has no home line"
 # Maximum number of lines in a file, comments and empty lines included: ten per item.
 MAX_LINES = 10 * MAX_ITEMS
 
@@ -157,7 +157,7 @@ def _parse_row(location: TextLine, line: str) -> MissionItem:
     )
     problem = item_problem(item)
     if problem is not None:
-        raise MissionError(**problem.at(location.file, location))
+        raise MissionError(**problem.error_arguments(location.file, location))
     return item
 
 
@@ -220,8 +220,8 @@ def _collect_warnings(locations: list[TextLine], items: list[MissionItem], *, ha
     if len(body) == len(items):
         warnings.append(
             f"{locations[0]}: no home line (seq 0): the mission has no home and begins with this "
-            "item, as in Mission Planner; QGroundControl and MAVProxy treat it as home and do "
-            "not fly it"
+            "item, as in Mission Planner. QGroundControl and MAVProxy treat this item as home and "
+            "do not fly it"
         )
     elif first.command != Command.NAV_WAYPOINT:
         warnings.append(
@@ -233,8 +233,9 @@ def _collect_warnings(locations: list[TextLine], items: list[MissionItem], *, ha
             warnings.append(f"{locations[0]}: home is at 0, 0, which stands for no position: the mission has no home")
         elif first.frame not in (Frame.GLOBAL, Frame.GLOBAL_INT):
             warnings.append(
-                f"{locations[0]}: home in frame {first.frame}: its height is taken as above mean sea level;"
-                f" {HOME_LINE_MISSING_TEXT}, so ground stations take the first item for home and do not fly it"
+                f"{locations[0]}: home in frame {first.frame}: its height is read as an altitude above mean sea level."
+                f" Probably {HOME_LINE_MISSING_TEXT}: ground stations then treat the first item as home and do not"
+                " fly it"
             )
     numbering_text = "items are numbered by line instead, as ground stations do, and jumps use these numbers"
     seq_steps = list(enumerate((following.seq - item.seq for item, following in pairwise(items)), 1))
@@ -246,7 +247,7 @@ def _collect_warnings(locations: list[TextLine], items: list[MissionItem], *, ha
         )
     if falling:
         warnings.append(
-            f"{locations[falling[0]]}: sequence number {items[falling[0]].seq} is not higher than the one before"
+            f"{locations[falling[0]]}: sequence number {items[falling[0]].seq} is not above the previous line's number"
             f" ({count_text(len(falling), 'such line')} in all): {numbering_text}"
         )
     unplaced = [
@@ -309,7 +310,7 @@ def _item_line(item: MissionItem, *, current: bool) -> str:
 
 
 def _format_decimal(value: float, places: int) -> str:
-    """Return a number as text without an exponent, from which the same double is read.
+    """Format a number without an exponent, so that the same double is read from the text; NaN becomes 0.
 
     places: minimum number of decimals.
     """
@@ -337,7 +338,7 @@ MAX_POINTS = 255
 
 
 def is_point_list(text: str) -> bool:
-    r"""Return True if a fence's text begins with a number, as only the older tools' lists of points do.
+    r"""Return True if a fence's text begins with a number, which only lists of points from older tools do.
 
     >>> is_point_list("# saved\n36.5 -84.2\n"), is_point_list("QGC WPL 110\n")
     (True, False)
@@ -350,10 +351,13 @@ def is_point_list(text: str) -> bool:
 
 
 def parse_fence_points(text: str, source: str) -> tuple[MissionItem, ...]:
-    r"""Return the polygon items of a fence file of the older tools; ``source`` names the file in messages.
+    r"""Return the polygon items of a list of fence points from ArduPilot's older tools.
 
-    The return point is not part of the zone, and is left out. A file without a return point, whose first point is also
-    its last, is accepted. Raises MissionError with file, line, value and allowed values.
+    source: name of the file in messages.
+
+    Such a list starts with a return point, which is left out. The corners of the polygon follow, with the first corner
+    repeated at the end. A list without a return point is accepted. Raises MissionError with file, line, value and
+    allowed values.
 
     >>> square = ["36.505 -84.195", "36.5 -84.2", "36.5 -84.19", "36.51 -84.19", "36.51 -84.2", "36.5 -84.2"]
     >>> [(item.command, item.params[0], item.lat_deg) for item in parse_fence_points("\n".join(square), "fence.txt")]
@@ -393,5 +397,5 @@ def _parse_point(location: TextLine, line: str) -> tuple[float, float]:
         raise MissionError(f"{location}: {line[:40]!r}: {allowed}", file=location.file, value=line, allowed=allowed)
     problem = position_problem(lat, lon)
     if problem is not None:
-        raise MissionError(**problem.at(location.file, location))
+        raise MissionError(**problem.error_arguments(location.file, location))
     return round_to_grid(lat), round_to_grid(lon)

@@ -19,7 +19,12 @@ _OUTPUT_OFFSET = int(_FIELDS["output"][1]) // 8
 
 @inner
 def read_state(block: Floats, registers: Floats, code: Code) -> None:
-    """Copy the state of the compiled model to the block of a workspace, in JSBSim's units."""
+    """Copy the state of the compiled model to the block of a workspace, in JSBSim's units.
+
+    block: numbers of the flight's workspace.
+    registers: values of the compiled model.
+    code: program of the compiled model, which lists the registers to read.
+    """
     first_read = code[READS_START]
     for k in range(code[WRITES_START] - first_read):
         block[_STATE_OFFSET + k] = registers[code[first_read + k]]
@@ -31,7 +36,8 @@ def advance_model(
 ) -> None:
     """Copy the autopilot's outputs to the compiled model's registers, and step the model to the next tick.
 
-    block: inputs and outputs of the autopilot, in the order of the flight's workspace.
+    block: numbers of the flight's workspace, which contain the outputs in JSBSim's units.
+    registers, code: values and program of the compiled model.
     """
     first_write = code[WRITES_START]
     for k in range(code[CODE_END] - first_write):

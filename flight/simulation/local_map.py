@@ -23,10 +23,10 @@ MAX_MAP_ERRORS = (0.01, 1e-6)
 
 @dataclass(frozen=True, slots=True)
 class LocalMap:
-    """Map projection of geodetic radians for compiled code, fitted around one flight.
+    """Map projection for compiled code: polynomials that are fitted around one flight.
 
-    position: (latitude, longitude) to (east, north).
-    angle: (latitude, longitude) to the grid convergence (rad), which is the map course of true north, and 0.
+    position: from latitude and longitude, rad, to east and north, m.
+    angle: from latitude and longitude, rad, to the grid convergence, rad, which is the map course of true north, and 0.
     center_longitude: longitude of the map's center, rad; longitudes are normalised to within pi of it.
     """
 
@@ -84,7 +84,7 @@ def _fit_local_map(
         return to_map(origin, np.degrees(latitude), np.degrees(longitude))
 
     def angle(latitude: Floats, longitude: Floats) -> tuple[Floats, Floats]:
-        """Return the map course of true north at a latitude and longitude (rad), rad."""
+        """Return the map course of true north at a latitude and longitude (rad), rad, and 0."""
         step = 1e-5
         east0, north0 = position(latitude - step, longitude)
         east1, north1 = position(latitude + step, longitude)
@@ -126,7 +126,7 @@ class Ground:
 
 
 def _map_outside_raster() -> PolyMap:
-    """Return a map that converts every position to a pixel outside any raster."""
+    """Return a map from positions to pixels that stands for missing terrain: every pixel is outside any raster."""
 
     def outside_pixel(x: Floats, y: Floats) -> tuple[Floats, Floats]:
         """Return a pixel outside any raster for each position."""

@@ -119,7 +119,10 @@ class RunningFlight:
         self.fdm = self._new_fdm()
 
     def _prepare_route(self, setup: FlightSetup, aircraft: Aircraft, local_map: LocalMap) -> None:
-        """Create the workspace for a route, and set the flight's time limit."""
+        """Create the workspace of the compiled loop for a route, and set the flight's time limit.
+
+        local_map: local map of the setup.
+        """
         self.setup, self.map = setup, local_map
         # An autopilot with its own turns does not follow the arcs after fly-over waypoints.
         turns = setup.autopilot.turns
@@ -168,7 +171,7 @@ class RunningFlight:
         return np.array([true.east, true.north, true.up])
 
     def _start_disturbances(self, setup: FlightSetup) -> None:
-        """Set the mean wind, and initialise turbulence and navigation error from their random streams."""
+        """Set the mean wind, and start turbulence and navigation error from their random streams."""
         wind, record = setup.scenario.wind, self._work
         wind_course = wind.to_course
         w20 = W20[wind.turbulence]
@@ -240,7 +243,10 @@ class RunningFlight:
         self._work.air.wind_north, self._work.air.wind_east = start.wind[:2]
 
     def fly_block(self, count: int) -> tuple[Rows, str]:
-        """Fly up to ``count`` ticks, and return their rows and the reason for the flight's end, "" if it continues."""
+        """Fly up to ``count`` ticks; return their track rows and the reason for the flight's end.
+
+        The reason is "" while the flight continues.
+        """
         workspace, row_blocks, end_reason = self._workspace, list[Rows](), ""
         while count > 0 and not end_reason:
             # The rows of these ticks fit in the workspace.
@@ -260,7 +266,7 @@ class RunningFlight:
         return (row_blocks[0] if len(row_blocks) == 1 else join_rows(row_blocks)), end_reason
 
     def _timeout_text(self) -> str:
-        """Return the end reason of a flight that exceeded its time limit; in a loiter, name the loiter's item."""
+        """Return the end reason of a flight that exceeded its time limit; it names the item of a current loiter."""
         route, next_waypoint = self.setup.route, min(int(self.guidance_memory.leg) + 1, self.setup.route.legs)
         time_text = f"not finished after {self.max_ticks * self.dt:.0f} s"
         if route.arc_radii[next_waypoint] > 0.0 and route.rtl_start is None:
@@ -301,7 +307,10 @@ def _extra_loiter_length(setup: FlightSetup, waypoints: Records) -> float:
 
 
 def _min_ground_speed(setup: FlightSetup, airspeeds: Floats) -> float:
-    """Return the lowest ground speed on any leg, m/s, in the mean wind at the altitudes of the leg."""
+    """Return the lowest ground speed on any leg in the mean wind, m/s; a default if no leg can be flown.
+
+    airspeeds: airspeed on each leg, m/s.
+    """
     limits: Limits = setup.limits
     points, courses = setup.route.positions, leg_courses(setup.route.positions)
     tables = {airspeed: limits.performance(airspeed) for airspeed in set(airspeeds.tolist())}
@@ -316,19 +325,21 @@ def _max_wind_deviation(setup: FlightSetup, length: float) -> float:
     """Return the largest deviation of a forecast's wind from the mean wind around a flight, m/s.
 
     length: length of the flight, m.
+
     Without a forecast the result is 0.
     """
     field = setup.scenario.wind.field
     if field is None:
         return 0.0
     longest_time = TIME_LIMIT_FACTOR * length / MIN_GROUND_SPEED_MPS + TIME_LIMIT_BASE_S
-    near = without_levels_above(field.between(0.0, longest_time), float(setup.route.positions[:, 2].max()))
-    return float(np.linalg.norm(near.velocities, axis=-1).max())
+    flight_field = without_levels_above(field.between(0.0, longest_time), float(setup.route.positions[:, 2].max()))
+    return float(np.linalg.norm(flight_field.velocities, axis=-1).max())
 
 
 def _find_wind(setup: FlightSetup, position: Sequence[float], convergence: float) -> tuple[float, float, float]:
-    """Return the mean wind at a position (east, north, up, m) at the start, true north, east and down, m/s.
+    """Return the mean wind at a position at the start of the flight: true north, east and down, m/s.
 
+    position: east, north, up, m.
     convergence: grid convergence, the map course of true north, rad.
     """
     east, north = setup.scenario.wind_velocity(position)
@@ -360,7 +371,7 @@ class Release:
 
 
 def default_gear(ground_phases: GroundPhases) -> Gear:
-    """Return the gear that is added to a model without contacts: wheels for a runway, otherwise a belly."""
+    """Return the kind of gear for ground contacts that an aircraft lacks: wheels for a runway, otherwise a belly."""
     return (
         "wheels" if ground_phases.take_off is not None and ground_phases.take_off.launch.method == "runway" else "belly"
     )
@@ -369,7 +380,11 @@ def default_gear(ground_phases: GroundPhases) -> Gear:
 def find_release(
     setup: FlightSetup, local_map: LocalMap, ground: Ground, aircraft: Aircraft, take_off: TakeOff
 ) -> Release:
-    """Return the state of the aircraft at the release: at the end of the launch, or at rest on the runway."""
+    """Return the state of the aircraft at the end of its launch, or at rest on a runway.
+
+    local_map, ground: local map and terrain of the flight.
+    take_off: the take-off that is simulated.
+    """
     launch = take_off.launch
     position, velocity = take_off.release()
     if launch.method == "runway":
@@ -399,7 +414,10 @@ def _to_true_north(east: float, north: float, convergence: float) -> tuple[float
 def release(
     fdm: Fdm, release_state: Release, commands: tuple[float, float, float, float]
 ) -> tuple[float, float, float, float]:
-    """Release the aircraft with elevator, aileron, rudder and throttle commands, and return these commands."""
+    """Put the aircraft into the state at the end of its launch, with control commands; return these commands.
+
+    commands: elevator, aileron, rudder (rad) and throttle (0..1).
+    """
     fdm.release(
         release_state.position,
         release_state.attitude,

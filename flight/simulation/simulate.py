@@ -37,7 +37,7 @@ def make_loop(
     step_model: Callable[[], object],
     steps: int,
 ) -> Callable[[int], int]:
-    """Return a function that flies up to a given number of ticks in JSBSim, and returns the end code or 0.
+    """Return a function that flies up to a number of ticks in JSBSim; it returns the flight's end code, or 0.
 
     getters: getters of the state, in the order of `flight.simulation.tick.READ_FIELDS`.
     setters: setters of the outputs, in the order of `flight.simulation.tick.OUTPUT`.
@@ -171,14 +171,16 @@ class FlightBlock(NamedTuple):
 
 
 def simulate(flight: RunningFlight, block_duration: float = BLOCK_DURATION_S) -> Iterator[FlightBlock]:
-    """Fly until the flight ends, and yield the rows of each block.  block_duration: duration of a block, s.
+    """Fly until the flight ends, and yield its track rows in blocks.
+
+    block_duration: duration of a block, s.
 
     >>> import numpy as np
     >>> from types import SimpleNamespace
     >>> from flight.simulation.track import TRACK_ROW
     >>> blocks = iter([(np.zeros(60, TRACK_ROW), ""), (np.zeros(12, TRACK_ROW), "ground contact")])
-    >>> at, path = SimpleNamespace(distance=0.0), SimpleNamespace(length=9.0)
-    >>> flight = SimpleNamespace(dt=1 / 60, guidance_memory=at, path=path, fly_block=lambda count: next(blocks))
+    >>> memory, path = SimpleNamespace(distance=0.0), SimpleNamespace(length=9.0)
+    >>> flight = SimpleNamespace(dt=1 / 60, guidance_memory=memory, path=path, fly_block=lambda count: next(blocks))
     >>> [(len(block.rows), block.end_reason) for block in simulate(flight)]
     [(60, ''), (12, 'ground contact')]
     """
@@ -201,8 +203,8 @@ def fly_to_end(flight: RunningFlight) -> SimulatedFlight:
     >>> from flight.simulation.setup import make_limits
     >>> from world.scenario import load_scenario
     >>> scenario, aerosonde = load_scenario("tight"), load_aircraft("aerosonde")
-    >>> way = scenario.start + np.array([[0.0, 0.0, 0.0], [300.0, 0.0, 0.0]])
-    >>> route = Route(route_points(way, 25.0), "")
+    >>> waypoints = scenario.start + np.array([[0.0, 0.0, 0.0], [300.0, 0.0, 0.0]])
+    >>> route = Route(route_points(waypoints, 25.0), "")
     >>> limits = make_limits(scenario, load_envelope(aerosonde), 25.0, 0.5)
     >>> setup = FlightSetup(scenario, Mission(None, ()), route, limits, "aerosonde", 888.0, 1)
     >>> flown = fly_to_end(Flight(setup, aerosonde))
@@ -234,7 +236,7 @@ class TrackBuilder:
         self._row_count = 0
 
     def add(self, rows: Rows) -> None:
-        """Add rows that follow the rows added before."""
+        """Append rows, copied into arrays of the track's types."""
         start, self._row_count = self._row_count, self._row_count + len(rows)
         if self._row_count > len(self._columns["time"]):
             self._set_capacity(max(self._row_count + _MIN_ADDED_ROWS, int(1.5 * self._row_count)))
@@ -249,6 +251,7 @@ class TrackBuilder:
         return Track(**self._columns)
 
     def _set_capacity(self, row_count: int) -> None:
+        """Resize all columns to a number of rows."""
         for column in self._columns.values():
             # Resize the array in place: a copy of a long flight takes as much memory again.
             column.resize((row_count, *column.shape[1:]), refcheck=False)
@@ -362,7 +365,10 @@ class Flight(RunningFlight):
         memory.stall_speed = self.fdm.aircraft.stall_speed
 
     def _start_motion(self, setup: FlightSetup, start: Start, elevator: float) -> None:
-        """Start the aircraft trimmed in the air, or release it on the launcher with an elevator command."""
+        """Start the aircraft trimmed in the air, and then release it from its launcher if it takes off.
+
+        elevator: elevator command at the release, rad.
+        """
         self._start_trimmed(setup.mission.source, start)
         if self._ground_phases.take_off is not None:
             release_state = find_release(setup, self.map, self._ground, self.fdm.aircraft, self._ground_phases.take_off)
@@ -371,7 +377,10 @@ class Flight(RunningFlight):
             self._work.air.wind_north, self._work.air.wind_east = release_state.wind[:2]
 
     def _choose_engine(self, setup: FlightSetup) -> tuple[CompiledModel | None, str]:
-        """Choose the engine; return the compiled model (None for JSBSim), and a text with the engine and the reason."""
+        """Choose between the compiled model and JSBSim, by comparing their steps.
+
+        Returns the compiled model, or None for JSBSim, and a text that names the choice and its reason.
+        """
         if self._chosen_engine == "jsbsim":
             return None, "JSBSim, as requested"
         if self._law.loop is None:
@@ -412,4 +421,4 @@ class Flight(RunningFlight):
 
 
 def _discard(_value: float) -> None:
-    """Ignore the value of an output that is not used."""
+    """Do nothing; stands for the setter of an output that the flight does not use."""

@@ -150,23 +150,29 @@ class Workspace:
         law_dtype: np.dtype[np.record] | None = None,
         field: WindField | None = None,
     ) -> None:
-        parts = {"piece": path.pieces, "node": path.nodes, "waypoint": waypoints}
-        rows_of_path = max(map(len, parts.values()))
-        path_begins = WORKSPACE_NUMBERS + (0 if law_dtype is None else law_dtype.itemsize // 8)
+        """Lay out the block: workspace record, control law's record, path table, and packed wind field.
+
+        waypoints: records of `flight.guidance.lateral_reference_laws.WAYPOINT`.
+        law_dtype: type of the control law's record; None for no such record.
+        field: wind field of a forecast; None without a forecast.
+        """
+        path_tables = {"piece": path.pieces, "node": path.nodes, "waypoint": waypoints}
+        path_row_count = max(map(len, path_tables.values()))
+        path_offset = WORKSPACE_NUMBERS + (0 if law_dtype is None else law_dtype.itemsize // 8)
         packed_field = np.empty(0) if field is None else field.packed()
         # The path's records are a view of the rest of the block, so the field takes a whole number of them.
-        row_numbers = PATH_ROW.itemsize // 8
-        field_begins = path_begins + rows_of_path * row_numbers
-        self.block: Floats = np.zeros(field_begins + math.ceil(packed_field.size / row_numbers) * row_numbers)
-        self.block[field_begins : field_begins + packed_field.size] = packed_field
+        numbers_per_row = PATH_ROW.itemsize // 8
+        field_offset = path_offset + path_row_count * numbers_per_row
+        self.block: Floats = np.zeros(field_offset + math.ceil(packed_field.size / numbers_per_row) * numbers_per_row)
+        self.block[field_offset : field_offset + packed_field.size] = packed_field
         self.array: Records = self.block[:WORKSPACE_NUMBERS].view(WORKSPACE)
-        self.path: Records = self.block[path_begins:field_begins].view(PATH_ROW)
-        law_numbers = self.block[WORKSPACE_NUMBERS:path_begins]
+        self.path: Records = self.block[path_offset:field_offset].view(PATH_ROW)
+        law_numbers = self.block[WORKSPACE_NUMBERS:path_offset]
         self.law_record: Record = None if law_dtype is None else law_numbers.view(law_dtype)[0]
         self.record: Record = self.array[0]
         self.record.gains = gains.record()
-        self.record.settings.field = 0 if field is None else field_begins
-        for name, rows in parts.items():
+        self.record.settings.field = 0 if field is None else field_offset
+        for name, rows in path_tables.items():
             self.path[name][: len(rows)] = rows
             setattr(self.record.settings, f"{name}s", len(rows))
         self.readings = self._field_numbers("state", len(READ_FIELDS))
@@ -188,7 +194,7 @@ class Workspace:
         return (self._estimated - self._true).tolist()
 
     def _field_numbers(self, field: str, count: int) -> Floats:
-        """Return the first numbers of a field as an array that shares the field's memory."""
+        """Return the first ``count`` numbers of a field of the record as an array that shares the field's memory."""
         fields: Any = WORKSPACE.fields
         return np.frombuffer(self.array, np.float64, count, fields[field][1])
 
@@ -273,7 +279,8 @@ def begin_tick(workspace: Record, heights: Heights) -> bool:
 def _read_sensors(workspace: Record, heights: Heights) -> bool:
     """Convert the state to SI units and map axes, and look up the ground; return False if a value is not finite.
 
-    Sets ``state``, ``true`` and ``place`` of a record of `flight.simulation.tick.WORKSPACE`.
+    workspace: a record of `WORKSPACE`; its fields ``state``, ``true`` and ``place`` are set.
+    heights: altitudes of the terrain, m, (rows, columns).
     """
     state = workspace.state
     true = workspace.true
@@ -316,7 +323,7 @@ def end_tick(workspace: Record, block: Floats) -> int:
 
 @inner
 def airborne_end_code(workspace: Record) -> int:
-    """Return the code (a key of `ENDS`) for why an airborne flight ends in this tick; 0 if it continues."""
+    """Return the code of the reason why an airborne flight ends in this tick, a key of `ENDS`; 0 if it continues."""
     settings, air = workspace.settings, workspace.air
     return _find_airborne_end(
         workspace.state,
@@ -443,6 +450,10 @@ def _find_airborne_end(
 ) -> int:
     """Return the code (a key of `ENDS`) of the first condition that ends an airborne flight; 0 if it continues.
 
+    state, memory: records of the workspace, with the aircraft's state and the progress along the route.
+    height_above_ground: m; NaN if unknown.
+    min_airspeed: airspeed below which control is lost, m/s.
+
     The conditions are, in this order, ground contact, bank, stall, end of the route, and empty battery.
     """
     if height_above_ground <= 0.0:
@@ -461,7 +472,11 @@ def _find_airborne_end(
 
 @inner
 def _set_output(output: Record, commands: Record, air: Record, scale_positive: Record, scale_negative: Record) -> None:
-    """Set the values for JSBSim, in JSBSim's units: commands, mean wind plus gust, and ground altitude."""
+    """Set the values for JSBSim, in JSBSim's units: commands, mean wind plus gust, and ground altitude.
+
+    output: record of `OUTPUT`, which is set.
+    scale_positive, scale_negative: factors from SI to JSBSim's units, for values above zero and for other values.
+    """
     output.elevator, output.aileron = commands.elevator, commands.aileron
     output.rudder, output.throttle = commands.rudder, commands.throttle
     # Mean wind is set as part of the gust: three properties a tick instead of six.
@@ -489,6 +504,8 @@ def _update_wind(
     The components are along true north, east and down.  The mean wind has no vertical component.  Without turbulence
     (`wind.w20` is 0) the gust in the record stays as it is.
 
+    wind: record of `MEAN_WIND`.
+    gusts, noise: state of the gust filters, and random numbers of the tick.
     height_above_ground, up: height and altitude of the aircraft, m; the height is NaN over unknown ground.
     convergence_cos, convergence_sin: cosine and sine of the grid convergence, the map course of true north.
     """
@@ -517,7 +534,13 @@ def _fill_row(
     energy: float,
     clearance: float,
 ) -> None:
-    """Fill a `flight.simulation.track.TRACK_ROW` record, except for the wind."""
+    """Fill a `flight.simulation.track.TRACK_ROW` record, except for the wind.
+
+    state, true, commands, memory: records of the workspace.
+    time: s since the start.
+    energy: Wh used since the start.
+    clearance: height above ground, m.
+    """
     row.time = time
     # Element by element: assigning a whole array would check shapes.
     position = row.position

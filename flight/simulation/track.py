@@ -179,7 +179,7 @@ COLUMNS = {name: math.prod(TRACK_ROW[name].shape) for name in field_names(TRACK_
 
 
 def join_tracks(parts: list[Track]) -> Track:
-    """Join successive parts to one track; return an empty track for no parts.
+    """Join successive tracks to one track; return an empty track for no parts.
 
     >>> rows = np.zeros(5, TRACK_ROW)
     >>> whole = join_tracks([as_track(rows[:2]), as_track(rows[2:])])
@@ -201,7 +201,7 @@ _STEPS_PER_UNIT = np.exp2(
 
 
 def quantise(rows: Rows) -> Rows:
-    """Return a copy of a flight's rows, rounded to the resolution of `DIGITS` and without negative zeros.
+    """Return a copy of a flight's track rows, rounded to the resolution of `DIGITS` and without negative zeros.
 
     Rows are rounded as they are flown, so that the verdict and every reader of the log see the same numbers.
     """
@@ -215,9 +215,9 @@ def _as_matrix(rows: Rows) -> Floats:
 
 @compiled
 def _round_to_steps(values: Floats, steps: Floats) -> Floats:
-    """Return values (t, 1 + n) with each column but the first rounded to multiples of the column's step.
+    """Return values (t, 1 + n) with each column except the first rounded to multiples of the column's step.
 
-    steps: number of steps per unit for each rounded column, (n,).
+    steps: reciprocal of the step of each rounded column, (n,), a power of two.
     """
     units = 1.0 / steps
     rounded = np.empty(values.shape)
@@ -230,7 +230,7 @@ def _round_to_steps(values: Floats, steps: Floats) -> Floats:
 
 
 def join_rows(parts: Sequence[Rows]) -> Rows:
-    """Join successive rows to one array (t,); return an empty array for no parts.
+    """Join successive arrays of track rows to one array, (t,); return an empty array for no parts.
 
     >>> rows = np.zeros(6, TRACK_ROW)
     >>> rows["time"] = np.arange(6)
@@ -239,7 +239,7 @@ def join_rows(parts: Sequence[Rows]) -> Rows:
     >>> join_rows([rows[4:5], rows[5:]])["time"]
     array([4., 5.])
     """
-    # As plain numbers: numpy copies a record field by field, which takes a hundred times as long.
+    # Join them as plain numbers: numpy copies a record field by field, which takes a hundred times as long.
     numbers = np.concatenate([_as_matrix(part) for part in (_NO_ROWS, *parts)])
     # For parts of one row each, numpy returns columns in contiguous memory.
     return np.ascontiguousarray(numbers).view(TRACK_ROW)[:, 0]
@@ -351,7 +351,10 @@ def write_track_csv(track: Track, path: Path) -> None:
 
 
 def write_track_parquet(track: Track, path: Path) -> None:
-    """Write a track as Parquet. Raises MissingExtraError without the extra ``tables``, and OSError."""
+    """Write a track as Parquet.
+
+    Raises MissingExtraError without the extra ``tables``, and OSError if the file cannot be written.
+    """
     require_extra("tables", "to_parquet() needs")
     import pyarrow as pa
     from pyarrow import parquet
@@ -393,11 +396,9 @@ _LIMIT_TOLERANCE_FRACTION = 1e-3
 
 
 def control_limits(aircraft: str) -> list[tuple[str, float]]:
-    """Return pairs of control and limit in either direction, rad; NaN for the surfaces of an unknown aircraft.
+    """Return the name of each control with its greatest deflection in either direction, rad; 1 for the throttle.
 
-    The limit of the throttle is 1.
-
-    aircraft: name or folder of the aircraft.
+    aircraft: name or folder of the aircraft; the deflections of an unknown aircraft are NaN.
 
     >>> for name, limit in control_limits("aerosonde"):
     ...     print(f"{name} {limit:.2f}")
@@ -416,10 +417,9 @@ def control_limits(aircraft: str) -> list[tuple[str, float]]:
 
 
 def saturated_rows(track: Track, control: int, min_command: float, max_command: float) -> NDArray[np.bool_]:
-    """Return a mask (t,): True for each row at which the command of a control is saturated.
+    """Return a mask of the rows at which the command of a control is at one of its limits, (t,).
 
     control: column of `Track.commands`.
-
     min_command, max_command: limits of the control; no row is saturated if they are NaN.
 
     >>> rows = np.zeros(3, TRACK_ROW)

@@ -17,7 +17,9 @@ GUST_FILTERS = record_dtype("along", "across_first", "across_second", "down_firs
 
 @inner
 def dryden_scales(height: float) -> tuple[float, float, float]:
-    """Return the length scales L_u = L_v and L_w (m) and the ratio sigma_u / sigma_w at a height above ground (m).
+    """Return the Dryden length scales L_u = L_v and L_w (m) and the ratio sigma_u / sigma_w of the gust deviations.
+
+    height: height above ground, m.
 
     MIL-F-8785C 3.7.3.4 with heights in feet: L_w = h, L_u = h / (0.177 + 0.000823 h)^1.2, sigma_u / sigma_w = 1 /
     (0.177 + 0.000823 h)^0.4, 10 ft <= h <= 1,000 ft.
@@ -30,15 +32,15 @@ def dryden_scales(height: float) -> tuple[float, float, float]:
 
 
 def start_gusts(noise: Floats, filters: Record) -> None:
-    """Initialise the gust filters so that the statistics of the gusts are the same throughout the flight.
+    """Draw the initial state of the gust filters, so that gusts have the same statistics throughout the flight.
 
     noise: random numbers from the standard normal distribution, (5,).
     filters: a record of `GUST_FILTERS`, which is set.
     """
-    filters.along, filters.across_first, across, filters.down_first, down = noise.tolist()
+    filters.along, filters.across_first, across_noise, filters.down_first, down_noise = noise.tolist()
     # In the stationary state the second of two filters has variance 1/2, and covariance 1/2 with the first.
-    filters.across_second = 0.5 * filters.across_first + 0.5 * across
-    filters.down_second = 0.5 * filters.down_first + 0.5 * down
+    filters.across_second = 0.5 * filters.across_first + 0.5 * across_noise
+    filters.down_second = 0.5 * filters.down_first + 0.5 * down_noise
 
 
 @inner
@@ -74,7 +76,14 @@ def step_gusts(
 
 @inner
 def _step_transverse(first: float, second: float, noise: float, decay: float) -> tuple[float, float, float]:
-    """Advance two lags in series by a tick; return both lags and a transverse gust of unit variance."""
+    """Advance the two first-order lags of a transverse gust by a tick; return both lags and the gust.
+
+    first, second: states of the lags.
+    noise: random number from the standard normal distribution.
+    decay: factor by which a lag decays in a tick.
+
+    The gust has unit variance.
+    """
     previous = first
     first = decay * previous + math.sqrt(1.0 - decay * decay) * noise
     second = decay * second + (1.0 - decay) * 0.5 * (previous + first)

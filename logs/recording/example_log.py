@@ -33,9 +33,9 @@ _SCENARIO = {
 
 
 def example_log() -> FlightLog:
-    """Return a log of two legs over level ground in calm air, flown exactly along them at 25 m/s.
+    """Return a log of two legs over level ground in calm air, flown exactly along the legs at 25 m/s.
 
-    The log has 10 rows a second; the range of one missile covers part of the path.  The envelope is simplified, not
+    The log has 10 rows per second.  The range of one missile covers part of the path.  The envelope is simplified, not
     computed from a model.
 
     >>> log = example_log()
@@ -120,7 +120,7 @@ def _envelope() -> Envelope:
 
 
 def _track() -> Track:
-    """Return a track along the waypoints at constant speed, heading along the leg, with wings level."""
+    """Return a track along the waypoints at constant speed, with the nose along the leg and level wings."""
     leg_vectors = np.diff(_WAYPOINTS, axis=0)
     lengths = np.sqrt((leg_vectors**2).sum(axis=1))
     waypoint_distances = np.concatenate([[0.0], np.cumsum(lengths)])

@@ -68,7 +68,7 @@ _EXCLUSION_COLOUR = theme.rgba("zone", dark=True)
 _INCLUSION_COLOUR = theme.rgba("highlight", dark=True)
 # Height of a name above the ground around it, m.
 _LABEL_HEIGHT_M = 40.0
-# Half the side of the square of ground that a name stays above, m.
+# Half the side of the square whose highest ground a name stays above, m.
 _LABEL_GROUND_DISTANCE_M = 300.0
 # Distance of the coloured path below the flight, m.
 _PATH_OFFSET_M = 6.0
@@ -79,7 +79,7 @@ MAX_POSTS = 24
 
 
 def timestamp(time_ns: int) -> Timestamp:
-    """Convert a log_time, ns since 1970, to a protobuf timestamp."""
+    """Convert a log time, ns since 1970, to a protobuf timestamp."""
     return Timestamp(seconds=time_ns // 1_000_000_000, nanos=time_ns % 1_000_000_000)
 
 
@@ -108,6 +108,7 @@ def body_rotation(attitude: ArrayLike) -> Floats:
 def log_message(time_ns: int, text: str, level: str, name: str = "planfly") -> Log:
     """Return one event as a Foxglove log message.
 
+    time_ns: log time, ns since 1970.
     level: a key of `LOG_LEVELS`.
     name: source of the message.
     """
@@ -115,20 +116,20 @@ def log_message(time_ns: int, text: str, level: str, name: str = "planfly") -> L
 
 
 def terrain_scene(time_ns: int, scenario: Scenario) -> bytes:
-    """Encode the ground of the area as a coloured mesh of at most `MAX_VERTICES` vertices a side."""
+    """Encode the ground of the area as a coloured mesh with up to `MAX_VERTICES` vertices per side."""
     entity = _entity(time_ns, "terrain")
     mesh = b"" if scenario.terrain is None else _encode_mesh(scenario.terrain, scenario.bounds)
     return length_delimited(2, entity.SerializeToString(deterministic=True) + mesh)
 
 
 def _terrain_mesh(terrain: Terrain, bounds: Floats) -> tuple[Floats, Floats, NDArray[np.bool_]]:
-    """Return the corners of the ground's mesh, m, (n, m, 3), their colours, (n, m, 3), and a mask (n, m).
+    """Return vertices (m) and colours of the ground's mesh, (n, m, 3) each, and a mask (n, m).
 
-    The mask is True at corners whose height is known.
+    The mask is True for vertices with known height.
     """
 
     def axis(min_value: float, max_value: float) -> Floats:
-        """Return the coordinates of the mesh's vertices along one axis, m."""
+        """Return evenly spaced coordinates of the mesh's vertices between two limits, m."""
         return np.linspace(
             min_value, max_value, int(np.clip((max_value - min_value) / terrain.spacing, 2, MAX_VERTICES))
         )
@@ -145,7 +146,7 @@ def _terrain_mesh(terrain: Terrain, bounds: Floats) -> tuple[Floats, Floats, NDA
 
 
 def terrain_points(scenario: Scenario) -> tuple[Floats, Floats]:
-    """Return the known corners of the terrain mesh (n, 3), m, and their colours (n, 3), 0..1."""
+    """Return the mesh's vertices of known height (m) and their colours (0..1), (n, 3) each."""
     if scenario.terrain is None:
         return np.zeros((0, 3)), np.zeros((0, 3))
     points, colours, is_known = _terrain_mesh(scenario.terrain, scenario.bounds)
@@ -168,7 +169,7 @@ def _encode_mesh(terrain: Terrain, bounds: Floats) -> bytes:
     mesh = TriangleListPrimitive(pose=_pose((0.0, 0.0, 0.0)), color=_colour(theme.rgba("terrain")))
     mesh.indices.extend(corners[has_known_corners].ravel().tolist())
     points = corner_points.reshape(-1, 3)
-    # Round to 2^-4 m and 2^-7 of a colour: the mesh is for display only, and takes a quarter of the bytes.
+    # Round to 2^-4 m and 2^-7 of a colour.  The mesh is only displayed, and thus takes a quarter of the bytes.
     rgba = np.hstack([np.round(colours.reshape(-1, 3) * 128.0) / 128.0, np.ones((len(points), 1))])
     body = mesh.SerializeToString(deterministic=True)
     body += repeated_submessages(_MESH_POINTS, _XYZ, np.round(points * 16.0) / 16.0)
@@ -195,7 +196,7 @@ def threats_scene(time_ns: int, threats: Threats, terrain: Terrain | None) -> by
 
 
 def _label_position(position: Floats, terrain: Terrain | None) -> Floats:
-    """Return the position of a label: above the point and the highest known ground around it."""
+    """Return a label's position above a point and the highest known ground around it, m, (3,)."""
     east, north, up = (float(value) for value in position)
     top_altitude = up
     if terrain is not None:
@@ -206,7 +207,7 @@ def _label_position(position: Floats, terrain: Terrain | None) -> Floats:
 
 
 def _make_label(position: Floats, name: str) -> TextPrimitive:
-    """Make the text of a name that always faces the viewer."""
+    """Make a text label that always faces the viewer."""
     return TextPrimitive(
         pose=_pose(position),
         billboard=True,
@@ -236,7 +237,10 @@ def plan_scene(time_ns: int, waypoints: Floats, items: Sequence[int]) -> bytes:
 
 
 def track_scene(time_ns: int, positions: Floats) -> bytes:
-    """Encode the track (n, 3) flown so far as a line."""
+    """Encode the track flown so far as a line.
+
+    positions: m, (n, 3).
+    """
     line = _TRACK_LINE + repeated_submessages(_LINE_POINTS, _XYZ, positions)
     entity = _entity(time_ns, "track").SerializeToString(deterministic=True)
     return length_delimited(2, entity + length_delimited(_ENTITY_LINES, line))
@@ -265,7 +269,7 @@ def _pose(position: ArrayLike) -> Pose:
 
 
 def _empty_line(colour: tuple[float, float, float, float]) -> LinePrimitive:
-    """Return a line primitive without points."""
+    """Return a Foxglove line without points, 3 pixels wide."""
     return LinePrimitive(
         type=LinePrimitive.LINE_STRIP,
         pose=_pose((0.0, 0.0, 0.0)),
@@ -284,7 +288,10 @@ def _points(points: Floats) -> Iterable[Point3]:
 
 
 def zones_scene(time_ns: int, scenario: Scenario, waypoints: Floats) -> bytes:
-    """Encode the names and edges of zones, from ground or floor to the ceiling or to above the path."""
+    """Encode names and edges of zones, from the ground or the floor up to the ceiling or above the path.
+
+    waypoints: m, (w, 3).
+    """
     entity = _entity(time_ns, "zones")
     min_altitude = float(waypoints[:, 2].min())
     max_altitude = float(waypoints[:, 2].max()) + 50.0
@@ -301,9 +308,9 @@ def zones_scene(time_ns: int, scenario: Scenario, waypoints: Floats) -> bytes:
 
 
 def returns_scene(time_ns: int, drawn_returns: DrawnReturns, terrain: Terrain | None) -> bytes:
-    """Encode the path coloured by the outcome of a return, the worst returns, and the glide footprint.
+    """Encode the path coloured by the outcome of returns, the worst returns, and the footprint.
 
-    The coloured line lies below the path, so that plan and track stay visible.
+    The coloured line is drawn below the path, so that plan and track stay visible.
     """
     entity = _entity(time_ns, "returns")
     for kind, segment in drawn_returns.segments_by_outcome:
@@ -350,7 +357,7 @@ def _add_line(entity: SceneEntity, role: str, points: Floats, thickness: float =
 #
 # trimesh would save 15 lines of glTF, but it rounds colours to 8 bits, makes three nodes, and takes 0.5 s to import.
 
-# Wing span of the model, m, for every aircraft: at its true size it would be invisible among hills.
+# Wing span of the model, m, for every aircraft.  At its true size it would be invisible among hills.
 MODEL_SPAN_M = 100.0
 MEDIA_TYPE = "model/gltf-binary"
 
@@ -440,7 +447,7 @@ def aircraft_glb() -> bytes:
 
 
 def aircraft_scene(time_ns: int) -> bytes:
-    """Encode the aircraft model as a SceneUpdate in the aircraft's frame, so that the transforms move it."""
+    """Encode the aircraft model in the aircraft's frame, which the log's transforms move."""
     model = ModelPrimitive(
         pose=Pose(position=Vector3(), orientation=Quaternion(x=0.0, y=0.0, z=0.0, w=1.0)),
         scale=Vector3(x=MODEL_SPAN_M, y=MODEL_SPAN_M, z=MODEL_SPAN_M),

@@ -41,8 +41,8 @@ from world.threats import Threats
 
 # ----------------------------------------------------------------------
 # The flown track as a growing line: every 2 s the whole track, in a bounded number of points.
-# A viewer that seeks gets only the newest message, therefore each holds the whole track; to keep the file small, older
-# parts lose the points that are nearest to the straight line between their neighbours.
+# A viewer that seeks gets only the newest message, so each message contains the whole track.  To keep the file small,
+# older parts lose the points that are nearest to the straight line between their neighbours.
 
 # Time between messages, s.
 TRACK_INTERVAL_S = 2
@@ -60,9 +60,9 @@ class GrowingTrack:
         self._count = 0
 
     def add(self, position: Floats) -> Floats:
-        """Add the next position (3,), `TRACK_INTERVAL_S` s after the last, and return the track so far.
+        """Add the next position, m, (3,), and return the track so far, thinned to `MAX_POINTS` points.
 
-        The track, (n, 3), is thinned to at most `MAX_POINTS` points, and valid until the next call.
+        Call this every `TRACK_INTERVAL_S`.  The returned array is valid only until the next call.
 
         >>> track = GrowingTrack()
         >>> for k in range(500):
@@ -79,7 +79,7 @@ class GrowingTrack:
 
 
 def thin_line(points: Floats, point_count: int) -> Floats:
-    """Thin points (n, 3) to ``point_count`` points that keep the shape of the line and its ends.
+    """Thin the points (n, 3) of a line to `point_count` points that keep the line's shape and its ends.
 
     >>> corner = np.array([[0.0, 0.0, 0.0], [5.0, 0.0, 0.0], [10.0, 0.0, 0.0], [10.0, 9.0, 0.0]])
     >>> thin_line(corner, 3)[:, :2].tolist()
@@ -94,26 +94,29 @@ def thin_line(points: Floats, point_count: int) -> Floats:
         distance_square = ((previous + fraction[:, None] * chord - inner) ** 2).sum(axis=1)
         is_dropped = np.zeros(len(points), dtype=bool)
         for k in np.argsort(distance_square, kind="stable")[: len(points) - point_count].tolist():
-            # Drop only one of two neighbours, because that changes the distance of the other.
+            # Drop only one of two neighbours, because its removal changes the distance of the other.
             is_dropped[k + 1] = not (is_dropped[k] or is_dropped[k + 2])
         points = points[~is_dropped]
     return points
 
 
 # ----------------------------------------------------------------------
-# Events in flight, recorded when they happen: starts of legs, entry into and exit from the reach of threats.
+# Events in flight, recorded when they happen: starts of legs, entries into and exits from the ranges of threats.
 
-# `name` of these events in the log; events that a timeline computes itself are not read back.
+# Name of the source of these events in the log.  They are not read back, because a timeline computes them itself.
 EVENT_SOURCE = "flight"
 # Interval between checks of threats, ns.
 _CHECK_INTERVAL_NS = 200_000_000
 
 
 class FlightEvents:
-    """Converter of flight events to Log messages, independent of how rows are split into blocks."""
+    """Converter of flight events to Log messages, independent of the split of rows into blocks."""
 
     def __init__(self, setup: FlightSetup, channel: int) -> None:
-        """Prepare for a setup.  channel: number of the log's topic."""
+        """Prepare for the flight of a setup.
+
+        channel: number of the channel for events.
+        """
         self._route, self._threats, self._channel = setup.route, setup.scenario.threats, channel
         self._leg, self._slot = -1, -1
         self._inside = {
@@ -125,7 +128,7 @@ class FlightEvents:
         """Yield the event messages of rows: changes of leg, and entries into and exits from threats' ranges.
 
         log_times: log time of each row, ns, (n,).
-        position: (n, 3) m.
+        position: m, (n, 3).
         leg: active leg of each row, (n,).
         """
         if not len(log_times):
@@ -150,7 +153,7 @@ class FlightEvents:
             self._inside[kind] = is_inside[-1]
 
     def _leg_text(self, leg: int) -> str:
-        """Return the text of a leg's event: leg, waypoint to which it leads, and that waypoint's mission item."""
+        """Describe the start of a leg: its number, and the waypoint and item to which it leads."""
         route, waypoint = self._route, leg + 1
         if not 0 <= waypoint < len(route.items):
             return f"leg {leg}"
@@ -158,7 +161,12 @@ class FlightEvents:
         return f"leg {route.leg_numbers[leg]}, to waypoint {route.stops[waypoint]}{item_text}"
 
     def _threat_record(self, time: int, kind: str, threat: int, has_entered: bool) -> MessageRecords:
-        """Make the record of the event that the aircraft enters or leaves the range of a threat."""
+        """Make the message record for an entry into, or an exit from, the range of a threat.
+
+        time: log time, ns.
+        kind: "missile range" or "radar range".
+        threat: index of the threat.
+        """
         name = self._threats.names[threat]
         level = "warning" if kind == "missile range" else "info"
         text = f"inside the {kind} of {name}" if has_entered else f"out of the {kind} of {name}"
@@ -207,7 +215,7 @@ _SIDE_INTERVALS = 7
 
 
 def point_cloud(time_ns: int, frame: str, points: Floats, colours: NDArray[np.uint8] | Colour) -> bytes:
-    """Encode points (n, 3), m, as a PointCloud in a frame, rounded to 1/16 m.
+    """Encode points (m, (n, 3)) as a PointCloud in a frame, rounded to 1/16 m.
 
     colours: red, green, blue and opacity, 0 to 255, (n, 4), or one colour for all points.
     """
@@ -236,19 +244,19 @@ def point_cloud(time_ns: int, frame: str, points: Floats, colours: NDArray[np.ui
 
 
 def ground_cloud(time_ns: int, scenario: Scenario) -> bytes:
-    """Encode the corners of the ground's mesh as a point cloud."""
+    """Encode the vertices of the ground's mesh as a point cloud."""
     points, colours = terrain_points(scenario)
     shades = np.hstack([np.round(colours * 255.0), np.full((len(points), 1), 255.0)]).astype(np.uint8)
     return point_cloud(time_ns, MAP_FRAME, points, shades)
 
 
 def plan_cloud(time_ns: int, waypoints: Floats) -> bytes:
-    """Encode the legs between waypoints (w, 3) as a point cloud."""
+    """Encode the legs between waypoints (m, (w, 3)) as a point cloud."""
     return point_cloud(time_ns, MAP_FRAME, points_along_legs(waypoints), _PLAN_COLOUR)
 
 
 def track_cloud(time_ns: int, positions: Floats) -> bytes:
-    """Encode the flown positions (n, 3) as a point cloud."""
+    """Encode the flown positions (m, (n, 3)) as a point cloud."""
     return point_cloud(time_ns, MAP_FRAME, positions, _TRACK_COLOUR)
 
 
@@ -287,7 +295,7 @@ def threats_cloud(time_ns: int, threats: Threats) -> bytes:
 
 
 def points_along_legs(waypoints: Floats) -> Floats:
-    """Return points at even distances on the legs between waypoints (w, 3), including the waypoints."""
+    """Return evenly spaced points, m, (n, 3), on the legs between waypoints (w, 3), which are included."""
     lengths = np.sqrt((np.diff(waypoints, axis=0) ** 2).sum(axis=1))
     spacing = max(_POINT_SPACING_M, float(lengths.sum()) / _MAX_SAMPLES)
     legs = [
@@ -312,7 +320,7 @@ _XYZW = "xyzw"
 _GEO = ("latitude", "longitude", "altitude")
 # Minimum time between messages with the points of the track, s.
 _MIN_CLOUD_INTERVAL_S = 10.0
-# Minimum ratio of the times of successive such messages, which limits their number.
+# Minimum ratio of the times of successive messages with these points.  It limits their number.
 _CLOUD_RATIO = 1.05
 # Constant parts of the messages after their timestamps, in protobuf's encoding.
 _TRANSFORM_NAMES = FrameTransform(
@@ -332,11 +340,11 @@ _FIX_DTYPE = np.dtype([("names", np.uint8, (len(_FIX_NAMES),)), *tagged_doubles(
 def transform_messages(channel: int, log_times: Ints, position: Floats, attitude: Floats) -> MessageRecords:
     """Encode position and attitude of the aircraft as a FrameTransform for each of n rows.
 
-    Values are rounded to 2^-10 m and 2^-20 of the quaternion, which is invisible and halves their size in the log; the
+    Positions are rounded to 2^-10 m and quaternions to 2^-20, which is invisible and halves their size in the log.  The
     state message is exact.
-
     log_times: ns, (n,).
-    position, attitude: m and rad, (n, 3).
+    position: m, (n, 3).
+    attitude: roll, pitch and yaw, rad, (n, 3).
     """
     with np.errstate(over="ignore", invalid="ignore"):
         translation = np.round(position * 1024.0) / 1024.0
@@ -366,7 +374,10 @@ class Poses:
     """Converter of rows to the messages for viewers: transforms, fixes and the track."""
 
     def __init__(self, origin: GeoOrigin, channels: dict[str, int]) -> None:
-        """Prepare for an origin.  channels: the number of each topic."""
+        """Prepare for a map with this origin.
+
+        channels: number of the channel of each topic.
+        """
         self._origin, self._channels = origin, channels
         self._slot = self._second = -1
         self._path: list[Floats] = []  # positions, one a second
@@ -380,7 +391,8 @@ class Poses:
         The track as a line is written every `TRACK_INTERVAL_S` s, and the track as points at growing intervals.
 
         log_times: log time of each row, ns, (n,).
-        position, attitude: m and rad, (n, 3).
+        position: m, (n, 3).
+        attitude: roll, pitch and yaw, rad, (n, 3).
         """
         good_rows = np.flatnonzero(np.isfinite(position).all(axis=1) & np.isfinite(attitude).all(axis=1))
         slots = log_times[good_rows] // _SLOT_NS
@@ -421,7 +433,10 @@ class Poses:
         yield self._track_cloud_record(log_time, parts)
 
     def _track_cloud_record(self, log_time: int, parts: list[Floats]) -> MessageRecords:
-        """Make the message with the track as points, from its parts (n, 3) m."""
+        """Make the message with the track as points.
+
+        parts: positions of successive parts of the track, m, (n, 3) each.
+        """
         points = track_cloud(log_time, np.concatenate([np.zeros((0, 3)), *parts]))
         return single_record(self._channels[TRACK_POINTS], log_time, points)
 

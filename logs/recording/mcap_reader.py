@@ -1,9 +1,9 @@
 """Read an MCAP container front to back without trusting it.
 
-mcap 1.6's `StreamReader` would save 150 lines, but it reports a damaged attachment only at the end of the file, its
-seeking reader not at all, and lz4 chunks decompress to any size. Therefore this module reads the framing; the classes
-of mcap then parse records, from bytes that are already bounded and CRC-checked. Reading stops at the first damage: the
-returned data are complete, in order and without a hole.
+mcap 1.6's `StreamReader` would save 150 lines.  However, it reports a damaged attachment only at the end of the file,
+its seeking reader does not report it at all, and lz4 chunks decompress to any size.  Therefore this module reads the
+framing; the classes of mcap then parse records from bytes that are already bounded and CRC-checked.  Reading stops at
+the first damage, so that the returned data are complete and in order.
 
 Any container that the format allows is read: with chunks or without, compressed by zstd, lz4 or not, with or without
 an index, statistics, a summary and CRCs, with unknown kinds of records, and with surplus bytes in a record. A
@@ -49,7 +49,9 @@ class _Damage(Exception):
 class Container:
     """Content of a file up to its end, or up to its first damage.
 
-    attachments: bytes by name.  media: type and log_time (ns) of each.  problem: empty if the file is whole.
+    attachments: bytes of each attachment by name.
+    media: media type and log time (ns) of each attachment by name.
+    problem: description of the damage; "" if the file is whole.
     """
 
     attachments: dict[str, bytes] = field(default_factory=dict)
@@ -58,7 +60,7 @@ class Container:
 
 
 def read_chunks(file: BinaryIO, container: Container) -> Iterator[bytes]:
-    """Yield the records of each complete chunk, and records outside chunks, as bytes; fill ``container``.
+    """Yield the records of each complete chunk, and records outside chunks, as bytes; fill `container`.
 
     Damage raises no error; `Container.problem` describes it.
 
@@ -114,9 +116,10 @@ def _read_sections(file: BinaryIO, container: Container) -> Iterator[bytes]:
 
 
 def _check_data_section(file: BinaryIO, crc: int, start: int) -> None:
-    """Check the data section by its CRC, before its records outside chunks are used; raise _Damage.
+    """Check the CRC of the data section before its records outside chunks are used.
 
-    crc: CRC of the section up to byte ``start``; the rest is read again.
+    Raises _Damage if it differs.
+    crc: CRC of the section up to byte `start`; the part after it is read twice.
     """
     resume_position = file.tell()
     file.seek(start)
@@ -192,9 +195,9 @@ def _read_chunk(content: bytes, position: int) -> bytes:
 
 
 def _decompress(chunk: Chunk, size: int) -> bytes:
-    """Decompress at most ``size`` + 1 bytes of a chunk.
+    """Decompress at most `size` + 1 bytes of a chunk.
 
-    The library's decompress() would trust the size that the compressed data state.
+    The library's decompress() would trust the size that the compressed data declare.
     """
     if chunk.compression == "zstd":
         reader = zstandard.ZstdDecompressor(max_window_size=2**27).stream_reader(chunk.data, read_across_frames=True)
@@ -211,7 +214,7 @@ def _read_attachment(content: bytes, position: int, container: Container) -> Non
         attachment = Attachment.read(record_stream(content))
     except PARSE_ERRORS as error:
         raise _Damage(f"the attachment at byte {position:,} cannot be read") from error
-    # Two times, three lengths with their contents; then the CRC, and perhaps unused bytes.
+    # The attachment has two times, three lengths with their contents, the CRC, and perhaps unused bytes.
     lengths = (len(attachment.name.encode()), len(attachment.media_type.encode()), len(attachment.data))
     end = 32 + sum(lengths)
     if int.from_bytes(content[end : end + 4], "little") not in (0, zlib.crc32(content[:end])):
@@ -223,7 +226,11 @@ def _read_attachment(content: bytes, position: int, container: Container) -> Non
 
 
 def _check_data_end(content: bytes, position: int, crc: int) -> None:
-    """Raise _Damage if the CRC of the data section differs from the stated one."""
+    """Raise _Damage if the CRC of the data section differs from the CRC in the end record.
+
+    content, position: content and file position of the end record.
+    crc: computed CRC of the data section.
+    """
     try:
         stated_crc = DataEnd.read(record_stream(content)).data_section_crc
     except PARSE_ERRORS as error:

@@ -1,9 +1,9 @@
 """Write an MCAP container front to back, from prepared chunks.
 
-The `Writer` of mcap takes one message at a time, at 5 us each, two to three times the time of this writer; its `Chunk`
-and `ChunkIndex` copy their fields through a record builder for as long as the compression takes. Here the records of a
-chunk and the index of its messages are passed as bytes. Records that are written once use the classes of mcap. Every
-CRC of the format is written.
+The `Writer` of mcap takes one message at a time, at 5 us each, which is two to three times the time of this writer.
+Its `Chunk` and `ChunkIndex` copy their fields through a record builder, which takes as long as the compression.  Here,
+the records of a chunk and the index of its messages are passed as bytes.  Records that are written once use the classes
+of mcap.  Every CRC of the format is written.
 """
 
 import struct
@@ -44,7 +44,7 @@ _MESSAGE = struct.Struct("<HIQ")
 _CHUNK_HEADER = struct.Struct("<QQQI")
 # Head of a chunk index: times, offset and length of the chunk, and length of its table of message indexes.
 _CHUNK_INDEX_HEADER = struct.Struct("<QQQQI")
-# Entry of that table: channel and offset.
+# Entry of the table of message indexes: channel and offset.
 _INDEX_OFFSET = struct.Struct("<HQ")
 # End of a chunk index: sizes of the chunk.
 _CHUNK_SIZES = struct.Struct("<QQ")
@@ -55,7 +55,12 @@ _PAIRS_HEAD = 6
 
 
 class ChannelIndex(NamedTuple):
-    """Message index of a channel after a chunk, with the start of its record and its number of messages."""
+    """Message index of one channel in a chunk.
+
+    channel: number of the channel.
+    offset: start of the index record in `ChunkContent.index`.
+    messages: number of messages.
+    """
 
     channel: int
     offset: int
@@ -64,7 +69,7 @@ class ChannelIndex(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class ChunkContent:
-    """Message records one after the other, and the message index records that follow them.
+    """Content of a chunk: message records, and the message index records that follow the chunk.
 
     records: records of schemas, channels and messages, in this order.
     index: message index records.
@@ -80,7 +85,16 @@ class ChunkContent:
 
 
 class _ChunkIndex(NamedTuple):
-    """Entry of a chunk in the chunk index; a frozen dataclass would take six times as long to create."""
+    """Entry of a chunk in the chunk index.
+
+    content_start, content_end: log time of the oldest and the newest message, ns.
+    position, length: position and length of the chunk record in the file, bytes.
+    offsets: channel and file position of each message index of the chunk.
+    index_length: total length of these message indexes, bytes.
+    compressed, size: size of the records with and without compression, bytes.
+
+    A frozen dataclass would take six times as long to create.
+    """
 
     content_start: int
     content_end: int
@@ -103,7 +117,7 @@ class _ChunkIndex(NamedTuple):
 
 
 class ContainerWriter:
-    """Writer of a container: magic and header, then attachments and chunks, and the summary at `write_end`."""
+    """Writer of a container: header, attachments and chunks, then the summary by `write_end`."""
 
     def __init__(self, file: BinaryIO, profile: str, level: int = 3) -> None:
         """Begin a container in an empty file open for writing.
@@ -124,7 +138,10 @@ class ContainerWriter:
         self._write_bytes(MAGIC + _record_bytes(Header(profile=profile, library=profile)))
 
     def write_attachment(self, name: str, media_type: str, data: bytes, log_time: int) -> None:
-        """Write an attachment."""
+        """Write an attachment, and note it for the summary.
+
+        log_time: ns since 1970.
+        """
         record = _record_bytes(
             Attachment(create_time=0, log_time=log_time, name=name, media_type=media_type, data=data)
         )
@@ -156,10 +173,9 @@ class ContainerWriter:
         return new_records
 
     def copy_chunk(self, data: bytes) -> None:
-        """Write the records of another file's chunk as a chunk.
+        """Write the records of another file's chunk as a chunk of this file.
 
-        Its schemas and channels become schemas and channels of this file.  Raises ValueError and the errors of mcap's
-        classes.
+        The chunk's schemas and channels are added to this file.  Raises ValueError and the errors of mcap's classes.
         """
         index: dict[int, list[tuple[int, int]]] = {}
         for opcode, position, content in records(data):
@@ -350,7 +366,7 @@ class Layout:
 
 @inner
 def _write_integer(buffer: Bytes, position: int, value: int, size: int) -> int:
-    """Write a little-endian number of ``size`` bytes, and return the position of its end."""
+    """Write a little-endian number of `size` bytes, and return the position after it."""
     for k in range(size):
         buffer[position + k] = (value >> (8 * k)) & 0xFF
     return position + size
@@ -358,7 +374,7 @@ def _write_integer(buffer: Bytes, position: int, value: int, size: int) -> int:
 
 @inner
 def _write_varint(buffer: Bytes, position: int, value: int) -> int:
-    """Write a value as a protobuf varint; return the next position."""
+    """Write a value as a protobuf varint, and return the position after it."""
     while value > 127:
         buffer[position] = (value & 127) | 128
         value >>= 7
@@ -369,7 +385,11 @@ def _write_varint(buffer: Bytes, position: int, value: int) -> int:
 
 @compiled
 def _write_message_header(buffer: Bytes, position: int, size: int, channel: int, log_time: int) -> int:
-    """Write the frame and header of a message record; ``size`` is the size of the message."""
+    """Write the frame and the header of a message record, and return the position after them.
+
+    size: size of the message, bytes.
+    log_time: ns since 1970; it is also the publish time.
+    """
     buffer[position] = MESSAGE_OPCODE
     position = _write_integer(buffer, position + 1, MESSAGE_HEADER + size, 8)
     position = _write_integer(buffer, position, channel, 2)
@@ -380,12 +400,12 @@ def _write_message_header(buffer: Bytes, position: int, size: int, channel: int,
 
 @compiled
 def _stamp_messages(log_times: Ints, channel: int, tag: int, bodies: Bytes) -> tuple[Bytes, Ints]:
-    """Encode messages with their log times before their bodies.
+    """Encode n message records, each with a timestamp before a body of constant size.
 
-    Return all bytes, and the offset of each message, (n + 1,); the last offset is the end of the bytes.
-
+    Return the bytes of all records, and the offset of each record, (n + 1,); the last offset is the end of the bytes.
+    log_times: ns since 1970, (n,).
     tag: protobuf tag of the timestamp.
-    bodies: (n, size) bytes after the timestamp.
+    bodies: bytes of the messages after their timestamps, (n, size).
     """
     count, body_size = bodies.shape
     # The timestamp takes at most 2 + 12 bytes: tag and length, then two tags and two varints of five bytes.
@@ -413,9 +433,9 @@ def _stamp_messages(log_times: Ints, channel: int, tag: int, bodies: Bytes) -> t
 def stamped_records(log_times: Ints, channel: int, timestamp_field: int, bodies: Bytes) -> MessageRecords:
     """Encode messages with a timestamp and a body of constant size as message records.
 
-    log_times: (n,) ns since 1970.
+    log_times: ns since 1970, (n,).
     timestamp_field: field number of the timestamp.
-    bodies: (n, size) bytes after the timestamp, in protobuf's encoding.
+    bodies: bytes of the messages after their timestamps, in protobuf's encoding, (n, size).
     """
     tag = timestamp_field << 3 | 2  # length-delimited
     blob, offsets = _stamp_messages(np.ascontiguousarray(log_times), channel, tag, bodies)
@@ -423,7 +443,10 @@ def stamped_records(log_times: Ints, channel: int, timestamp_field: int, bodies:
 
 
 def single_record(channel: int, log_time: int, data: bytes) -> MessageRecords:
-    """Encode one message with the bytes ``data`` as a message record."""
+    """Encode one message with the bytes `data` as a message record.
+
+    log_time: ns since 1970.
+    """
     record = np.empty(FRAME_SIZE + MESSAGE_HEADER + len(data), dtype=np.uint8)
     position = _write_message_header(record, 0, len(data), channel, log_time)
     record[position:] = np.frombuffer(data, np.uint8)
@@ -434,10 +457,12 @@ def single_record(channel: int, log_time: int, data: bytes) -> MessageRecords:
 def _merge_by_time(
     row_times: Ints, row_length: int, row_channel: int, other_messages: Entries, prefix_size: int, limit: int
 ) -> tuple[Entries, Ints]:
-    """Merge rows and other messages by time, and cut them into chunks.
+    """Merge rows and other messages by time, and divide them into chunks of at most one second.
 
-    Return all messages (n,), and the index of each chunk's first message, followed by n.  At equal times a row comes
-    last.
+    Return all messages, (n,) of `ENTRY`, and the index of each chunk's first message, followed by n.  At equal times, a
+    row comes last.
+    row_times: log times of the rows, ns.
+    row_length, row_channel: size in bytes and channel of each row's message.
 
     prefix_size: size of the bytes before the first message.
     limit: largest size of a chunk of several messages, bytes.
@@ -476,7 +501,12 @@ def _merge_by_time(
 
 @compiled
 def _copy_messages(entries: Entries, rows: Bytes, blob: Bytes, prefix: Bytes) -> Bytes:
-    """Return the bytes of all chunks: ``prefix`` and all messages, one after the other."""
+    """Return the bytes of all chunks: `prefix` and all messages, one after the other.
+
+    entries: messages, (n,) of `ENTRY`.
+    rows: messages of the rows, (r, size) bytes.
+    blob: bytes of the other messages.
+    """
     total_size = len(prefix)
     for k in range(len(entries)):
         total_size += entries[k].length
@@ -498,8 +528,12 @@ def _copy_messages(entries: Entries, rows: Bytes, blob: Bytes, prefix: Bytes) ->
 def _index_messages(
     entries: Entries, firsts: Ints, prefix_size: int, max_channel: int
 ) -> tuple[Bytes, Chunks, ChannelIndexes]:
-    """Encode the message index records of each chunk by channel; return them and the tables of `Layout`.
+    """Encode the message index records of each chunk by channel; return them, chunks and channels.
 
+    The chunks and channels are those of `Layout`.
+    entries: messages, (n,) of `ENTRY`.
+    firsts: index of each chunk's first message, followed by n.
+    prefix_size: size of the bytes before the first message.
     max_channel: highest channel number.
     """
     count = len(firsts) - 1
@@ -538,11 +572,12 @@ def _index_messages(
 def lay_out_chunks(
     rows: Bytes, row_times: Ints, row_channel: int, other_messages: list[MessageRecords], prefix: bytes, limit: int
 ) -> Layout:
-    """Order message records by time, and index them in chunks of at most a second and ``limit`` bytes.
+    """Order message records by time, and index them in chunks of at most one second and `limit` bytes.
 
-    A message of more than ``limit`` bytes gets its own chunk.
-
-    rows: (n, size) records of the channel ``row_channel``, at ``row_times`` (ns); at equal times a row comes last.
+    A message of more than `limit` bytes gets a chunk of its own.  At equal times, a row comes after other messages.
+    rows: message records of the rows, (n, size) bytes.
+    row_times: log times of the rows, ns, (n,).
+    row_channel: channel of the rows.
     prefix: bytes before the first message.
     """
     max_channel = max([row_channel, *(messages.channel for messages in other_messages)])
@@ -559,9 +594,9 @@ def lay_out_chunks(
 
 
 def _message_entries(other_messages: list[MessageRecords]) -> Entries:
-    """Return the entries of messages in order of time, with their starts in the joined blobs.
+    """Return the entries (`ENTRY`) of messages in order of time, with their starts in the joined blobs.
 
-    Their offsets in the chunks are not set yet.
+    The field `offset`, the start in the chunk, is not set.
     """
     entries: Entries = np.zeros(sum(len(messages.log_times) for messages in other_messages), dtype=ENTRY)
     first, start = 0, 0
@@ -578,12 +613,12 @@ def _message_entries(other_messages: list[MessageRecords]) -> Entries:
 
 @compiled
 def last_log_time(times: Floats, newest: int, epoch: int, max_time: float) -> int:
-    """Check that the times of rows (s) increase, and return the log time (ns) of the last row.
+    """Check that the times of rows (s) increase, and return the log time of the last row, ns.
 
-    Returns `OUT_OF_RANGE` if a time is not in 0..max_time, and `NOT_INCREASING` if a time is not later than the time
-    before it.
-
+    Return `OUT_OF_RANGE` if a time is not in 0..max_time.  Return `NOT_INCREASING` if a time is not later than the
+    previous one.
     newest: log time before the first row, ns.
+    epoch: log time at simulation time 0, ns.
     """
     for k in range(len(times)):
         if not 0.0 <= times[k] < max_time:

@@ -60,7 +60,10 @@ from world.wording import count_text
 
 @dataclass(frozen=True, slots=True)
 class LogChannel:
-    """Topic of a log: encoding of its messages, and name, encoding and data of their schema."""
+    """Topic of a log, with the encoding of its messages and their schema.
+
+    schema: name of the schema.
+    """
 
     topic: str
     encoding: str
@@ -71,7 +74,10 @@ class LogChannel:
 
 @dataclass(frozen=True, slots=True)
 class LogMessage:
-    """One message; log_time in ns since 1970."""
+    """One message of a log.
+
+    log_time: ns since 1970.
+    """
 
     channel: LogChannel
     log_time: int
@@ -154,8 +160,9 @@ _LEVEL_NAMES = {number: name for name, number in LOG_LEVELS.items()}
 
 @dataclass(frozen=True, slots=True)
 class LogEvent:
-    """One event of the log: time in s (to the nanosecond), text and level.
+    """One event of the log.
 
+    time: flight time, s, exact to the nanosecond.
     level: a key of `logs.recording.foxglove_scene.LOG_LEVELS`.
     """
 
@@ -171,12 +178,12 @@ class FlightLog:
     source: name of the file, for messages.
     setup, track, events: the flown setup, the rows, and the events in order of time.
     ended: reason for the end of the flight; None if the recording stopped before.
-    recorded_verdict: the verdict as written, or None; never to be trusted.
+    recorded_verdict: the verdict as written, or None; for comparison only.
     versions: versions of the packages of the flight.
     complete: True if nothing is missing or damaged.
     problem: the fault, in one line; empty for a complete log.
     end_time: time of the last row, s.
-    lost: the lost part of the flight, in one line; for a recovered log, ``problem`` says so as well.
+    lost: the lost part of the flight, in one line; in a recovered log, `problem` also states it.
     reference: results of reference flights; None if none were flown.
     """
 
@@ -273,7 +280,7 @@ class _MessageCollector:
             message = Log.FromString(data[start + MESSAGE_HEADER : end])
             if message.name == FLIGHT_EVENT_SOURCE:
                 return end
-            # Subtract whole ns first: a float cannot hold ns since 1970.
+            # Subtract integers first, because a float cannot represent ns since 1970 exactly.
             time = (log_time - EPOCH_NS) / 1e9
             self.events.append(LogEvent(time, message.message, _LEVEL_NAMES.get(message.level, "info")))
         return end
@@ -285,7 +292,7 @@ class _MessageCollector:
 
 @checks_types
 def read_log(path: Path | str) -> FlightLog:
-    """Read a flight log; a damaged or unfinished log is read up to its damage (``complete`` is False).
+    """Read a flight log; a damaged or unfinished log is read up to the damage (`complete` is False).
 
     Raises LogError, in one line, for a file that is missing, empty, not an MCAP file or not a planfly log, or that
     contains no complete second of flight.
@@ -383,9 +390,9 @@ def _usable_rows(rows: StateRecords, waypoint_count: int) -> tuple[StateRecords,
 
 
 def _read_result(attachments: dict[str, bytes], row_count: int) -> tuple[str | None, str]:
-    """Return the recorded end of the flight (None if it is unknown), and the fault of the record ("" if it has none).
+    """Return the reason for the flight's end (None if unknown), and the fault of the result or "".
 
-    row_count: number of rows in the log; the record has a fault if it states another number.
+    row_count: number of rows in the log; the result has a fault if it states another number.
     """
     if RESULT_FILE not in attachments:
         return None, "the recording stopped before the flight had ended"
@@ -399,13 +406,16 @@ def _read_result(attachments: dict[str, bytes], row_count: int) -> tuple[str | N
 
 
 def _recorded_loss(recovery: bytes) -> str:
-    """Return the loss that the log's recovery note states."""
+    """Return the description of the lost part from the recovery note of a log.
+
+    recovery: content of the note, in JSON.
+    """
     loss = _parse_object(recovery).get("lost")
     return loss if isinstance(loss, str) and loss else "the extent of the loss is unknown"
 
 
 def _read_verdict(attachments: dict[str, bytes]) -> tuple[dict[str, Any] | None, str]:
-    """Return the recorded verdict, or None, and the fault of its attachment; "" without a fault."""
+    """Return the recorded verdict (None without one), and the fault of its attachment ("" if none)."""
     if VERDICT_FILE not in attachments:
         return None, ""
     verdict = _parse_object(attachments[VERDICT_FILE])
@@ -413,7 +423,7 @@ def _read_verdict(attachments: dict[str, bytes]) -> tuple[dict[str, Any] | None,
 
 
 def _read_reference(attachments: dict[str, bytes]) -> tuple[ReferenceFlights | None, str]:
-    """Return the results of reference flights, or None, and the fault of their attachment; "" without one."""
+    """Return the results of reference flights or None, and the fault of their attachment or ""."""
     if REFERENCE_FILE not in attachments:
         return None, ""
     try:

@@ -85,7 +85,7 @@ _CHANNELS: dict[str, Any] = {
 
 
 class Recorder:
-    """Writer of a flight log; a context manager, so that a flight that raises leaves a readable, unfinished file.
+    """Writer of a flight log; as a context manager, it leaves a readable file if the flight raises.
 
     The setup is written first; then each whole second of flight is passed to the operating system, so that a killed
     process loses at most the last second.
@@ -108,10 +108,9 @@ class Recorder:
     def __init__(self, path: Path, setup: FlightSetup, *, every: int = 1, batch: int = 1) -> None:
         """Open ``path`` for writing (replacing it) and write the setup.  Raises OSError.
 
-        every: record every n-th row, and the last row of the flight.
-        batch: number of whole seconds of flight written at once, each in its own chunks; a larger batch costs less
-            time, but
-            a killed process loses up to one batch.  The bytes are the same.
+        every: stride of the recorded rows: every n-th row, and the last row of the flight.
+        batch: number of whole seconds of flight that are written at once.  A larger batch takes less time, but a killed
+            process loses up to one batch.  The bytes of the file are the same.
         """
         self._batch_ns = batch * SECOND_NS
         self._every = every
@@ -127,7 +126,7 @@ class Recorder:
         self._channels: dict[str, int] = {}
         self._file = path.open("wb", buffering=_BUFFER_BYTES)
         try:
-            # A thinned log is meant to cost little: compress faster, a quarter more bytes for half the time.
+            # A thinned log should take little time: faster compression takes half the time for a quarter more bytes.
             self._writer = ContainerWriter(self._file, PROFILE, 3 if every == 1 else -1)
             self._write_setup(attachments, setup)
         except OSError:
@@ -157,13 +156,13 @@ class Recorder:
                 self._close_file()
 
     def write(self, block: Track) -> None:
-        """Append rows. Raises ValueError unless their times increase, from 0 on, across all blocks."""
+        """Append rows; raise ValueError unless their times increase across all blocks and are at least 0 s."""
         self.write_rows(track_rows(block))
 
     def write_rows(self, rows: Rows) -> None:
-        """Record rows as a flight returns them, (t,) of `flight.simulation.track.TRACK_ROW`.
+        """Record the rows of a flight, (t,) of `flight.simulation.track.TRACK_ROW`.
 
-        Raises ValueError unless their times increase, from 0 on, across all calls.
+        Raises ValueError unless their times increase across all calls and are at least 0 s.
         """
         if not len(rows):
             return
@@ -221,7 +220,7 @@ class Recorder:
         reference: ReferenceFlights | None = None,
         returns: DrawnReturns | None = None,
     ) -> None:
-        """Write the end of the flight, verdict, reference flights and returns, and close the file."""
+        """Write the end of the flight, the verdict, reference flights and returns, and close the file."""
         if self._skipped_row is not None:
             self._append_rows(self._skipped_row)
             self._skipped_row = None
@@ -295,9 +294,9 @@ class Recorder:
         self._writer.write_attachment(name, media_type(name), data, log_time)
 
     def _write_pending(self, end_ns: int | None) -> None:
-        """Write the pending rows and events before ``end_ns``, in chunks of at most a second.
+        """Write the pending rows and events before log time `end_ns`, in chunks of at most one second.
 
-        All are written if ``end_ns`` is None.
+        end_ns: ns; None to write all.
         """
         rows = join_rows(self._pending_rows)
         log_times = times_ns(rows["time"])
@@ -314,7 +313,10 @@ class Recorder:
     def _write_messages(
         self, other_messages: list[MessageRecords], rows: Rows = _NO_ROWS, log_times: Ints = _NO_TIMES
     ) -> None:
-        """Write rows and other messages in order of time; at equal times the row comes last."""
+        """Write rows and other messages in order of time; at equal times, a row comes after other messages.
+
+        log_times: log time of each row, ns, (t,).
+        """
         channel = self._channels[STATE_TOPIC]
         encoded = encode_rows(rows, self._written_count, channel)
         self._written_count += len(rows)
@@ -330,10 +332,11 @@ INTERRUPTED = "interrupted"
 
 
 class CrashSafeRecorder(Recorder):
-    """Recorder that leaves a valid log if Ctrl-C interrupts the flight, and locks the log against other processes.
+    """Recorder that leaves a valid log after Ctrl-C, and locks the log against other processes.
 
-    The log of an interrupted flight ends with the last row flown and has no verdict; `planfly check` can judge it.  A
-    log without a row is removed.  After any other error the log stays unfinished; `planfly recover` can read its rows.
+    The log of an interrupted flight ends with the last flown row and has no verdict; `planfly check` can judge it.  A
+    log without rows is removed.  After any other error, the log stays unfinished, and `planfly recover` can read its
+    rows.
 
     end_reason: reason for the end that the log of an interrupted flight states.
 
@@ -377,7 +380,7 @@ class CrashSafeRecorder(Recorder):
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Close a log whose flight has not been judged, and release its lock."""
+        """Close a log that is still open, with an end if the flight was interrupted, and release its lock."""
         with self._locks, delay_signals():
             if not self._is_open:
                 return
@@ -419,7 +422,7 @@ class CrashSafeRecorder(Recorder):
 def _chunk_contents(layout: Layout) -> Iterator[ChunkContent]:
     """Yield the content of each chunk of a layout."""
     records, index = memoryview(layout.records), layout.index.tobytes()  # type: ignore[arg-type]  # an array is a buffer
-    # Converting to lists first is faster than reading the fields chunk by chunk, which costs a microsecond each.
+    # Lists are faster than arrays here: reading a field of one chunk from an array takes a microsecond.
     bounds = {name: layout.chunks[name].tolist() for name in CHUNK.names or ()}
     offsets = layout.channels["offset"].tolist()
     messages = layout.channels["messages"].tolist()
@@ -438,7 +441,7 @@ def _chunk_contents(layout: Layout) -> Iterator[ChunkContent]:
 
 
 def thin_track(track: Track, every: int) -> Track:
-    """Return the rows that a `Recorder` with ``every`` records: every n-th row, and the last row.
+    """Return the rows that a `Recorder` with the same `every` records: every n-th row, and the last row.
 
     >>> from logs.recording.example_log import example_log
     >>> thin_track(example_log().track, 100).time

@@ -1,6 +1,6 @@
 """Recover the readable part of an unfinished or damaged log, as a file that any MCAP reader opens.
 
-The new log carries a note on the loss, so that it always reads as incomplete.
+The new log contains a note on the loss, so that it is always read as incomplete.
 """
 
 import io
@@ -19,7 +19,11 @@ RECOVERY_SCHEMA = "planfly.recovery/1"
 
 @dataclass(frozen=True, slots=True)
 class RecoveredLog:
-    """A recovered log: its bytes, and its flight."""
+    """Recovered log.
+
+    data: bytes of the new file.
+    log: flight that the new file contains.
+    """
 
     data: bytes
     log: FlightLog
@@ -55,7 +59,7 @@ def recover_log(path: Path) -> RecoveredLog | None:
         try:
             writer.copy_chunk(chunk)
         except PARSE_ERRORS:
-            # The reader stopped here, too.
+            # `read_log` stopped at this chunk, too.
             break
     note = {"schema": RECOVERY_SCHEMA, "lost": log.lost, "rows": len(log.track), "end_time_s": log.end_time}
     text = (json.dumps(note, indent=1) + "\n").encode()
@@ -65,7 +69,7 @@ def recover_log(path: Path) -> RecoveredLog | None:
 
 
 def _intact_chunks(path: Path) -> tuple[Container, list[bytes]]:
-    """Return the container (with the attachments) and the chunks of a log that precede its damage."""
+    """Return the attachments (in a `Container`) and the chunks of a log that precede its first damage."""
     container = Container()
     with path.open("rb") as file:
         file.seek(len(MAGIC))

@@ -95,7 +95,7 @@ _MAX_PART_HEIGHTS = 4 * 2**20
 
 
 class _TerrainFile(SetupModel):
-    """Content of `terrain.json`: size, source and position of the terrain, and the names of its height parts."""
+    """Content of `terrain.json`: size, source and position of the terrain, and its height parts."""
 
     model_config = ConfigDict(validate_by_name=True, validate_by_alias=True)
     file_schema: Annotated[str, Field(alias="schema", pattern=f"^{TERRAIN_SCHEMA}$")] = TERRAIN_SCHEMA
@@ -170,13 +170,13 @@ def unpack_terrain(attachments: dict[str, bytes], source: str) -> Terrain:
 
 
 def _row_blocks(rows: int, cols: int) -> list[tuple[int, int]]:
-    """Return the first row and the end row of the heights in each attachment."""
+    """Return the first row of the terrain's heights in each attachment, and the row after the last."""
     step = max(1, _MAX_PART_HEIGHTS // cols)
     return [(first, min(rows, first + step)) for first in range(0, rows, step)]
 
 
 def _pack_heights(heights: NDArray[np.float32]) -> bytes:
-    """Compress heights without loss, as differences of their bits in byte planes."""
+    """Compress heights without loss, with the encoding `_ENCODING`."""
     bits = np.ascontiguousarray(heights, dtype="<f4").view("<u4")
     bits = np.diff(bits, axis=1, prepend=np.zeros((len(bits), 1), dtype="<u4"))
     planes = np.ascontiguousarray(bits.reshape(-1, 1).view(np.uint8).T)
@@ -184,10 +184,10 @@ def _pack_heights(heights: NDArray[np.float32]) -> bytes:
 
 
 def _unpack_heights(data: bytes, rows: int, cols: int, name: str) -> NDArray[Any]:
-    """Decompress heights; raise LogError if the data are damaged or their size differs."""
+    """Decompress the result of `_pack_heights`; raise LogError for damaged data or another size."""
     size = rows * cols * 4
     try:
-        # Use a reader, not decompress(): the size declared by the frame cannot be trusted.
+        # The reader limits the size; decompress() would trust the size that the data declare.
         raw = zstandard.ZstdDecompressor(max_window_size=2**27).stream_reader(data).read(size + 1)
     except zstandard.ZstdError as error:
         raise LogError(f"{name}: cannot be decompressed: {error}", file=name) from error
@@ -198,7 +198,7 @@ def _unpack_heights(data: bytes, rows: int, cols: int, name: str) -> NDArray[Any
 
 
 def _check_coefficients(rows: list[list[float]], source: str) -> NDArray[np.float64]:
-    """Return the coefficients of the map as an array; raise LogError if their shape is invalid."""
+    """Return the coefficients of the map to pixels as an array; raise LogError for invalid ones."""
     size = len(rows[0])
     if len(rows) != 2 + 2 * size or any(len(row) != size for row in rows) or size < 2:
         shape_text = f"{len(rows)} rows of {size}"
@@ -239,7 +239,7 @@ _FIELD_ENCODING = "float64, little endian, zstd: counts (t, y, x, k), axes, and 
 
 
 class _ForecastFile(SetupModel):
-    """Content of `forecast.json`: what is said of the forecast, and whether the wind deviates from its mean profile."""
+    """Content of `forecast.json`: facts about the forecast, and the number of values of its wind field."""
 
     model_config = ConfigDict(validate_by_name=True, validate_by_alias=True)
     file_schema: Annotated[str, Field(alias="schema", pattern=f"^{FORECAST_SCHEMA}$")] = FORECAST_SCHEMA
@@ -261,7 +261,7 @@ class _ForecastFile(SetupModel):
 
 
 def pack_forecast(wind: Wind) -> dict[str, bytes]:
-    """Encode the forecast of a wind as attachments, bytes by name; none for a stated wind."""
+    """Encode the forecast of a wind as attachments, bytes by name; {} for a stated wind."""
     if wind.forecast is None:
         return {}
     numbers = np.empty(0) if wind.field is None else wind.field.packed()
@@ -327,7 +327,7 @@ class _SetupFile(SetupModel):
 
 @dataclass(frozen=True, slots=True)
 class StoredSetup:
-    """A setup as recorded, with the versions of the packages of its flight."""
+    """Setup from a log, with the versions of the packages with which it was flown."""
 
     setup: FlightSetup
     versions: dict[str, str]
@@ -335,7 +335,7 @@ class StoredSetup:
 
 @functools.cache
 def _cached_versions() -> tuple[tuple[str, str], ...]:
-    """Return the versions of the packages, which are looked up only once."""
+    """Return names and versions of the packages, which are looked up only once."""
     return tuple(_find_versions().items())
 
 
@@ -451,7 +451,7 @@ def unpack_setup(attachments: dict[str, bytes], source: str) -> StoredSetup:
 
 
 def _read_autopilot(file: _SetupFile, file_name: str) -> Autopilot:
-    """Rebuild the autopilot; raise LogError if its parameters or its name are invalid."""
+    """Rebuild the autopilot from `setup.json`; raise LogError if its parameters or its name are invalid."""
     stored_autopilot = StoredAutopilot(
         file.guidance,
         None if file.parameters is None else read_parameters(file.parameters),
@@ -494,7 +494,7 @@ def _decode_text(attachments: dict[str, bytes], name: str, source: str) -> str:
 
 
 def _read_scenario(attachments: dict[str, bytes], source: str, terrain: Terrain | None, external: bool) -> Scenario:
-    """Rebuild the scenario with the log's own terrain; raise LogError if it is invalid."""
+    """Rebuild the scenario with the terrain from the log; raise LogError if it is invalid."""
     file_name = f"{source}: {SCENARIO_FILE}"
     try:
         spec = json.loads(_decode_text(attachments, SCENARIO_FILE, source))
@@ -510,7 +510,7 @@ def _read_scenario(attachments: dict[str, bytes], source: str, terrain: Terrain 
 
 
 def _read_plan(attachments: dict[str, bytes], source: str, terrain: Terrain | None) -> Plan:
-    """Rebuild the plan with the log's own terrain; raise LogError if it is invalid."""
+    """Rebuild the plan with the terrain from the log; raise LogError if it is invalid."""
     file_name = f"{source}: {PLAN_FILE}"
     text = _decode_text(attachments, PLAN_FILE, source)
     try:

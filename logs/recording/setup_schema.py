@@ -1,9 +1,9 @@
 """The tables of `setup.json`: mission, route, envelope and parameters of a `FlightSetup`.
 
-A table has the fields of its dataclass under keys with units: pydantic writes it from the attributes of the dataclass,
-and the dataclass is made from its values. Numbers are written as Python's repr, which reads back to the same float.
+A table has the fields of its dataclass under keys with units.  pydantic writes it from the attributes of the dataclass,
+and the dataclass is made from its values.  Numbers are written as Python's repr, which reads back to the same float.
 
-cattrs 26 needs as many lines to rename fields, but reads 1.7 as the integer 1, "12" as a number and NaN as any number.
+cattrs 26 needs as many lines to rename fields, but reads 1.7 as the integer 1, "12" as a number, and NaN as any number.
 """
 
 from dataclasses import fields
@@ -35,7 +35,7 @@ _Position = Annotated[list[Finite], Field(min_length=3, max_length=3)]
 # A height or another value that may be unknown: NaN in the dataclass, null in the file.
 _Height = Annotated[Finite | None, BeforeValidator(lambda value: None if value != value else value)]
 
-# Number of a waypoint or an item in the file where the dataclass has None.
+# Number in the file for a waypoint or an item that is None in the dataclass.
 _NO_NUMBER = -1
 _Number = Annotated[
     Annotated[int, Field(ge=0)] | None,
@@ -59,16 +59,17 @@ class SetupModel(BaseModel):
         return cls.model_validate(value, from_attributes=True, by_alias=False, by_name=True)
 
     def fault(self, file: str, field: str, message: str) -> LogError:
-        """Return the error for a field, which is named by its key in the file.
+        """Return the error for a field; the message names the field by its key in the file.
 
         file: name of the log for the message.
+        field: name of the field in the dataclass.
         """
         key = f"{self.name}.{type(self).model_fields[field].alias or field}"
         return LogError(f"{file}: {key}: {message}", file=file, field=key)
 
 
 def _make_from_table(data_class: type[Data], table: SetupModel, **replacements: Any) -> Data:
-    """Make a dataclass from the values of a table; ``replacements`` take precedence."""
+    """Make a dataclass from the values of a table; `replacements` replace fields of the table."""
     return data_class(**(dict(table) | replacements))
 
 
@@ -141,7 +142,7 @@ class MissionTable(SetupModel):
 
 
 class RouteTable(SetupModel):
-    """A `Route` as a table: the fields of its points are columns, with one value a waypoint, and for airspeed a leg."""
+    """A `Route` as a table: one column per field of its points, one value per waypoint (airspeed: leg)."""
 
     name = "route"
     position: Annotated[list[_Position], Field(min_length=2, alias="waypoints_east_north_amsl_m"), _LISTED]
@@ -171,7 +172,7 @@ class RouteTable(SetupModel):
     @model_validator(mode="before")
     @classmethod
     def _columns_of_points(cls, value: Any) -> Any:
-        """Return the values of a route by name, with its points as columns; any other value unchanged."""
+        """Return the fields of a `Route` by name, its points as columns; return other values unchanged."""
         if not isinstance(value, Route):
             return value
         columns = {name: value.points[name] for name in field_names(ROUTE_POINT)} | {"airspeed": value.leg_airspeeds}
@@ -207,7 +208,7 @@ class RouteTable(SetupModel):
 
 
 class EnvelopeTable(SetupModel):
-    """An `Envelope` as a table; its power is empty if unknown."""
+    """An `Envelope` as a table; the tables of power are empty if the power is unknown."""
 
     name = "envelope"
     aircraft: str

@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 # ----------------------------------------------------------------------
 # Many protobuf messages of doubles at once, as numpy structured arrays of their encoding.
 #
-# Message objects of the protobuf library cost some microseconds each: ten thousand of them cost as much as minutes of
-# flight.
+# Message objects of the protobuf library take some microseconds each.  Ten thousand of them take as long as the
+# simulation of minutes of flight.
 
 # Wire type of a 64-bit value.
 _FIXED64 = 1
@@ -39,7 +39,7 @@ _LENGTH_DELIMITED = 2
 
 
 def tagged_doubles(names: Sequence[str]) -> list[tuple[str, str]]:
-    """Return the numpy fields of doubles, each after its one-byte tag ``tag_<name>``."""
+    """Return the numpy fields of doubles, each after a one-byte field `tag_<name>` for its protobuf tag."""
     return [field for name in names for field in ((f"tag_{name}", "u1"), (name, "<f8"))]
 
 
@@ -49,7 +49,7 @@ def submessage_dtype(names: Sequence[str]) -> np.dtype[np.void]:
 
 
 def fill_doubles(out: Encoded, names: Sequence[str], values: Floats) -> None:
-    """Write values (n, m), each after its tag, into ``out``, (n,).
+    """Write values (n, m), each after its protobuf tag, into `out`, (n,).
 
     names: names of the m fields, which have the numbers 1 to m.
     """
@@ -58,7 +58,7 @@ def fill_doubles(out: Encoded, names: Sequence[str], values: Floats) -> None:
 
 
 def fill_submessages(out: Encoded, field_number: int, names: Sequence[str], values: Floats) -> None:
-    """Write a submessage of doubles into ``out`` for each row of values (n, m).
+    """Write a submessage of doubles into `out` for each row of values (n, m).
 
     out: (n,) of type `submessage_dtype`.
     field_number: field number of the submessage in its parent message.
@@ -75,7 +75,7 @@ def repeated_submessages(field_number: int, names: Sequence[str], values: Floats
 
 
 def length_delimited(field_number: int, data: bytes) -> bytes:
-    """Encode the bytes of a submessage as the field ``field_number`` of its parent message."""
+    """Encode the bytes of a submessage as the field `field_number` of its parent message."""
     size, head = len(data), bytearray([field_number << 3 | _LENGTH_DELIMITED])
     while size > 127:
         head.append(size & 127 | 128)
@@ -89,7 +89,7 @@ def as_bytes(messages: NDArray[Any]) -> NDArray[np.uint8]:
     return np.ascontiguousarray(messages).view(np.uint8).reshape(len(messages), messages.dtype.itemsize)
 
 
-# log_time of simulation time 0: 2000-01-01T00:00:00Z in ns since 1970.  Not 0, which MCAP reads as "no messages".
+# Log time at simulation time 0: 2000-01-01T00:00:00Z in ns since 1970.  It is not 0, which in MCAP means "no messages".
 EPOCH_NS = 946_684_800_000_000_000
 
 STATE_NAME = "planfly.State"
@@ -111,7 +111,7 @@ class StateField(NamedTuple):
     """A field of the message.
 
     name: name with its unit.
-    kind: its numpy type.
+    kind: numpy type.
     source: field of `Track` with the values.
     component: column of that field; None for a field of one column.
     """
@@ -179,19 +179,19 @@ RECORD = np.dtype(
 
 
 def state_class() -> "type[Message]":
-    """Return the protobuf class of a state message, in its own pool."""
+    """Return the protobuf class of a state message, from a descriptor pool of its own."""
     pool = descriptor_pool.DescriptorPool()
     pool.Add(STATE_FILE)
     return message_factory.GetMessageClass(pool.FindMessageTypeByName(STATE_NAME))
 
 
 def state_schema() -> bytes:
-    """Return the FileDescriptorSet of the state message, as MCAP embeds it."""
+    """Return the serialized FileDescriptorSet of the state message, which MCAP embeds as the schema."""
     return descriptor_pb2.FileDescriptorSet(file=[STATE_FILE]).SerializeToString(deterministic=True)
 
 
 def file_descriptor_set(descriptor: "Descriptor") -> bytes:
-    """Return the FileDescriptorSet of a message, with each file after the files that it imports."""
+    """Return the serialized FileDescriptorSet of a message; each file comes after its imports."""
     files: dict[str, FileDescriptor] = {}
 
     def visit(file: "FileDescriptor") -> None:
@@ -214,7 +214,7 @@ def times_ns(time: NDArray[np.float64]) -> NDArray[np.int64]:
 
 
 def _make_template() -> StateRecords:
-    """Make a record of one state message with all tags and lengths set."""
+    """Make a message record of one state message with all tags and lengths set, and values of 0."""
     row: StateRecords = np.zeros(1, dtype=RECORD)
     row["opcode"] = MESSAGE_OPCODE
     row["length"] = MESSAGE_HEADER + STATE_BODY.itemsize
@@ -251,7 +251,7 @@ def encode_rows(rows: NDArray[np.record], first_row: int, channel: int) -> State
 def join_records(parts: list[StateRecords], kind: np.dtype[np.void]) -> StateRecords:
     """Join arrays of one structured type.
 
-    They are joined as bytes, because numpy compares structured types name by name.
+    They are joined as bytes, because numpy would compare the structured types name by name, which takes longer.
     """
     if not parts:
         return np.zeros(0, dtype=kind)
@@ -281,7 +281,12 @@ def parse_row(data: bytes, parser: "type[Message]") -> StateRecords:
 
 @compiled
 def _count_matching(raw: Bytes, columns: NDArray[np.int64], expected: Bytes) -> int:
-    """Count the leading records (rows of bytes) that have the expected bytes in these columns."""
+    """Count the leading records that have the expected bytes.
+
+    raw: bytes of the records, (n, size).
+    columns: positions of the compared bytes in a record, (k,).
+    expected: expected bytes at these positions, (k,).
+    """
     for row in range(len(raw)):
         for k in range(len(columns)):
             if raw[row, columns[k]] != expected[k]:
@@ -293,7 +298,10 @@ class RowMatcher:
     """Finder of successive state messages of the known layout in the bytes of a chunk."""
 
     def __init__(self, channel: int) -> None:
-        """Prepare for a file.  channel: MCAP channel of its state messages."""
+        """Prepare for a file.
+
+        channel: MCAP channel of the file's state messages.
+        """
         sample = _TEMPLATE.copy()
         sample["channel"] = channel
         fixed_mask: StateRecords = np.zeros(1, dtype=RECORD)
@@ -304,7 +312,7 @@ class RowMatcher:
         self._expected = sample.view(np.uint8)[self._columns]
 
     def match(self, data: bytes, offset: int) -> StateRecords:
-        """Return the successive records with this layout from ``offset`` on, (n,) of `RECORD`."""
+        """Return the successive records with the known layout from byte `offset` on, (n,) of `RECORD`."""
         count = (len(data) - offset) // RECORD.itemsize
         raw = np.frombuffer(data, np.uint8, count * RECORD.itemsize, offset).reshape(count, RECORD.itemsize)
         matching_count = _count_matching(raw, self._columns, self._expected)

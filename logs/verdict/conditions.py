@@ -38,7 +38,7 @@ _AIRSPEED_SOURCE_TEXTS: dict[AirspeedSource, str] = {
 
 @dataclass(frozen=True, slots=True)
 class Conditions(DocumentConfig):
-    """Conditions of a verdict or a plan; fields that the log of an imported flight does not state are None."""
+    """Conditions of a verdict or a plan; None for a field that the log of an imported flight lacks."""
 
     aircraft: str
     """Name or folder of the aircraft; empty for an imported flight without a named aircraft."""
@@ -84,7 +84,7 @@ def plan_conditions(scenario: Scenario, aircraft: str, airspeed: float, autopilo
     """
     flight_table, wind, terrain = scenario.flight, scenario.wind, scenario.terrain
     mass = None
-    # The aircraft of a log may not be on this machine.
+    # The mass is unknown if the aircraft of a log is not installed on this machine.
     with suppress(FlightError):
         mass = find_logged_aircraft(aircraft, flight_table.aircraft).mass
     east, north = scenario.wind_velocity(scenario.start.tolist())
@@ -116,14 +116,14 @@ def plan_conditions(scenario: Scenario, aircraft: str, airspeed: float, autopilo
 
 
 def _autopilot_source(flight_table: FlightTable) -> str:
-    """Return a clause that names the file from which the autopilot was taken; "" if it was named or is the default."""
+    """Return a clause on the file that decided the autopilot; "" for a named or default autopilot."""
     if flight_table.autopilot_from is None or flight_table.steering.autopilot == DEFAULT_AUTOPILOT:
         return ""
     return f"; taken from {flight_table.autopilot_from}, because no autopilot was named"
 
 
 def _airspeed_source(scenario: Scenario, autopilot: Autopilot) -> AirspeedSource:
-    """Name the source of the cruise airspeed: the scenario, else the parameter file, else the aircraft."""
+    """Return the source of the cruise airspeed, in this order: scenario, parameter file, aircraft."""
     if scenario.flight.airspeed_mps is not None:
         return "scenario"
     stated_airspeed = autopilot.stated_value(autopilot.speeds.cruise_parameter)
@@ -131,7 +131,7 @@ def _airspeed_source(scenario: Scenario, autopilot: Autopilot) -> AirspeedSource
 
 
 def judging_conditions(setup: FlightSetup) -> Conditions:
-    """Return the conditions (aircraft, airspeed, wind, autopilot) under which a flight or unflown mission is judged."""
+    """Return the conditions under which a mission or a flight is judged, from its setup."""
     conditions = plan_conditions(setup.scenario, setup.aircraft, setup.airspeed, setup.autopilot)
     conditions = replace(conditions, navigation=setup.nav, zones=len(judged_airspace(setup).zones))
     imported_log = setup.imported_log
@@ -151,7 +151,7 @@ def judging_conditions(setup: FlightSetup) -> Conditions:
 
 
 def condition_lines(conditions: Conditions) -> list[str]:
-    """Return a line on the aircraft and its airspeed, and a line on wind, turbulence, navigation, terrain and zones."""
+    """Return the line on aircraft and airspeed, and the line on weather, navigation, terrain and zones."""
     return [_aircraft_line(conditions), _world_line(conditions)]
 
 
@@ -221,10 +221,9 @@ _SAME_LINE_DISTANCE_M = 1.0
 def corridor_line(setup: FlightSetup, findings: Sequence[Finding]) -> str:
     """Return a line on a corridor whose width the scenario does not state; "" if the scenario states it.
 
-    The line states the width of the corridor, where it comes from, and the legs along which turns or loiters make it
-    wider.  It warns if the corridor is wider than the distance between legs: a flight within such a corridor may never
-    have followed the legs' lines.  Surveys also get "", because their photo lines are judged one by one.
-
+    The line states the corridor's width, its source, and how many legs have a wider corridor because of turns or
+    loiters.  It warns if the corridor is wider than the distance between legs, because a flight within it may never
+    have followed the legs.  The line is "" for surveys, whose photo lines are judged one by one.
     findings: findings of the verdict, which contain the corridor of each leg.
     """
     half_width, radius = setup.corridor, setup.autopilot.turns.acceptance_radius or 0.0
@@ -258,10 +257,10 @@ def corridor_line(setup: FlightSetup, findings: Sequence[Finding]) -> str:
 
 
 def min_leg_spacing(waypoints: NDArray[np.float64]) -> tuple[float, int] | None:
-    """Return the smallest distance between parallel legs two legs apart, m, and the number of the first.
+    """Return the smallest distance between side-by-side legs k and k + 2 (m), and the number k.
 
-    Only legs that lie side by side are compared: their courses are parallel or opposite within `_PARALLEL_ANGLE_RAD`,
-    and at least half of the shorter leg lies next to the longer leg.  The result is None if there are no such legs.
+    Their courses are parallel or opposite within `_PARALLEL_ANGLE_RAD`, and at least half of the shorter leg lies next
+    to the longer leg.  Return None if there are no such legs.
 
     waypoints: east, north and up, m, (w, 3).
 
@@ -286,5 +285,5 @@ def min_leg_spacing(waypoints: NDArray[np.float64]) -> tuple[float, int] | None:
         if min(leg_length, overlap[1]) - max(0.0, overlap[0]) >= 0.5 * min(leg_length, other_length):
             offset = 0.5 * (other_start + other_end) - start
             spacings.append((abs(float(direction[0] * offset[1] - direction[1] * offset[0])), k))
-    # A line that is flown twice is not a survey.
+    # Legs on the same line are one line flown twice, not neighbours.
     return min((pair for pair in spacings if pair[0] >= _SAME_LINE_DISTANCE_M), default=None)

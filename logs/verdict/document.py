@@ -146,7 +146,7 @@ def deciding_document(deciding: DecidingParameter) -> DecidingDocument:
 
 
 def parameters_document(parameters: Parameters) -> ParametersDocument:
-    """Return the parameters as a document: their values and origins, and file entries without an effect."""
+    """Return the parameters as a document: values, origins, and entries of the file without an effect."""
     return ParametersDocument(
         file=parameters.source,
         values=tuple(ParameterDocument(**value._asdict()) for value in parameters.values),

@@ -18,9 +18,9 @@ from world.json_schema import DocumentConfig
 
 # Fact of a slope finding: the largest error of the height above ground that its leg follows.
 GROUND_FOLLOWING_ERROR = "error of the height above ground"
-# Fact of a slope finding: how long the pitch was at the autopilot's limit.
+# Fact of a slope finding: time with the pitch at the autopilot's limit.
 PITCH_LIMIT_TIME = "pitch at its limit"
-# Fact of a slope finding: the steepest slope that the aircraft can fly, where the leg or its arc exceeds it.
+# Fact of a slope finding: steepest slope that the aircraft can fly, if the leg or its arc exceeds it.
 AIRCRAFT_SLOPE = "steepest slope of the aircraft"
 
 # Values of `Finding.check` for unjudged findings that leave the verdict undecided.
@@ -34,10 +34,10 @@ GROUND_PATH = "ground way"
 NOT_FLOWN = "not flown"
 # Returns or glides that a scenario requires are not known well enough.
 UNKNOWN_RETURN = "unknown return"
-# A mission without a home does not state where the return after its last item leads.  The verdict stays flyable, as
+# Without a home, the destination of the return after the last item is unknown.  The verdict may still be "flyable", as
 # without elevation data.
 NO_HOME = "no home"
-# Checks on which a flight gives no evidence, so that a flight may pass without them.
+# Checks that a flight cannot decide.  A flight may pass although they are undecided.
 APART_FROM_FLIGHT = (GROUND_PATH, UNKNOWN_RETURN)
 _UNDECIDED = (UNKNOWN_AIRCRAFT, UNKNOWN_PATH, NOT_FLOWN, *APART_FROM_FLIGHT)
 
@@ -63,7 +63,7 @@ class Finding:
 
     rule: a name of `logs.verdict.rule_words.RULE_WORDS`.
     place: place of the finding.
-    planned, flown, limit, tolerance, margin: in `unit`, None if there is no such number.
+    planned, flown, limit, tolerance, margin: numbers in `unit`; None if there is no such number.
     margin: distance inside the limit without the tolerance; negative beyond the limit.
     limit_source: "scenario", "aircraft", or another source of the limit.
     method: how the numbers were obtained.
@@ -130,9 +130,9 @@ class Finding:
 
     @property
     def value(self) -> float | None:
-        """Value that was compared with the limit: the flown or the planned one, whichever matches the margin.
+        """Value that was compared with the limit: the flown or planned value, whichever fits the margin.
 
-        Without a limit or a margin, it is the flown value, or else the planned one; None if there is neither.
+        Without a limit or a margin, it is the flown value, or else the planned value; None if both are missing.
         """
         if self.flown is None or self.planned is None or self.limit is None or self.margin is None:
             return self.planned if self.flown is None else self.flown
@@ -141,9 +141,9 @@ class Finding:
 
     @property
     def nearest(self) -> float | None:
-        """Distance outside the nearest missile sphere or fence zone, m, negative inside; None if not known.
+        """Distance outside the nearest missile sphere or fence zone, m, negative inside; None if unknown.
 
-        Only findings of the rules threat and fence have it, as one of their facts.
+        Only findings of the rules `threat` and `fence` have this fact.
         """
         return next((fact.value for fact in self.facts if fact.what == "nearest"), None)
 
@@ -157,7 +157,7 @@ class Finding:
         return self.compared_texts()[1]
 
     def compared_texts(self) -> tuple[str, str]:
-        """Return the value and the passing values as texts, with enough digits to show which side it is on."""
+        """Return the value and the range of passing values as texts, with enough digits to tell the two apart."""
         value, limit = self.value, self.effective_limit
         if value is None or limit is None:
             texts = ["" if number is None else quantity_text(number, self.unit) for number in (value, limit)]
@@ -185,7 +185,7 @@ class Finding:
     def place_and_value(self) -> str:
         """Text of the place with the value, if there is one, such as "leg 4 (12.3 m)".
 
-        If a failed finding's value is within its limit, it fails for another reason, which then replaces the value.
+        A finding without a margin did not fail because of its value; its brief reason then replaces the value.
         """
         value = self.compared_texts()[0] if self.margin is not None else shorten_statement(self.brief)
         return self.where + (f" ({value})" if value else "")
@@ -198,8 +198,10 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class Message:
-    """A message of a rule: the full text, and its brief first part for a headline.
+    """Message of a rule.
 
+    text: full text.
+    brief: first part of the text, for a headline.
     placed: True if the message begins with the finding's place.
     """
 
@@ -208,19 +210,19 @@ class Message:
     placed: bool = False
 
 
-def message(brief: str, rest: str = "", *, placed: bool = False) -> Message:
-    """Make a message from its brief first part and the rest of the text.
+def message(brief: str, explanation: str = "", *, placed: bool = False) -> Message:
+    """Make a message from a brief statement and an explanation, which begins with its punctuation.
 
     placed: True if the message begins with the finding's place.
 
     >>> message("overshoots its arc by 8 m", " (at most 5 m)").text
     'overshoots its arc by 8 m (at most 5 m)'
     """
-    return Message(brief + rest, brief, placed)
+    return Message(brief + explanation, brief, placed)
 
 
 def undecided_findings(findings: Iterable[Finding]) -> tuple[Finding, ...]:
-    """Return the findings that leave the verdict undecided, such as findings on an insufficiently known aircraft.
+    """Return the findings that leave the verdict undecided, such as findings on an uncertain aircraft.
 
     >>> slope = make_finding("slope", Place("leg", 1), ok=None, reason="", check=UNKNOWN_AIRCRAFT)
     >>> undecided_findings([slope]) == (slope,)
@@ -273,9 +275,10 @@ def make_finding(
 
     faults: faults with which the reason begins.
     facts: further measured numbers; non-finite numbers are omitted.
-    at_least: True if values of at least the limit pass.  The margin is dropped if it contradicts the result: a finding
-        that fails although its number is within the limit and tolerance fails for another reason.  A finding that
-        passes although its number is beyond them passes for another reason.
+    at_least: True if values of at least the limit pass.
+
+    The margin is dropped if it contradicts `ok`, because the finding then fails or passes for another reason than its
+    number.
 
     >>> make_finding("speed", Place("leg", 2), ok=False, reason="too slow", limit=16.0, margin=0.5).margin is None
     True
@@ -313,7 +316,7 @@ def _rounded_or_none(value: float | None) -> float | None:
 
 
 def worst_first_key(finding: Finding) -> tuple[int, float]:
-    """Return a sort key that puts the worst finding first: failed, unjudged, then passed; each sorted by margin.
+    """Return a sort key that puts the worst finding first: failed, unjudged, passed; each by margin.
 
     >>> near, far = (make_finding("slope", Place("leg", 1), ok=True, reason="", margin=m) for m in (4.0, 9.0))
     >>> worst_first_key(near) < worst_first_key(far)

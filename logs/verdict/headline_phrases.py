@@ -11,11 +11,14 @@ HeadlinePhrase = Callable[[str, Finding], str]
 
 
 def _with_place(noun: str, finding: Finding, text: str) -> str:
-    """Join a rule's noun, the finding's place (unless it is the whole flight or mission), and a text in brackets."""
+    """Join a rule's noun, a place and a text in brackets: "slope on leg 0 (14.5° > 14.2°)".
+
+    A place that is the whole flight, plan or mission is left out.
+    """
     place = finding.place
     if place.kind in ("flight", "plan", "mission"):
         return f"{noun_with_place(noun, place)} ({text})"
-    # The item is outside brackets, so that the text follows in the only brackets.
+    # The item is separated by a comma, so that only `text` is in brackets.
     item_text = "" if place.item is None else f", item {place.item}"
     place_name = place_text(replace(place, item=None)) + item_text
     return f"{noun} {'at' if place.kind == 'waypoint' else 'on'} {place_name} ({text})"
@@ -32,14 +35,17 @@ def event_phrase(noun: str, finding: Finding) -> str:
 
 
 def return_phrase(noun: str, finding: Finding) -> str:
-    """Return the statement on a return after the last item; for the whole flight, a phrase with the reason."""
+    """Return the brief reason of a return after the last item; otherwise a phrase with the reason."""
     if finding.place.kind == "waypoint":
         return shorten_statement(finding.brief)
     return reason_phrase(noun, finding)
 
 
 def shortfall_phrase(noun: str, finding: Finding) -> str:
-    """Return a phrase such as "speed on leg 2 (11.9 m/s < 12 m/s)"; the reason if no value is too low."""
+    """Return a phrase such as "speed on leg 2 (11.9 m/s < 12 m/s)".
+
+    Without a value that is too low, the phrase contains the reason instead.
+    """
     value, limit = finding.value, finding.effective_limit
     if value is None or limit is None or value >= limit:
         return reason_phrase(noun, finding)
@@ -47,9 +53,11 @@ def shortfall_phrase(noun: str, finding: Finding) -> str:
 
 
 def excess_phrase(noun: str, finding: Finding) -> str:
-    """Return a phrase such as "slope on leg 0 (14.5° > 14.2°)", with the value of the margin, or else the worse one.
+    """Return a phrase such as "slope on leg 0 (14.5° > 14.2°)".
 
-    If the value is within the limit, return a phrase with the reason.
+    Without a value that exceeds the limit, the phrase contains the reason instead.
+    The value is the one that was compared with the limit.  Without a margin, it is the larger of the flown and the
+    planned value.
     """
     values = [value for value in (finding.flown, finding.planned) if value is not None]
     worst_value = max(values, key=abs, default=None) if finding.margin is None else finding.value
@@ -61,7 +69,10 @@ def excess_phrase(noun: str, finding: Finding) -> str:
 
 
 def slope_phrase(noun: str, finding: Finding) -> str:
-    """Return a phrase with the reason if no slope can be flown on the leg, else the `excess_phrase`."""
+    """Return a phrase with the reason if the limit is 0°; otherwise return `excess_phrase`.
+
+    With a limit of 0°, the aircraft can fly no slope.
+    """
     return reason_phrase(noun, finding) if finding.limit == 0.0 else excess_phrase(noun, finding)
 
 
@@ -77,7 +88,10 @@ def small_circle_phrase(noun: str, finding: Finding) -> str:
 
 
 def zone_phrase(noun: str, finding: Finding) -> str:
-    """Return a phrase such as "town (exclusion) violated (12.0 m inside)"; else `excess_phrase`."""
+    """Return a phrase such as "town (exclusion) violated (12.0 m inside)".
+
+    Return `excess_phrase` for a place without a name.
+    """
     if not finding.place.name:
         return excess_phrase(noun, finding)
     depth = max(finding.flown or 0.0, finding.planned or 0.0)
@@ -101,8 +115,8 @@ def photo_line_phrase(noun: str, finding: Finding) -> str:
 def missed_waypoint_phrase(_noun: str, finding: Finding) -> str:
     """Return a phrase such as "waypoint 3 missed (120 m > 50 m)".
 
-    The distances are left out if the waypoint was never passed.  If the finding has its own brief reason, the phrase is
-    the place and this reason.
+    The distances are left out if the waypoint was never passed.  A brief reason other than the full reason replaces
+    "missed".
     """
     if finding.flown is not None and finding.brief != finding.reason:
         return f"{place_text(finding.place)} {finding.brief}"

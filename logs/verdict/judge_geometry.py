@@ -19,7 +19,7 @@ from planner.plan import Plan, Violation
 
 
 def judge_geometry(setup: FlightSetup, requirements: RouteRequirements | None = None) -> Verdict:
-    """Judge a route by its geometry and the aircraft's envelope, without a flight, at the level "geometric".
+    """Judge a route by its geometry and the aircraft's envelope, at the level "geometric".
 
     requirements: the setup's route requirements if already known.
 

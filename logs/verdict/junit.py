@@ -1,4 +1,4 @@
-"""Write answers as JUnit XML for continuous integration: of a verdict, a case for each finding and for the answer."""
+"""Write answers as JUnit XML for continuous integration; a verdict has a case for its answer and for each finding."""
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
@@ -60,8 +60,8 @@ def suites_text(suites: Iterable[JunitSuite]) -> str:
 def _case_element(case: JunitCase, suite_name: str) -> ElementTree.Element:
     """Make the XML element of a test case.
 
-    The class states the suite, because many programs tell cases apart by class and name only.  They split a class at
-    its dots, so that a dot in the name of a file is replaced.
+    The class name contains the suite, because many programs distinguish cases only by class and name.  Dots in the
+    suite's name are replaced, because these programs split a class at its dots.
     """
     package, *rule = case.classname.split(".")
     element = ElementTree.Element(
@@ -111,12 +111,15 @@ def junit_error_text(name: str, message: str) -> str:
 
 
 def answer_case(reason: str) -> JunitCase:
-    """Make the test case of an answer. reason: reason why it fails; "" if it passes."""
+    """Make the test case of an answer.
+
+    reason: reason why the answer fails; "" if it passes.
+    """
     return JunitCase("planfly", "verdict", "failure" if reason else "passed", reason)
 
 
 def _finding_cases(findings: tuple[Finding, ...]) -> list[JunitCase]:
-    """Make one test case, with a unique name, for each finding; skip unjudged findings."""
+    """Make one test case, with a unique name, for each finding; an unjudged finding is "skipped"."""
     counts: Counter[tuple[str, str]] = Counter()
     cases = []
     for finding in findings:

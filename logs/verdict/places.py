@@ -108,7 +108,7 @@ class ItemMove(DocumentConfig):
 
 @dataclass(frozen=True, slots=True)
 class RemainingFinding(DocumentConfig):
-    """Finding that is open after a change, on a part of the mission that was not judged, or that failed, before."""
+    """Finding that still fails or is undecided after a change, on a part not judged or failed before."""
 
     rule: str
     place: Place
@@ -225,7 +225,7 @@ class TriedSuggestions(DocumentConfig):
 
 @dataclass(frozen=True, slots=True)
 class ReferenceFlights(DocumentConfig):
-    """Results of reference flights for the judged flight; they are stored in its log, because they are not flown again.
+    """Results of reference flights, stored in the log of the judged flight because they are not repeated.
 
     airframe: result of the airframe's reference flight; None if it was not flown.
     deciding: parameter that decides; None if no parameter decides, or if none was searched.

@@ -16,7 +16,7 @@ from logs.verdict.wording import noun_with_place, quantity_text, text_after
 STATE_SIGNS: dict[State, str] = {"ok": "✓", "fail": "✗", "open": "?", "unjudged": "–"}
 # Words of states of findings.
 STATE_WORDS: dict[State, str] = {"ok": "ok", "fail": "fails", "open": "not judged", "unjudged": "not judged"}
-# Words of the overlap of a survey's photos, which is shown apart from the photo lines: it is no share of a line.
+# Texts of the overlap of a survey's photos.  It is shown apart from the photo lines, because it is no share of a line.
 _OVERLAP_WORDS = replace(
     RULE_WORDS["survey"],
     title="photo overlap",
@@ -41,12 +41,12 @@ def finding_words(finding: Finding) -> RuleWords:
 def finding_heading(finding: Finding) -> str:
     """Return the rule of a finding and its place, such as "slope at leg 7, to item 9"."""
     word = finding_words(finding).word
-    # A fence item names its rule.
+    # The place of a fence item already begins with the rule's name.
     return finding.where if finding.where.startswith(f"{word} ") else noun_with_place(word, finding.place)
 
 
 def limit_with_tolerance_text(finding: Finding) -> str:
-    """Return the values that pass as text, with the tolerance and its purpose apart.
+    """Describe the values that pass by the limit and, separately, the tolerance with its purpose.
 
     >>> from logs.verdict.findings import make_finding
     >>> from logs.verdict.places import Place
@@ -92,17 +92,17 @@ class RuleFindings:
 
     @property
     def closest(self) -> Finding | None:
-        """The failed finding that is furthest beyond its limit, or else the finding closest to its limit, or None."""
+        """Failed finding furthest beyond its limit, else the finding closest to its limit; None if none."""
         return closest_to_limit(self.findings)
 
     @property
     def shown(self) -> Finding | None:
-        """The finding that stands for all: an undecided one if none fails, or else the closest to its limit."""
+        """Finding that represents the rule: an undecided finding if none fails, otherwise `closest`."""
         return min(undecided_findings(self.findings), key=worst_first_key) if self.state == "open" else self.closest
 
     @property
     def passed_otherwise(self) -> tuple[Finding, ...]:
-        """Findings that pass although their number is beyond the limit; each states why."""
+        """Findings that pass although their number is beyond the limit; their reason explains it."""
         return tuple(
             finding
             for finding in self.findings
@@ -213,7 +213,7 @@ class Presentation:
         None if no failed finding has a remedy.
         """
         worst_findings = [rule.failed[0] for rule in self.failed_rules]
-        # A ground contact ended the flight; the sort keeps the order of the others.
+        # A ground contact comes first, because it ended the flight.  The sort keeps the order of the others.
         worst_findings.sort(
             key=lambda finding: finding.rule != "clearance" or finding.flown is None or finding.flown > 0.0
         )

@@ -17,7 +17,7 @@ from world.errors import LogError
 from world.json_schema import DocumentConfig
 from world.scenario_file import first_fault
 
-# The name that logs have stored since the attachment was called "beside".
+# Name of the schema in stored logs.
 REFERENCE_SCHEMA: Final = "planfly.beside/1"
 
 

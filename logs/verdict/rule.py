@@ -45,11 +45,11 @@ class LogNeeds:
     """Data that an imported log needs for a rule to judge it, in addition to times and positions.
 
     quantities: quantities without which the rule is not judged.
-    needs_planned_heights: True if the plan must state altitudes.
+    needs_planned_heights: True if the mission must state altitudes.
     needs_aircraft: True if the aircraft must be known, unless the scenario sets the limit.
     needs_full_leg: True if the leg must be flown to its end; otherwise only failures are reported.
-    needs_no_gap: True if the log must have no gap at the waypoint.  A leg with a gap never passes, whatever the rule.
-    reports_missing: True if the rule is reported as not judged if it finds nothing because `quantities` are missing.
+    needs_no_gap: True if the log must have no gap at a waypoint.  A leg with a gap passes no rule.
+    reports_missing: True to report the rule as not judged if it has no finding because `quantities` are missing.
     """
 
     quantities: tuple[DataKind, ...] = ()

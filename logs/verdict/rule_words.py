@@ -24,7 +24,7 @@ from logs.verdict.wording import RULE_NOUNS
 
 @dataclass(frozen=True, slots=True)
 class Margin:
-    """Quantity whose distance from the limit is a rule's margin, and the scale by which flights are ranked.
+    """Quantity that a rule compares with a limit, and the scale by which flights are ranked.
 
     quantity: name of the quantity that is compared with the limit.
     unit: unit of the quantity, the limit and the margin.
@@ -46,13 +46,13 @@ class RuleWords:
     noun: name of the rule within a sentence; "" to use `name`.
     question: question that the rule answers, one sentence.
     margin: quantity of the rule's margin; None for a rule without a number of its own.
-    urgency: a headline names failures of a greater urgency first.
+    urgency: rank in a headline, which names failures of a higher urgency first.
     phrase: function that makes the phrase of a failed finding in a headline.
     unjudged: name of the unjudged part in the headline of a flyable verdict; "" to omit it.
     unjudged_unit: noun, in the singular, with which the headline counts findings that were not judged.
     explains_unjudged: True if the summary states why the rule was not judged.
     is_warning: True if the rule's findings are warnings, which decide no verdict.
-    tolerance_purpose: what the tolerance of the rule's limit is for; "" to omit it.
+    tolerance_purpose: purpose of the tolerance, such as "navigation and gusts"; "" to omit it.
     """
 
     name: str
@@ -97,7 +97,7 @@ SIDE_OVERLAP = "side overlap"
 # Rules of take-off and landing, which the airframe's reference flight does not fly.
 GROUND_RULES = ("takeoff", "climbout", "launch", "landing", "approach", "touchdown")
 
-# Those of them that judge a flight before its first waypoint.
+# Rules of `GROUND_RULES` that judge the part before the first waypoint.
 TAKE_OFF_RULES = ("takeoff", "climbout", "launch")
 
 # The words of every rule by its name, in the order in which a verdict judges and lists the rules.

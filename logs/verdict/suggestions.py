@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from aircraft.path_limits import aircraft_slopes, turn_radius_between
-from flight.mission.altitude_frames import misread_altitudes
+from flight.mission.altitude_frames import find_misread_altitudes
 from flight.mission.items import LANDINGS, OVER_HOME, Frame
 from flight.mission.itinerary import stated_loiter
 from flight.mission_files.wpl import HOME_LINE_MISSING_TEXT
@@ -79,8 +79,8 @@ def suggest_passing_zone(
 
     finding: the finding on the violated zone.
 
-    If the planned path violates the zone, its violating legs are shifted, by enough for the greater depth of the
-    flight, too.  If only the flight violates the zone, the violating legs of the flight are shifted.
+    If the planned path violates the zone, its violating legs are shifted.  The shift also covers a greater depth of the
+    flight.  If only the flight violates the zone, the shift is measured on the flown legs.
     """
     zone_index, facts = finding.place.index, {fact.what: fact.value for fact in finding.facts}
     if zone_index is None or "entry leg" not in facts:
@@ -122,11 +122,13 @@ def _smallest_shift(
 ) -> float | None:
     """Return the smallest shift (m) in one direction that ends a violation.
 
-    Return None if the shift exceeds ``max_shift``, if it depends on unknown ground, or if it is not found within
+    Return None if the shift exceeds `max_shift` (m), if it depends on unknown ground, or if it is not found within
     `ZONE_SUGGESTION_TRIAL_COUNT` steps.
+    axis: coordinate that is shifted: "east", "north" or "up".
+    sign: direction of the shift, 1 or -1.
 
-    Each step shifts the path by its present depth beyond the limit.  No smaller shift is missed, because a path needs a
-    shift of at least its depth.  Ground that rises faster than the step may be missed.
+    Each step shifts the path by the depth of its remaining violation.  No smaller shift is missed, because ending a
+    violation needs a shift of at least its depth.  Only ground that rises faster than the step may be missed.
     """
     shift, shifted_moves = 0.0, np.array(moves)
     for _ in range(ZONE_SUGGESTION_TRIAL_COUNT):
@@ -149,12 +151,12 @@ _MAX_RADIUS_ROUNDING_M = 10
 _SizedSuggestion = tuple[float, Suggestion]
 
 
-# Largest suggested relative change: ten times the planned value is no advice (a leg of 84 km instead of 326 m).
+# Largest relative change that is suggested; a leg of 84 km instead of 326 m would be no useful advice.
 _MAX_RELATIVE_CHANGE = 9.0
 
 
 def _smallest_first(alternatives: list[_SizedSuggestion]) -> tuple[Suggestion, ...]:
-    """Sort alternatives by the relative size of their changes, and drop those with too large a change."""
+    """Sort alternatives by their relative change, and drop those above `_MAX_RELATIVE_CHANGE`."""
     helpful = [sized for sized in alternatives if sized[0] <= _MAX_RELATIVE_CHANGE]
     return tuple(suggestion for _, suggestion in sorted(helpful, key=lambda sized: sized[0]))
 
@@ -162,7 +164,7 @@ def _smallest_first(alternatives: list[_SizedSuggestion]) -> tuple[Suggestion, .
 def suggest_gentler_slope(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
-    """Suggest a gentler slope, a longer leg or another airspeed for one leg; the smallest relative change first.
+    """Suggest a gentler slope, a longer leg or another airspeed; the smallest relative change first.
 
     If the aircraft is not known well enough, suggest a flight that measures its climb or sink performance.  If its
     climb performance is a guess, first suggest that the user state it.  Return () for a finding that is not on a leg.
@@ -182,10 +184,10 @@ def suggest_gentler_slope(
     height_change = abs(float(requirements.points[leg + 1, 2] - requirements.points[leg, 2]))
     leg_length = float(requirements.runs[leg])
     if planned_slope <= limit and finding.flown is not None:
-        # The geometry passes and the flight failed: the slope that was flown is the limit.
+        # If only the flight failed, the flown slope is the limit.
         limit = min(limit, abs(math.radians(finding.flown)))
     if source == "aircraft":
-        # Within its uncertainty the aircraft's limit leaves a slope undecided, unless the leg is nearly level.
+        # A slope beyond the certain part of the aircraft's limit would be undecided, unless the leg is nearly level.
         certain_limits = requirements.certain_climb if requirements.slopes[leg] >= 0.0 else requirements.certain_dive
         limit = min(limit, max(float(certain_limits[leg]), LEVEL_SLOPE_RAD))
     max_slope = limit - SUGGESTION_ANGLE_MARGIN_RAD
@@ -215,10 +217,10 @@ def suggest_gentler_slope(
 def suggest_gentler_landing(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
-    """Suggest a waypoint that is lower, or further away, before a too steep landing, or to land from the other end.
+    """Suggest a lower or more distant waypoint before a steep landing, or landing from the other end.
 
     If the aircraft is not known well enough, suggest a flight that measures its descent.  Return () if the slope
-    passes, or if the limit allows no descent.
+    passes, or if the limit permits no descent.
     """
     if finding.check == UNKNOWN_AIRCRAFT:
         return ((Change("no throttle", finding.place, None, MIN_EVIDENCE_FLIGHT_S, "s"),),)
@@ -257,7 +259,7 @@ def _gentler_arc(requirements: RouteRequirements, leg: int) -> tuple[Suggestion,
     changes = []
     for k in (leg, leg + 1):
         height_change = slope_ratio * float(requirements.points[k + 1, 2] - requirements.points[k, 2])
-        # A leg of opposite slope makes the arc flatter, and is kept.
+        # A leg of the opposite slope makes the arc flatter, so it is not changed.
         if height_change * arc.tangent > 0.0:
             requested_height_change = math.copysign(math.floor(abs(height_change)), height_change)
             changes.append(Change("rise", requirements.leg(k), None, requested_height_change, "m"))
@@ -321,7 +323,7 @@ def suggest_larger_loiter(
     loiter, radius_of = None if item is None else stated_loiter(item), requirements.setup.autopilot.loiters.radius_of
     if loiter is None or finding.limit is None or not finding.planned or finding.planned >= finding.limit:
         return ()
-    # The flown radius grows with the altitude; the autopilot rounds the stated radius, to 10 m at most.
+    # The flown radius grows with the altitude.  The autopilot rounds the stated radius by up to 10 m.
     scale = finding.planned / radius_of(loiter) if radius_of(loiter) else math.nan
     if not math.isfinite(scale):
         return ()
@@ -335,7 +337,7 @@ def suggest_larger_loiter(
 
 
 def _longer_legs(requirements: RouteRequirements, corner: int) -> list[_SizedSuggestion]:
-    """Suggest legs at a corner that are long enough for its turn and the neighbouring turns; [] if all fit."""
+    """Suggest legs at a corner that are long enough for its and the neighbouring turns; [] if all fit."""
     needed_before = (
         requirements.length_before[corner]
         + requirements.length_after[corner - 1]
@@ -362,7 +364,8 @@ def _gentler_turn(requirements: RouteRequirements, corner: int, max_turn: float)
     """Return the largest turn that passes at a corner, deg, in steps of 0.1; 0 if none passes.
 
     The route after the corner is rotated with the turn.  In wind, the courses after the corner affect the next turns,
-    and thus the length available to this turn. max_turn: largest turn to try, rad.
+    and thus the length available to this turn.
+    max_turn: largest turn to try, rad.
     """
     first_point, end_point = max(0, corner - 2), min(len(requirements.points), corner + 3)
     route = requirements.route
@@ -391,10 +394,10 @@ def _true_airspeed_ratio(requirements: RouteRequirements, leg: int) -> float:
 
 
 def _level_speeds(requirements: RouteRequirements, altitude: float, current_speed: float, factor: float) -> list[float]:
-    """Return the airspeeds to command for level flight at an altitude (m AMSL), m/s, in steps of 0.5 m/s.
+    """Return commanded airspeeds at which level flight is possible at an altitude (m AMSL), m/s.
 
-    The airspeed nearest to ``current_speed`` comes first.  If the maximum airspeed is uncertain, only airspeeds that
-    are certainly possible are returned.
+    They are multiples of `SUGGESTION_SPEED_STEP_MPS`, sorted by their difference from `current_speed`.  If the maximum
+    airspeed is uncertain, only airspeeds that are certainly possible are returned.
 
     factor: ratio of true airspeed to commanded airspeed.
     """
@@ -413,7 +416,7 @@ def _level_speeds(requirements: RouteRequirements, altitude: float, current_spee
 
 
 def _slope_speed(requirements: RouteRequirements, leg: int, slope: float) -> float | None:
-    """Return the nearest commanded airspeed at which the aircraft holds a leg's slope, m/s, or None.
+    """Return the nearest commanded airspeed at which the aircraft holds a slope, m/s, or None.
 
     slope: absolute value of the slope, rad.
     """
@@ -499,10 +502,10 @@ def home_height(setup: FlightSetup) -> float:
 
 
 def _suggest_home_on_ground(setup: FlightSetup) -> tuple[Suggestion, ...]:
-    """Suggest the ground's altitude for a home that is far above or below the ground; otherwise return ()."""
+    """Suggest to set a home far above or below the ground on the ground; otherwise return ()."""
     home, height = setup.mission.home, home_height(setup)
-    # The height is NaN if it is unknown.  Without a home line, the first item was probably taken for home: another
-    # altitude of it mends nothing.
+    # The height is NaN if it is unknown.  If the file has no home line, its first item was probably taken for home, and
+    # another altitude of this item would not help.
     is_first_item = any(HOME_LINE_MISSING_TEXT in warning for warning in setup.mission.warnings)
     if home is None or not abs(height) > HOME_ERROR_M or is_first_item:
         return ()
@@ -510,7 +513,7 @@ def _suggest_home_on_ground(setup: FlightSetup) -> tuple[Suggestion, ...]:
 
 
 def _suggest_launch_from_ground(requirements: RouteRequirements) -> tuple[Suggestion, ...]:
-    """Suggest home on the ground and, for legs that are then too low, to raise them; () for a home near the ground."""
+    """Suggest to set home on the ground and to raise the legs that are then too low; or ()."""
     suggestions, setup = _suggest_home_on_ground(requirements.setup), requirements.setup
     terrain = setup.scenario.terrain
     if not suggestions or terrain is None:
@@ -526,11 +529,11 @@ def _suggest_launch_from_ground(requirements: RouteRequirements) -> tuple[Sugges
 
 
 def _suggest_other_frame(setup: FlightSetup, frame: Frame) -> tuple[Suggestion, ...]:
-    """Suggest an altitude frame for the items whose altitudes fit the terrain only in it; () without such items.
+    """Suggest another altitude frame for items that fit the terrain only in it; () without any.
 
     frame: GLOBAL_RELATIVE_ALT for items below the ground, GLOBAL for items that are too high above home.
     """
-    below_ground, too_high = misread_altitudes(setup.mission, setup.scenario.origin, setup.scenario.terrain)
+    below_ground, too_high = find_misread_altitudes(setup.mission, setup.scenario.origin, setup.scenario.terrain)
     if not (too_high if frame == Frame.GLOBAL else below_ground):
         return ()
     current = Frame.GLOBAL_RELATIVE_ALT if frame == Frame.GLOBAL else Frame.GLOBAL
@@ -538,7 +541,7 @@ def _suggest_other_frame(setup: FlightSetup, frame: Frame) -> tuple[Suggestion, 
 
 
 def _suggest_lower_reading(setup: FlightSetup) -> tuple[Suggestion, ...]:
-    """Suggest lower readings of a mission's altitudes: home on the ground below it, or AMSL instead of above home."""
+    """Suggest to read altitudes as lower: with home on the ground, or as AMSL."""
     home_on_ground = _suggest_home_on_ground(setup) if home_height(setup) > 0.0 else ()
     return (*home_on_ground, *_suggest_other_frame(setup, Frame.GLOBAL))
 
@@ -548,9 +551,9 @@ def suggest_flying_higher(
 ) -> tuple[Suggestion, ...]:
     """Suggest flying a leg higher above the ground.
 
-    Other suggestions come first where they apply: home on the ground, if home is below it or leaves the clearance open;
-    heights above home, if items are below the ground but would be above it with heights above home.  Over varied
-    ground, following the terrain is also suggested.
+    Two suggestions come first if they apply.  A home far from the ground is set on the ground.  Altitudes of items
+    below the ground are read as heights above home if they then fit the terrain.  Over varied ground, following the
+    terrain is also suggested.
     """
     if finding.place == FLIGHT:
         return _suggest_launch_from_ground(requirements)
@@ -573,21 +576,21 @@ def suggest_flying_higher(
         suggestions.append((Change("height", finding.place, None, _round_to_meter(shortfall), "m"),))
     following = _follow_ground(requirements, finding)
     if following:
-        # Of several legs it raises all at once, and is tried before each of them is raised.
+        # A change that lets several legs follow the ground is tried before single legs are raised.
         suggestions.insert(0 if len(following) > 1 else len(suggestions), following)
     return tuple(suggestions)
 
 
-# Smallest difference of the ground's altitude along a leg for which it is suggested to follow the ground, m.
+# Smallest difference of the ground's altitude along a leg for which following the ground is suggested, m.
 _MIN_FOLLOWED_RELIEF_M = 20.0
 
 
 def _follow_ground(requirements: RouteRequirements, finding: Finding) -> Suggestion:
-    """Return the changes with which the legs that are too low over varied ground follow it.
+    """Return changes that let all legs that are too low over varied ground follow the ground.
 
-    The end of a leg keeps its height above ground, but gets at least the required height plus
-    `HEIGHT_ERROR_LIMIT_M`.  A leg that already follows the ground is not changed, nor is one that ends with a landing.
-    Return () if none of the changed legs has the failed finding, or if the autopilot cannot follow terrain.
+    The end of a leg keeps its height above ground, but gets at least the required height plus `HEIGHT_ERROR_LIMIT_M`.
+    Legs that already follow the ground or end with a landing are not changed.  Return () if the leg of the finding is
+    not among the changed legs, or if the autopilot cannot follow terrain.
     """
     setup, leg, limit = requirements.setup, finding.place.index, finding.limit
     terrain = setup.scenario.terrain
@@ -614,7 +617,7 @@ def _follow_ground(requirements: RouteRequirements, finding: Finding) -> Suggest
 def suggest_flying_lower(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
-    """Suggest flying a leg lower, below the maximum height above ground; return () if it is not exceeded on a leg."""
+    """Suggest flying a leg lower, below the maximum height above ground; return () if no leg exceeds it."""
     heights = [height for height in (finding.planned, finding.flown) if height is not None]
     if finding.place.kind != "leg" or finding.limit is None or not heights or not max(heights) > finding.limit:
         return ()
@@ -625,10 +628,10 @@ def suggest_flying_lower(
 def suggest_better_launch(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
-    """Suggest a launch into the wind, or a faster throw or catapult.
+    """Suggest a launch into the wind, or a faster throw or catapult; return () without a take-off.
 
-    In a tailwind, suggest to launch against it, on a runway in the other direction.  A faster throw or catapult is one
-    that reaches the minimum airspeed of level flight.  Return () without a take-off.
+    In a tailwind, suggest the course into the wind, or the other direction of the runway.  Suggest a throw or catapult
+    that reaches the minimum airspeed of level flight.
     """
     ground = requirements.ground_phases
     take_off = None if ground is None else ground.procedures.take_off
@@ -652,7 +655,7 @@ def suggest_better_launch(
 def suggest_other_landing_course(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
-    """Suggest to land from the other end of the strip after a failed landing in a tailwind; () for any other."""
+    """Suggest to land from the other end after a failed landing in a tailwind; otherwise ()."""
     ground = requirements.ground_phases
     approach = None if ground is None else ground.procedures.approach
     if finding.ok is not False or approach is None:
@@ -663,7 +666,7 @@ def suggest_other_landing_course(
 def _suggest_landing_against_wind(
     requirements: RouteRequirements, place: Place, course: float, altitude: float
 ) -> tuple[Suggestion, ...]:
-    """Suggest to land from the other end if there is a tailwind on the landing course (rad); otherwise return ().
+    """Suggest to land from the other end if the landing course (rad) has a tailwind; otherwise ().
 
     altitude: altitude of the landing point, m AMSL.
     """
@@ -677,7 +680,7 @@ def _suggest_landing_against_wind(
 def suggest_staying_inside(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
-    """Suggest lower readings of the altitudes first, then a path inside the area; return () if it is not outside."""
+    """Suggest lower altitudes, then a path further inside the area; () for a path inside."""
     if finding.margin is None or not finding.margin < 0.0:
         return ()
     inset = _round_to_meter(-finding.margin + SUGGESTION_LENGTH_MARGIN_M)
@@ -689,8 +692,8 @@ def suggest_using_less_energy(
 ) -> tuple[Suggestion, ...]:
     """Suggest a shorter flight, or a battery or tank with more energy.
 
-    Neither changes the charge at which a battery failsafe aborts the mission.  The trial of a shorter flight is flown
-    with a larger battery.  Return () if the energy is sufficient or unknown.
+    Return () if the energy is sufficient or unknown, or if a battery failsafe aborts the mission, because the charge
+    at which it acts would not change.
     """
     energy = finding.planned if finding.flown is None else finding.flown
     is_failsafe = finding.limit_source == "autopilot"
@@ -708,7 +711,7 @@ def suggest_using_less_energy(
     storage: ChangeKind = "battery" if envelope.volts or not envelope.power_level.size else "tank"
     shorter_flight = Change("duration", FLIGHT, None, float(math.ceil(100.0 * (1.0 - 1.0 / ratio))), "%")
     larger_storage = Change(storage, FLIGHT, None, math.ceil(100.0 * ratio) / 100.0, "1")
-    # Shortened by 100 %, nothing would be left of the flight.
+    # A flight shortened by 100 % would have no length.
     changes = [shorter_flight] if shorter_flight.wanted < 100.0 else []
     changes += [larger_storage] if not is_failsafe else []
     return tuple((change,) for change in changes)
@@ -717,7 +720,7 @@ def suggest_using_less_energy(
 def suggest_flying_faster(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
-    """Suggest an airspeed above the stall on the slowest leg; () if its command is already as high.
+    """Suggest an airspeed above the stall on the slowest leg; () if it already has one.
 
     finding: failed finding of the stall rule; without a limit there is no suggestion.
     """

@@ -31,17 +31,17 @@ from world.wording import count_text, is_one_edit
 
 # Maximum number of failed findings that the first line names.
 _MAX_NAMED_FINDINGS = 4
-# Largest length of a part of a parameter's name that counts as short, letters.
+# Largest number of letters of a part of a parameter's name that counts as short.
 _LONGEST_SHORT_PART = 2
 # Introductions of the lines on the other levels.
 _LEVEL_TITLES = {
     "geometry": "By geometry only",
-    "airframe": "Uav alone (planfly's guidance, exact navigation)",
+    "airframe": "UAV alone (planfly's guidance, exact navigation)",
 }
 
 
 def setup_notes(setup: FlightSetup, findings: Sequence[Finding]) -> tuple[str, ...]:
-    """Return headline notes on two facts that affect all findings: an uncertain aircraft, home's altitude.
+    """Return headline notes on an uncertain aircraft and on a doubtful home altitude.
 
     There is no note on home's altitude if a finding already reports it.
     """
@@ -56,10 +56,10 @@ def setup_notes(setup: FlightSetup, findings: Sequence[Finding]) -> tuple[str, .
 
 
 def headline(findings: Sequence[Finding], flyable: bool, setup_notes: Sequence[str] = ()) -> str:
-    """Return the first line of a verdict: the answer, and the failed, unjudged or narrowly passed findings.
+    """Return the answer of a verdict with its failed, unjudged or narrowly passed findings, in one line.
 
     flyable: True if the verdict is flyable.
-    setup_notes: see `setup_notes`.
+    setup_notes: notes from the function `setup_notes`.
     """
     if flyable:
         unjudged = [_unjudged_text(findings, rule) for rule in RULE_WORDS.values() if rule.unjudged]
@@ -67,9 +67,9 @@ def headline(findings: Sequence[Finding], flyable: bool, setup_notes: Sequence[s
         notes = [*filter(None, unjudged), *_near_miss_notes(findings), *_altitude_notes(findings)]
         return "; ".join(["flyable", *notes, *setup_notes])
     failed_findings = _failed_by_urgency(findings)
-    if not failed_findings and (open_text := undecided_text(findings)):
+    if not failed_findings and (reason := undecided_text(findings)):
         notes = [*_near_miss_notes(findings), *_altitude_notes(findings)]
-        return "; ".join([f"not judged in full: {open_text}", *notes, *setup_notes])
+        return "; ".join([f"not judged in full: {reason}", *notes, *setup_notes])
     named_findings = _headline_findings(failed_findings)
     unnamed_count = len(failed_findings) - len(named_findings)
     text = (
@@ -110,7 +110,7 @@ def undecided_text(findings: Sequence[Finding]) -> str:
 
 
 def _first_briefs(briefs: Sequence[str], noun: str) -> list[str]:
-    """Return the first briefs, and the count of the others.
+    """Return the first `_MAX_NAMED_FINDINGS` texts, and the count of the others.
 
     >>> _first_briefs(["a", "b", "c", "d", "e"], "item")
     ['a', 'b', 'c', 'd', '1 more item']
@@ -119,7 +119,7 @@ def _first_briefs(briefs: Sequence[str], noun: str) -> list[str]:
     return [*briefs[:_MAX_NAMED_FINDINGS], *([count_text(more_count, f"more {noun}")] if more_count > 0 else [])]
 
 
-# Subjects of a sentence on an insufficiently known aircraft, with the places that are counted, by rule.
+# Noun, preposition and counted place by rule, for a sentence on an insufficiently known aircraft.
 _PLACED_SUBJECTS = {
     "slope": ("slope", "on", "leg"),
     "speed": ("airspeed", "on", "leg"),
@@ -130,9 +130,9 @@ _PLACED_SUBJECTS = {
 
 
 def _unknown_aircraft_text(open_findings: Sequence[Finding]) -> str:
-    """Describe the findings that are open because the aircraft is not known well enough; "" if none is.
+    """Describe findings that are undecided because the aircraft is uncertain; "" without any.
 
-    The text names the legs if a few slopes are the only such findings, and otherwise counts the findings by rule.
+    If a few slopes are the only such findings, the text names their legs.  Otherwise it counts the findings by rule.
     """
     slope_findings = [finding for finding in open_findings if finding.rule == "slope"]
     if len(slope_findings) < len(open_findings):
@@ -197,7 +197,7 @@ def most_urgent_failure(findings: Sequence[Finding]) -> Finding | None:
 
 
 def _failed_by_urgency(findings: Sequence[Finding]) -> list[Finding]:
-    """Return the failed findings sorted by urgency, and then by the order of the rules."""
+    """Return the failed findings, the most urgent first, and then in the order of the rules."""
     order = {name: k for k, name in enumerate(RULE_WORDS)}
     failed = (finding for finding in findings if finding.ok is False)
     return sorted(failed, key=lambda finding: (-RULE_WORDS[finding.rule].urgency, order[finding.rule]))
@@ -225,7 +225,7 @@ def _near_miss_notes(findings: Sequence[Finding]) -> list[str]:
 
 
 def _altitude_notes(findings: Sequence[Finding]) -> list[str]:
-    """Return notes on large altitude errors, at the worst waypoint and the worst leg that follows the ground."""
+    """Return notes on the worst altitude errors at waypoints and on legs that follow the ground."""
     waypoint_errors = _passing_errors(findings, "waypoint", "height error")
     leg_errors = _passing_errors(findings, "slope", GROUND_FOLLOWING_ERROR)
     return [
@@ -234,13 +234,16 @@ def _altitude_notes(findings: Sequence[Finding]) -> list[str]:
     ]
 
 
-def _passing_errors(findings: Sequence[Finding], rule: str, what: str) -> list[tuple[float, Place]]:
-    """Return the values of a fact, with their places, from those findings of a rule that did not fail."""
+def _passing_errors(findings: Sequence[Finding], rule: str, fact_name: str) -> list[tuple[float, Place]]:
+    """Return value and place of one fact from the findings of a rule that did not fail.
+
+    fact_name: name of the fact.
+    """
     return [
         (fact.value, finding.place)
         for finding in findings
         for fact in finding.facts
-        if finding.rule == rule and finding.ok is not False and fact.what == what
+        if finding.rule == rule and finding.ok is not False and fact.what == fact_name
     ]
 
 
@@ -259,8 +262,8 @@ def _worst_error_notes(errors: Sequence[tuple[float, Place]], verb: str, referen
 def _headline_findings(failed: list[Finding]) -> list[Finding]:
     """Select at most four failed findings: the worst of each rule before the second worst of any rule.
 
-    Findings of a rule whose number is within the limit come after its other findings: they may fail only because of
-    those, like the arc at the end of a steep leg.
+    Within a rule, findings whose number is within the limit come last.  They may fail only because of the others, like
+    the arc at the end of a steep leg.
     """
     margins = [0.0 if finding.margin is None else finding.margin for finding in failed]
     indices_by_margin = sorted(range(len(failed)), key=margins.__getitem__)
@@ -274,7 +277,7 @@ def _headline_findings(failed: list[Finding]) -> list[Finding]:
 
 
 def _headline_phrase(finding: Finding) -> str:
-    """Return the headline's phrase for a failed finding."""
+    """Return the headline's phrase for a failed finding, such as "slope on leg 0 (14.5° > 14.2°)"."""
     rule = RULE_WORDS[finding.rule]
     return rule.phrase(rule.word, finding)
 
@@ -287,7 +290,7 @@ def summary_lines(
     conditions: Conditions,
     deciding: DecidingParameter | None = None,
 ) -> tuple[str, ...]:
-    """Return the lines of the summary: answer, start, conditions, autopilot, unjudged rules, warnings, levels.
+    """Return the lines of the summary, from the answer and the conditions to the other levels.
 
     levels: answers of all levels; the last answer is the verdict's own, whose headline is the first line.
     """
@@ -335,7 +338,7 @@ def summary_lines(
 
 
 def unjudged_parts(findings: Sequence[Finding], setup: FlightSetup) -> list[tuple[str, str]]:
-    """Return the rules with unjudged findings to be explained, each with a text on places and first reason."""
+    """Return each rule with unjudged findings, with a text on their places and the first reason."""
     parts = []
     for rule in RULE_WORDS.values():
         rule_findings = [finding for finding in findings if finding.rule == rule.name and rule.explains_unjudged]
@@ -373,10 +376,10 @@ def _airframe_or_autopilot_lines(
 
 
 def _is_covered_by_airframe(findings: Sequence[Finding]) -> bool:
-    """Return True if the airframe's reference flight can explain every failure.
+    """Return True if the airframe's reference flight can show whether the autopilot causes every failure.
 
-    It cannot explain failures in a take-off or landing, which it does not fly, or on a slope that the aircraft itself
-    cannot fly.
+    It cannot show this for failures in a take-off or landing, which it does not fly, nor for a slope that the aircraft
+    itself cannot fly.
     """
     failed_findings = [finding for finding in findings if finding.ok is False]
     return not any(
@@ -386,7 +389,7 @@ def _is_covered_by_airframe(findings: Sequence[Finding]) -> bool:
 
 
 def _pitch_limit_lines(findings: Sequence[Finding], setup: FlightSetup) -> list[str]:
-    """Return a line on the failed leg with the longest time at the autopilot's pitch limit; [] without one."""
+    """Return a line on the failed leg with the longest time at the pitch limit; [] without one."""
     failed_places = {finding.place for finding in findings if finding.ok is False}
     times = [
         (fact.value, finding.place)
@@ -410,9 +413,9 @@ def _misspelling_lines(parameters: ParameterSet) -> list[str]:
     known_names, stated_names = parameters.table.by_any_name, parameters.by_origin("file")
 
     def is_meant(name: str, known: str) -> bool:
-        """Return True if a name misspells a known name; short parts such as P and D are not compared.
+        """Return True if `name` misspells the parameter name `known`.
 
-        Return False for a known name that the parameters also state.
+        Return False if only short parts such as P and D differ, or if the file also contains `known`.
         """
         differing_parts = set(name.split("_")) ^ set(known.split("_"))
         is_stated = known_names[known][0].name in stated_names
@@ -437,7 +440,7 @@ def _parameter_lines(setup: FlightSetup, *, is_flown: bool) -> list[str]:
         return []
     contradictions = [
         *(_misspelling_lines(parameters) if isinstance(parameters, ParameterSet) else ()),
-        *([f"Parameters that do not fit: {'; '.join(parameters.contradictions)}"] if parameters.contradictions else []),
+        *([f"Contradictory parameters: {'; '.join(parameters.contradictions)}"] if parameters.contradictions else []),
     ]
     if not is_flown and all(len(name) <= LONGEST_NAME for name in parameters.unused):
         return contradictions
@@ -467,7 +470,7 @@ def _parameter_lines(setup: FlightSetup, *, is_flown: bool) -> list[str]:
 
 
 def _ignored_settings_lines(setup: FlightSetup) -> list[str]:
-    """Return a line if the scenario states rtl_autoland but the autopilot has no such parameter, otherwise []."""
+    """Return a line if the scenario's rtl_autoland has no effect on the autopilot, otherwise []."""
     rtl_settings, parameters = setup.scenario.returns, setup.autopilot.parameters
     if (
         rtl_settings is None
@@ -480,7 +483,7 @@ def _ignored_settings_lines(setup: FlightSetup) -> list[str]:
 
 
 def _terrain_error_lines(findings: Sequence[Finding], setup: FlightSetup) -> list[str]:
-    """Return a line with the minimum clearance minus the terrain's stated error; [] if no error is stated."""
+    """Return a line on the minimum clearance less the terrain's stated error; [] if none is stated."""
     error = None if setup.scenario.terrain is None else setup.scenario.terrain.vertical_error
     clearances = [
         finding.planned if finding.flown is None else finding.flown
@@ -499,7 +502,7 @@ def _terrain_error_lines(findings: Sequence[Finding], setup: FlightSetup) -> lis
 
 
 def _agreement_text(other_level: LevelAnswer) -> str:
-    """Describe where the verdict and another level agree or differ."""
+    """Describe the findings on which the verdict and another level differ, or state that they agree."""
     disagreements = other_level.disagreements
     if not disagreements:
         is_geometry = other_level.name == "geometry"

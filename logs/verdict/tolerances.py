@@ -17,18 +17,20 @@ ROUNDING_M = 0.02
 # m.  A leg, a loiter or a return may be this far below the required height above ground: the effect of `ROUNDING_M` on
 # steep ground.
 CLEARANCE_TOLERANCE_M = 0.1
-# m.  A waypoint further below home than this needs terrain: ground stations round home's altitude to whole metres.
+# m.  Without terrain data, a route with a waypoint further below home than this is undecided. Ground stations round
+# home's altitude to whole metres.
 BELOW_HOME_M = 1.0
-# m.  A mission's home may be stated this far above the terrain there. The cause is an altitude above the ellipsoid
-# instead of mean sea level, or an error of the elevation file; nearly everywhere both together are less than this.
+# m.  A mission's home may be this far above or below the terrain there. Such a difference comes from an altitude above
+# the ellipsoid instead of mean sea level, and from errors of the elevation file. Nearly everywhere, both together are
+# less than this.
 HOME_ERROR_M = 50.0
 # m.  A leg may be this far above the maximum height above ground, or above the ceiling: the effect of `ROUNDING_M` on
 # steep ground.
 HEIGHT_TOLERANCE_M = 0.1
 # m.  A loiter's radius may be this much smaller than the radius at the bank limit: 1e-7 degrees at its center.
 LOITER_RADIUS_TOLERANCE_M = 0.02
-# Laps.  Laps that may be missing in a loiter by an autopilot that steers to its center. Such an aircraft joins and
-# leaves the circle on other courses than drawn; joining on the other side makes half a lap.
+# Laps.  A loiter may lack this many laps if the autopilot steers to its center. Such an autopilot joins and leaves the
+# circle on other courses than drawn; joining it on the other side makes a difference of half a lap.
 LOITER_LAPS_TOLERANCE = 0.5
 # Fraction.  The mean radius of a flown loiter may exceed its stated radius by this, in addition to
 # `WAYPOINT_PASS_MARGIN_M`.
@@ -90,11 +92,11 @@ SLOPE_TOLERANCE_RAD = math.radians(0.5)
 HEIGHT_ERROR_LIMIT_M = 10.0
 # m.  Largest height error of a leg without any part outside the blends.
 SHORT_LEG_HEIGHT_ERROR_LIMIT_M = 15.0
-# rad.  The pitch is at the autopilot's limit from this far below it on.
+# rad.  The pitch counts as being at the autopilot's limit if it is at most this far below the limit.
 PITCH_LIMIT_TOLERANCE_RAD = math.radians(1.0)
 # rad.  A leg with a smaller slope is level.
 LEVEL_SLOPE_RAD = math.radians(0.5)
-# m/s.  Less wind than this is called calm air in a reason about the wind's effect on a slope.
+# m/s.  A reason calls wind below this speed calm air.
 CALM_WIND_MPS = 0.5
 # m/s.  Tolerance of the mean airspeed while the throttle is at a limit, or of the airspeed on an arc; in turbulence the
 # standard deviation of the gusts is added.
@@ -115,25 +117,26 @@ ABILITY_SIGMAS = 3.0
 
 # Measured slopes
 
-# s.  A leg with the throttle at a limit, and the mean airspeed off its command, for this long is not flyable: a short
+# s.  A leg is not flyable if the throttle is at a limit, and the mean airspeed off its command, for this long. Shorter
 # saturation is normal.
 SATURATED_TIME_S = 5.0
-# s.  On a held slope, rising air adds airspeed at the rate g w/V; drag removes it after about this time.
+# s.  On a constant slope at airspeed V, air that rises at w adds airspeed at the rate g w/V. Drag removes this airspeed
+# after about this time.
 SPEED_MEMORY_S = 12.0
-# m/s.  Least airspeed V in g w/V: it bounds the speed gain of an aircraft that has nearly stopped.
+# m/s.  Smallest airspeed V in the rate g w/V. It bounds the rate for an aircraft that has nearly stopped.
 MIN_AIRBORNE_AIRSPEED_MPS = 10.0
 # Fraction of a window during which the throttle must be at a limit for the window to be saturated.
 SATURATED_FRACTION = 0.8
-# Throttle, relative to the autopilot's limit.  The throttle is at its upper limit from this on.
+# Throttle, relative to the autopilot's limit.  A throttle of at least this is at its upper limit.
 FULL_THROTTLE_FRACTION = 0.99
-# Throttle 0..1.  The throttle is at its lower limit up to this.
+# Throttle 0..1.  A throttle of at most this is at its lower limit.
 IDLE_THROTTLE_FRACTION = 0.01
-# A.  The motor is off up to this battery current.
+# A.  The motor is off if the battery current is at most this.
 ZERO_CURRENT_A = 0.02
-# Throttle, relative to the autopilot's limit.  An ability to climb shows only at this limit: 1 % of the Aerosonde's
-# throttle is 0.6 degrees of climb.
+# Throttle, relative to the autopilot's limit.  Only a throttle of at least this shows the ability to climb: 1 % of the
+# Aerosonde's throttle makes 0.6 degrees of climb.
 SATURATED_THROTTLE_FRACTION = 0.999
-# s.  Least time over which an ability is measured.
+# s.  Shortest time over which a climb or sink ability is measured.
 ABILITY_WINDOW_S = 1.5
 # s.  Time after the throttle reaches its limit from which an ability is measured.
 ABILITY_SETTLING_S = 0.5
@@ -173,8 +176,8 @@ ROUGH_SLOPE_ERROR_RAD = math.radians(0.5)
 
 # The rules on waypoints, speed, departure and completion
 
-# m.  If neither mission nor autopilot states an acceptance radius, a waypoint is reached within the fly-by path's
-# distance from it plus this.  A corridor is wider by this than its turns need.
+# m.  If neither mission nor autopilot states an acceptance radius, a waypoint is reached within this plus the distance
+# at which the fly-by path passes it.  A corridor is also wider by this than its turns need.
 WAYPOINT_PASS_MARGIN_M = 10.0
 # m.  A larger height error at a waypoint is named in the first line of a verdict. At 106 waypoints of the simulated
 # ArduPlane and PX4, on slopes of up to 5 degrees and in up to moderate turbulence, the error was 11.4 m or less.
@@ -184,8 +187,8 @@ NOTABLE_HEIGHT_ERROR_M = 25.0
 # turns by its own control law. It was up to 1.05 in 168 turns of the simulated ArduPlane and 1.24 in 80 turns of PX4
 # (95 to 180 degrees, wind up to 12 m/s, light turbulence).
 FLY_OVER_SWING_RATIO = 1.25
-# m.  Approaches to a waypoint whose distances differ by less than this are equally close; of them the one nearest in
-# altitude counts. A path that crosses itself above or below has such approaches.
+# m.  Approaches to a waypoint are equally close if their distances differ by less than this. The approach nearest in
+# altitude then counts. A path that crosses itself at another altitude has such approaches.
 EQUAL_DISTANCE_TOLERANCE_M = 0.5
 # m/s.  Error of a leg's mean airspeed.
 MEAN_SPEED_TOLERANCE_MPS = 1.0
@@ -211,17 +214,17 @@ MIN_CONTROLLED_AIRSPEED_MPS = 15.0
 # Fraction of the slowest level speed.  Airspeed below this is a loss of control of every other aircraft; for the
 # Aerosonde both are the same.
 MIN_CONTROLLED_STALL_RATIO = 0.94
-# s.  A log with a pause this long between rows has lost rows.
+# s.  A log with a longer pause than this between rows has lost rows.
 MAX_ROW_GAP_S = 0.5
-# Median steps between rows.  In a sparse log, where `MAX_ROW_GAP_S` is an ordinary step, this many steps
-# are a pause.
+# Median steps between rows.  In a sparse log, `MAX_ROW_GAP_S` may be an ordinary step. Only more than this many steps
+# are then a pause.
 MAX_ROW_GAP_TICKS = 5.0
 # m/s.  Largest disagreement between position and velocity in one tick; beyond it the record contradicts itself.
 MAX_VELOCITY_DISAGREEMENT_MPS = 10.0
 # s.  Airspeed, bank and load factor are averaged over this time for comparison with the stall.
 STALL_AVERAGING_TIME_S = 1.0
-# m/s.  A flown airspeed may be below the stall speed in a bank by this plus the standard deviation of the gusts:
-# guidance lets the airspeed vary by this when it rolls into a turn in calm air.
+# m/s.  A flown airspeed may be below the stall speed in a bank by this plus the standard deviation of the gusts. In
+# calm air, the airspeed varies by this when the guidance rolls into a turn.
 STALL_TOLERANCE_MPS = 0.2
 # Fraction of the battery or the tank that must be left at the end: the reserve.
 ENERGY_RESERVE_FRACTION = 0.2
@@ -235,25 +238,25 @@ FULL_CELL_VOLTAGE_V = 4.2
 
 # Surveys
 
-# Fraction of a photo line that must be flown as photos require: on the line, level, at the planned height above ground,
-# and with the camera on.  A line that loses one metre in twenty still overlaps as usual surveys do.
+# Fraction of a photo line that must be usable: flown on the line, level, at the planned height above ground, and with
+# the camera on.  A line that loses one metre in twenty still overlaps as usual surveys do.
 PHOTO_COVERAGE_FRACTION = 0.95
-# Fraction of the line spacing.  A photo may be taken this far to the side of its line: two neighbouring lines that are
-# both off by it are half again as far apart, which leaves 40 % of 60 % overlap.
+# Fraction of the line spacing.  A photo may be taken this far to the side of its line. If two neighbouring lines are
+# both off by this, their distance is 1.5 times the spacing, and an overlap of 60 % falls to 40 %.
 PHOTO_OFFSET_FRACTION = 0.25
 # rad.  Largest bank in a photo: at 60 m above ground its center is then 10 m to the side.
 MAX_PHOTO_BANK_RAD = math.radians(10.0)
 # Fraction of the planned height above ground.  A photo may be this far above or below it: the area that a photo shows,
 # and its overlap, depend on the height.
 PHOTO_HEIGHT_FRACTION = 0.1
-# m.  Least tolerance of a photo's height above ground.
+# m.  Smallest tolerance of a photo's height above ground.
 MIN_PHOTO_HEIGHT_ERROR_M = 5.0
 # rad.  An aircraft flies along a line if its course is within this of the line's course.
 MAX_PHOTO_COURSE_ERROR_RAD = math.radians(30.0)
 # m.  Step in which a photo line is checked.
 PHOTO_STEP_M = 1.0
-# Fraction of a photo.  Photos may overlap by this much less than required: of 60 % side overlap, a line that is a
-# quarter of the spacing off (`PHOTO_OFFSET_FRACTION`), next to one that is flown as drawn, leaves 50 %.
+# Fraction of a photo.  Photos may overlap by this much less than required. If one line is off by a quarter of the
+# spacing (`PHOTO_OFFSET_FRACTION`) and its neighbour is not, a side overlap of 60 % falls to 50 %.
 PHOTO_OVERLAP_FRACTION = 0.1
 # Radii of the bank limit's arc.  A turn-around too tight to be flown as drawn may lead this far beyond its waypoints: a
 # turn back onto the next line takes 1 + sqrt(3) radii, and rolling takes the rest.
@@ -261,8 +264,8 @@ TURN_AROUND_RADII = 3.25
 
 # Departures from the ground and approaches to it
 
-# m.  Terrain within this distance of home is ignored under a climb-out. Rail or runway are there, and the distance is
-# less than two pixels of the usual elevation files.
+# m.  Terrain within this distance of home is ignored under a climb-out. The rail or the runway is there, and the
+# distance is less than two pixels of the usual elevation files.
 LAUNCH_RUN_M = 50.0
 # m.  Least height above the ground at home to which an aircraft climbs before it descends to its first waypoint: below
 # that ArduPlane flies no slope (`Plane::setup_glide_slope`).
@@ -278,10 +281,10 @@ EARLY_TOUCHDOWN_DISTANCE_M = 60.0
 GLIDE_PATH_TOLERANCE_M = 5.0
 # m.  The glide tolerance applies down to this height above the landing point; below it the flare may start.
 FLARE_HEIGHT_MARGIN_M = 15.0
-# m.  Home's altitude and an elevation file may differ by this at a landing point.  Further above the ground the
-# aircraft flares too early, and falls; further below it, it flies into the ground.
+# m.  A landing point may be this far above or below the ground of the elevation file.  If it is further above, the
+# aircraft flares too early and drops.  If it is further below, the aircraft flies into the ground.
 LANDING_POINT_ERROR_M = 10.0
-# m.  Least height above ground on a go-around: it turns on that path, and turns are not laid out.
+# m.  Required height above ground on a go-around.  Its turns are not laid out exactly.
 GO_AROUND_CLEARANCE_M = 20.0
 # m.  A waypoint of the landing sequence may be below the required height. Within this distance of it a go-around may
 # be as low as the waypoint: a slope down to a waypoint that is 10 m lower needs this length.
@@ -304,29 +307,30 @@ MAX_LAUNCH_HEIGHT_LOSS_M = 1.0
 # m.  Least runway length left where the aircraft leaves the ground: the simulated ArduPlane left it after 34 m, and the
 # real one after 37 m, in the one such flight that is known.
 RUNWAY_MARGIN_M = 10.0
-# m.  Required height above ground of the legs after a take-off and of a landing sequence, even if the scenario
-# requires more: they are near the ground by nature. A go-around needs the same, `GO_AROUND_CLEARANCE_M`.
+# m.  Required height above ground of the legs after a take-off and of a landing sequence, even if the scenario requires
+# more, because these legs are always near the ground. It equals the requirement on a go-around,
+# `GO_AROUND_CLEARANCE_M`.
 GROUND_LEG_CLEARANCE_M = GO_AROUND_CLEARANCE_M
 # m.  Largest distance from home, or from the landing point, at which `GROUND_LEG_CLEARANCE_M` applies: the length of
 # the longest final that a plan has.  Beyond it, the scenario's requirement applies to these legs, too.
 FIELD_RADIUS_M = 2000.0
 # rad.  After a take-off the first leg's corridor applies once the aircraft's course is within this of the leg's course.
 RUNWAY_COURSE_TOLERANCE_RAD = math.radians(10.0)
-# m.  Within this of its contact height above ground the aircraft has touched down: rows are 1/60 s apart.
+# m.  An aircraft at most this far above its standing height has touched down.  Rows are 1/60 s apart.
 CONTACT_HEIGHT_M = 0.02
-# m.  A flight with landing gear that ends on its way below this height above ground has met the ground, with its wheels
-# or belly before its center of gravity.
+# m.  A flight with landing gear that ends early below this height above ground has hit the ground: wheels or belly
+# touch it before the center of gravity does.
 MAX_GEAR_HEIGHT_M = 1.0
-# m.  Error of a simulated touch-down along the strip: 5 touch-downs of ArduPlane in steady wind were within 15 m of the
+# m.  Error of a simulated touchdown along the strip: 5 touchdowns of ArduPlane in steady wind were within 15 m of the
 # simulated ones, and 38 of 42 in light turbulence within 30 m.  The strip must be this much longer at either end.
 TOUCHDOWN_ERROR_M = 30.0
-# m.  In turbulence a landing is undecided if it leaves less of the strip than this. 42 touch-downs of ArduPlane were
+# m.  In turbulence a landing is undecided if it leaves less of the strip than this. 42 touchdowns of ArduPlane were
 # 27 m shorter to 46 m longer than simulated, with an 11 kg Aerosonde as well as a 2 kg wing.
 GUST_TOUCHDOWN_ERROR_M = 50.0
 # m.  A final that is simulated lower above ground than this, before its flare may begin, is undecided: five ArduPlane
 # finals reached their flares within 2 m of the simulated height.
 FINAL_APPROACH_CLEARANCE_M = 3.0
-# m/s.  A faster sink towards the ground leaves a touch-down undecided: 15 ArduPlane landings touched down at 0.5 to
+# m/s.  A faster sink towards the ground leaves a touchdown undecided: 15 ArduPlane landings touched down at 0.5 to
 # 4.2 m/s, and an aircraft that a flare drops from a height touches down faster than any of them.
 MAX_TOUCHDOWN_SINK_MPS = 5.0
 
@@ -337,7 +341,8 @@ CAPTURE_RADIUS_M = 500.0
 # s.  To assign stretches of a track to waypoints, rows are thinned to at least this interval; the row nearest to each
 # waypoint is then searched among all rows.
 CHORD_TIME_S = 0.25
-# m.  A waypoint where the track ends is passed within this of its apex, in addition to the fly-by's own distance.
+# m.  A waypoint at which the track ends was passed if the track ends within this plus the distance at which the fly-by
+# path passes it.
 FINAL_WAYPOINT_TOLERANCE_M = 10.0
 # s.  An imported flight that continues this long after its last waypoint has flown a part of the next leg.
 PARTIAL_LEG_MIN_S = 2.0
@@ -348,7 +353,7 @@ MAX_UNSEEN_TIME_S = 10.0
 PLAN_MISMATCH_DISTANCE_M = 1000.0
 # m.  When the order of waypoints is checked, a waypoint is passed within the corridor's half width, but at least this.
 MIN_NEAR_WAYPOINT_M = 50.0
-# m.  Upper limit of that distance, for a corridor that is wider.
+# m.  Upper limit of the distance within which a waypoint is passed when the order is checked, for a wide corridor.
 MAX_NEAR_WAYPOINT_M = 150.0
 # Fraction.  If the plan is the one that was flown, this fraction of the passed waypoints was passed in the plan's
 # order.
@@ -359,7 +364,8 @@ MAX_PLAUSIBLE_POSITION_M = 1e7
 MAX_PLAUSIBLE_SPEED_MPS = 1e4
 # rad, deflection, m/s.  Largest plausible attitude, control or wind.
 MAX_PLAUSIBLE_VALUE = 1e3
-# s.  Stays in a sphere on neighbouring segments that touch within this are one.  Rounding.
+# s.  Stays in a sphere on neighbouring segments are one stay if the pause between them is at most this, the effect of
+# rounding.
 SPHERE_STAY_TOLERANCE_S = 1e-6
 # Diagonals of a block of segments.  At this distance from a sphere's center the segments are joined to longer ones,
 # which changes the exposure by less than 0.1 %.

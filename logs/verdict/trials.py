@@ -18,7 +18,7 @@ def first_that_passes(candidates: Iterable[Candidate], passes: Callable[[Candida
 def least_change(changes: Sequence[Candidate], passes: Callable[[Candidate], bool]) -> Candidate | None:
     """Return the smallest change that passes, by bisection, or None if no tried change passes.
 
-    The changes are in increasing order, and all changes above a passing one are assumed to pass.
+    changes: candidates in increasing order; all changes above a passing change are assumed to pass.
 
     >>> tried = []
     >>> least_change(range(0, 120, 10), lambda metres: not tried.append(metres) and metres >= 30)

@@ -97,7 +97,7 @@ class Verdict:
 
     @property
     def flies(self) -> bool:
-        """True if the verdict is flyable, or is complete and leaves only departure, approach or returns open.
+        """True if the verdict is flyable, or is complete and undecided only in climb-out, approach or returns.
 
         >>> from dataclasses import replace
         >>> from logs.verdict.findings import GROUND_PATH, make_finding
@@ -127,7 +127,7 @@ class Verdict:
 
     @property
     def closest(self) -> dict[str, Finding]:
-        """For each rule, the failed finding furthest beyond its limit, or else the finding closest to its limit.
+        """By rule, the failed finding furthest beyond its limit, or the finding closest to its limit.
 
         Rules without a finding that failed or was judged by a number are left out.
 
@@ -145,7 +145,7 @@ class Verdict:
         return {name: finding for name, finding in closest.items() if finding is not None}
 
     def to_pandas(self) -> Any:
-        """Return a `pandas.DataFrame` with a row for each finding, in the verdict's order, and NaN for missing numbers.
+        """Return a `pandas.DataFrame` with a row for each finding, and NaN for missing numbers.
 
         Columns: rule, place and index (of the leg, turn or threat), then as in `Finding`: planned, flown, limit,
         tolerance, margin, unit, limit_source, method, ok (None if not judged) and reason; and nearest, the distance

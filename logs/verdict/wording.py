@@ -29,7 +29,7 @@ RULE_NOUNS = {
     "link": "radio link",
     "departure": "loss of control",
 }
-# Rules that judge a flight where another rule judges the route.
+# Rules of the route, each with the rule that judges the same part in a flight.
 FLOWN_COUNTERPARTS = {"landing": "touchdown"}
 # Greatest length of a statement in a headline, characters.
 _MAX_STATEMENT_LENGTH = 80
@@ -72,7 +72,7 @@ def place_text_within(place: Place) -> str:
 
 
 def noun_with_place(noun: str, place: Place, *, within: bool = False) -> str:
-    """Name the rule of a finding and its place; a place that is the whole flight, plan or mission is left out.
+    """Name the rule of a finding and its place, unless that is the whole flight, plan or mission.
 
     within: True for use within a sentence, with the item of a leg between commas.
 
@@ -203,7 +203,7 @@ def _other_change_text(change: Change) -> str:
 
 
 def _airspeed_text(change: Change) -> str:
-    """Name the place of a change of airspeed, and the new airspeed."""
+    """Phrase a change of airspeed as an instruction, such as "fly leg 1 at 20.5 m/s"."""
     if change.place.kind == "leg":
         return f"fly {place_text_within(change.place)} at {change.wanted:g} m/s"
     where = f" through {place_text(change.place)}" if change.place.kind == "waypoint" else ""
@@ -219,7 +219,7 @@ def _rise_text(change: Change) -> str:
 
 
 def _length_text(change: Change) -> str:
-    """Name a leg, its new length, and its present length."""
+    """State a leg with its present and its new length, such as "leg 1 from 150 m to 260 m"."""
     current = change.current or 0.0
     place_name = place_text_within(change.place)
     if current < MIN_LEG_LENGTH_M:
@@ -228,7 +228,7 @@ def _length_text(change: Change) -> str:
 
 
 def _terrain_height_text(suggestion: Suggestion) -> str:
-    """Name the items at which legs that follow the ground end, with their heights above it.
+    """Phrase changes that let legs follow the ground, with their end items and heights above ground.
 
     >>> legs = [Change("terrain height", Place("leg", k, to_item=k + 1), None, 70.0 + k, "m") for k in (1, 2)]
     >>> _terrain_height_text(tuple(legs))
@@ -274,7 +274,7 @@ def suggestion_text(suggestion: Suggestion) -> str:
 
 
 def _remaining_text(finding: RemainingFinding) -> str:
-    """Name the rule and the place of a finding that remains open."""
+    """Name the rule and the place of a finding that remains failed or undecided after a change."""
     return noun_with_place(RULE_NOUNS.get(finding.rule, finding.rule), finding.place)
 
 
@@ -348,7 +348,7 @@ def _items_text(items: Sequence[int]) -> str:
 
 
 def _join_with_and(texts: Sequence[str]) -> str:
-    """Join texts by commas, the last one by "and"."""
+    """Join texts by commas, and the last text by "and"."""
     return " and ".join([", ".join(texts[:-1]), texts[-1]] if len(texts) > 1 else texts)
 
 
@@ -386,7 +386,7 @@ def disagreement_text(disagreement: Disagreement) -> str:
 
 
 def deciding_text(deciding: DecidingParameter) -> str:
-    """Describe the autopilot parameter that decides, the effect of its value, and the value that would pass.
+    """Describe the parameter that decides, the effect of its value, and the value that would pass.
 
     >>> deciding_text(DecidingParameter("TECS_HDEM_TCONST", 3.0, 1.2, "s", "clearance", Place("leg", 4), -8.2))
     'with TECS_HDEM_TCONST 3 s the aircraft is 8 m too low on leg 4; with 1.2 s the flight would pass'
@@ -426,7 +426,7 @@ def shorten_statement(statement: str) -> str:
 
 
 def text_after(text: str, starts: Sequence[str]) -> str:
-    """Return a text without the first of `starts` at its beginning, and without the punctuation that follows.
+    """Return a text without one of `starts` at its beginning, and without the punctuation after it.
 
     >>> text_after("not flyable: slope on leg 1", ("Not flyable, and incomplete", "not flyable"))
     'slope on leg 1'
@@ -436,7 +436,7 @@ def text_after(text: str, starts: Sequence[str]) -> str:
 
 
 def quantity_text(value: float, unit: str) -> str:
-    """Return a value with its unit, to three significant figures, and without an exponent even for 1140000 Wh.
+    """Return a value with its unit, to three significant figures and without an exponent.
 
     >>> quantity_text(11.87, "deg"), quantity_text(1_140_000.0, "Wh")
     ('11.9°', '1140000 Wh')
@@ -448,13 +448,9 @@ def energy_left_text(energy: float) -> str:
     """Return the energy left at the end of a flight, or the energy that is missing, in Wh.
 
     >>> energy_left_text(11.87), energy_left_text(-3.0)
-    ('11.9 Wh left', '3 Wh more than there are')
+    ('11.9 Wh left', '3 Wh missing')
     """
-    return (
-        f"{quantity_text(energy, 'Wh')} left"
-        if energy >= 0.0
-        else f"{quantity_text(-energy, 'Wh')} more than there are"
-    )
+    return f"{quantity_text(energy, 'Wh')} left" if energy >= 0.0 else f"{quantity_text(-energy, 'Wh')} missing"
 
 
 def _with_unit(digits: str, unit: str) -> str:

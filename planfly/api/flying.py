@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Unpack
 
-from flight.autopilots.catalog import program_class_for
+from flight.autopilots.catalog import find_program_class
 from flight.autopilots.sitl.process import check_binary
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
@@ -357,5 +357,5 @@ def check_program(sitl: str | Path) -> Path:
     """
     require_extra("live", "--sitl needs")
     program = Path(sitl)
-    check_binary(program, program_class_for(program).title)
+    check_binary(program, find_program_class(program).title)
     return program

@@ -241,8 +241,11 @@ def optimise(
     if lower_bounds.ndim != 1 or lower_bounds.shape != upper_bounds.shape or not lower_bounds.size:
         shapes = f"of shapes {lower_bounds.shape} and {upper_bounds.shape}"
         raise ArgumentError.of_argument("lower, upper", lower, "expected two of shape (d,)", shown=shapes)
-    if not (np.isfinite(lower_bounds) & np.isfinite(upper_bounds) & (lower_bounds < upper_bounds)).all():
-        raise ArgumentError.of_argument("lower, upper", lower, "expected finite numbers, lower below upper", shown="")
+    with np.errstate(over="ignore", invalid="ignore"):
+        widths = upper_bounds - lower_bounds
+    if not (np.isfinite(widths) & (widths > 0.0)).all():
+        allowed = "expected finite numbers, lower below upper by a finite difference"
+        raise ArgumentError.of_argument("lower, upper", lower, allowed, shown="")
     if not isinstance(model, str) or model not in _MODELS:
         raise ArgumentError.of_argument("model", model, f"expected {', '.join(_MODELS)}")
     if population % 2:

@@ -22,7 +22,7 @@ from planfly.workflow.make_plan import make_given_plan, make_plan
 from planfly.workflow.output_paths import file_target
 from planfly.workflow.uav import choose_seed, cruise_airspeed, find_aircraft_and_energy, load_uav
 from planner.plan import GIVEN_WAYPOINTS, Plan, plan_json, read_plan
-from planner.search.explain_failure import explain_failure
+from planner.search.explain_failure import explain_failure, nearest_missile_text
 from planner.search.replan import check_same_mission
 from planner.search.search_state import StopCondition
 from world.argument_types import checks_types
@@ -281,14 +281,16 @@ def failures_to_expect(plan: Plan) -> tuple[str, ...]:
 
 @checks_types
 def what_blocks(plan: Plan) -> tuple[str, ...]:
-    """Return the reasons why a plan is not feasible, one line each; empty for a feasible plan.
+    """Return the reasons why a plan is not safe, one line each; empty for a safe plan.
 
     >>> import planfly
     >>> planfly.what_blocks(planfly.plan("tight", seed=1))
     ()
     """
-    if plan.feasible:
+    if plan.safe:
         return ()
+    if plan.feasible:
+        return (nearest_missile_text(plan),)
     if plan.algorithm == GIVEN_WAYPOINTS and plan.certificate.problems:
         return plan.certificate.problems
     return tuple(explain_failure(plan, load_uav(plan.scenario).limits.with_margin()))

@@ -177,8 +177,8 @@ def _predict_by_controls(motion: MotionLog, aircraft: Aircraft, start: float | N
     with stage("reading a log"):
         records, _ = records_and_outputs(motion, aircraft, MIN_CHECK_SECONDS)
     start = _judged_start(motion, aircraft, records, start)
-    earlier = [part for record in records if len((part := record.between(-math.inf, start)).time) > 1]
-    judged_records = [part for record in records if len((part := record.between(start, math.inf)).time) > 1]
+    earlier = [part for record in records if len((part := record.part_between(-math.inf, start)).time) > 1]
+    judged_records = [part for record in records if len((part := record.part_between(start, math.inf)).time) > 1]
     for parts, side in ((earlier, "before"), (judged_records, "from")):
         seconds = sum(part.seconds for part in parts)
         if seconds < MIN_CHECK_SECONDS:

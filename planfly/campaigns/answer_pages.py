@@ -46,17 +46,18 @@ def window_page(result: WindowResult, figure: Figure, command: str) -> AnswerPag
         tables=[PageTable([*times, *zip(window_text.DEPARTURE_COLUMNS, styles, strict=True)], rows)],
         explanation=[
             f"Each departure is flown {count_text(goal.flights, 'time')} with varied wind, aircraft, terrain and start."
-            f" It is open if at least {goal.probability:.0%} of these flights are flyable. The interval is that of"
-            " Clopper and Pearson. The departure is decided by the rules that fail most of its flights."
+            f" It is open if at least {goal.probability:.0%} of these flights are flyable. The interval is the"
+            " Clopper-Pearson interval. A departure is decided by the rules that fail the most of its flights."
         ],
         command=command,
     )
 
 
 def battery_page(result: BatteryResult, figure: Figure, command: str) -> AnswerPage:
-    """Return the page of a battery: the chart of the capacities, what decides, and the energy of each leg.
+    """Return the page of a battery: chart of the capacities, deciding parts of the flight, and energy of each leg.
 
-    The arguments are as for `window_page`.
+    figure: chart of the capacities.
+    command: command line that repeats the search; "" if there is none.
     """
     goal = result.goal
     return AnswerPage(
@@ -81,9 +82,10 @@ def battery_page(result: BatteryResult, figure: Figure, command: str) -> AnswerP
             ),
         ],
         explanation=[
-            "A flight needs the larger of two energies, at the end of the mission and at the end of its most expensive"
-            " return to launch, divided by the usable fraction of the battery and by the drawn factor on its capacity."
-            f" The found capacity covers {goal.probability:.0%} of the flights."
+            "A flight has used one energy at the end of its mission, and another at the end of its most expensive"
+            " return to launch. The capacity that it needs is the larger of these two energies, divided by the usable"
+            " fraction of the battery and by the drawn factor on its capacity. The found capacity is enough for"
+            f" {goal.probability:.0%} of the flights."
         ],
         command=command,
     )

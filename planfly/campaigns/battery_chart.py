@@ -11,7 +11,7 @@ from logs.views.drawing import clean_style, new_figure
 from planfly.campaigns.find_battery import BatteryResult
 from world.arrays import Floats
 
-# Largest ratio of the aircraft's own capacity to the largest needed one at which it is on the axis.
+# Largest ratio of the aircraft's own capacity to the other capacities at which the axis still includes it.
 _MAX_OWN_RATIO = 2.5
 
 
@@ -51,7 +51,7 @@ def draw_battery(result: BatteryResult) -> Figure:
 
 
 def _draw_capacities(axes: Axes, result: BatteryResult, needed: Floats) -> None:
-    """Draw the needed capacities in steps, the required probability, the found capacity and the aircraft's own.
+    """Draw the needed capacities as steps, the required probability, the found capacity and the aircraft's capacity.
 
     needed: finite capacities that the flights need, Wh, ascending, (n,).
     """

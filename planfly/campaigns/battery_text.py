@@ -16,17 +16,17 @@ _MAX_LISTED = 3
 def answer_line(result: BatteryResult) -> str:
     """Return the smallest battery in one line."""
     goal = result.goal
-    where_text = "in the mission and in every return" if result.has_returns else "in the mission (without returns)"
-    where_text += " that arrives" if any(row.blocked_returns for row in result.rows) else ""
-    keeps_text = f"a reserve of {goal.reserve:.0%} {where_text} with probability {goal.probability:g}"
+    flown_text = "in the mission and in every return" if result.has_returns else "in the mission (without returns)"
+    flown_text += " that arrives" if any(row.blocked_returns for row in result.rows) else ""
+    keeps_text = f"a reserve of {goal.reserve:.0%} {flown_text} with probability {goal.probability:g}"
     lost_count = sum(math.isinf(row.return_energy) for row in result.rows)
     if math.isinf(result.capacity) and lost_count:
         flights_text = f"{lost_count} of {len(result.rows)} flights"
         return f"no battery keeps {keeps_text}, because a return does not arrive in {flights_text}"
     if math.isinf(result.capacity):
         return (
-            f"no battery keeps {keeps_text}: with {goal.specific_energy:g} Wh/kg, carrying its mass takes too much of"
-            f" the energy that it adds (the aircraft would weigh {result.mass * result.mass_factor:.3g} kg)"
+            f"no battery keeps {keeps_text}: at {goal.specific_energy:g} Wh/kg a larger battery needs too much of its"
+            f" energy to carry its own mass (the aircraft would weigh {result.mass * result.mass_factor:.3g} kg)"
         )
     if math.isnan(result.capacity):
         return f"not judged: {_unknown_reason(result)}"
@@ -34,7 +34,9 @@ def answer_line(result: BatteryResult) -> str:
     confidence_text = f"at {goal.confidence:.0%} confidence"
     interval_text = f"{low:.0f} to {high:.0f} Wh {confidence_text}"
     if not math.isfinite(high):
-        interval_text = f"at least {low:.0f} Wh {confidence_text}, no upper bound with {len(result.rows)} flights"
+        interval_text = (
+            f"at least {low:.0f} Wh {confidence_text}, {len(result.rows)} flights are too few for an upper bound"
+        )
     volts_text = f", {1000.0 * result.capacity / result.volts:.0f} mAh at {result.volts:.1f} V" if result.volts else ""
     return f"a battery of {result.capacity:.0f} Wh ({interval_text}{volts_text}) keeps {keeps_text}"
 
@@ -43,16 +45,16 @@ def _unknown_reason(result: BatteryResult) -> str:
     """Return the reason why the smallest battery is unknown."""
     count, completed = len(result.rows), len(result.completed)
     endings = [row.ended for row in result.rows if row.ended != "completed"]
-    if unknown := len(result.completed) - len(result.known):
-        return f"in {unknown} of {count} flights a return leaves the known terrain, so its energy is unknown"
+    if unknown_count := len(result.completed) - len(result.known):
+        return f"in {unknown_count} of {count} flights a return leaves the known terrain, so its energy is unknown"
     if not endings:
         return "the aircraft's model states no power, so the energy is unknown"
     most_frequent = max(set(endings), key=endings.count)
-    return f"{count - completed} of {count} flights do not complete the mission; most frequent end: {most_frequent}"
+    return f"{count - completed} of {count} flights do not complete the mission; most frequent reason: {most_frequent}"
 
 
 def battery_lines(result: BatteryResult) -> list[str]:
-    """Return the lines below the answer: the aircraft's battery, what decides, and how it was found.
+    """Return the lines below the answer: the aircraft's battery, deciding parts, energy of the legs, and method.
 
     Return [] if no flight completed the mission.
     """
@@ -77,11 +79,12 @@ def battery_lines(result: BatteryResult) -> list[str]:
         lines.append("the mission has no home, so no returns were simulated")
     elif blocked:
         lines.append(
-            f"in {blocked} of {total} flights, returns that hit an obstacle are left out (planfly returns shows them)"
+            f"in {blocked} of {total} flights, returns hit an obstacle; the capacity does not include these returns"
+            " (`planfly returns` shows them)"
         )
     lines.append(
-        f"{total} of {len(result.rows)} flights complete the mission; a return starts every {result.goal.interval:g} s."
-        " Returns are simulated up to their loiter; the reserve has to cover loiter and landing"
+        f"{total} of {len(result.rows)} flights complete the mission. A return starts every {result.goal.interval:g} s"
+        " and is simulated up to its loiter; the reserve has to cover loiter and landing"
     )
     return [*lines, *return_law_lines(result.base.nominal_setup())]
 
@@ -124,11 +127,13 @@ def leg_rows(result: BatteryResult) -> list[tuple[str, str, str]]:
 
 
 def _own_battery_line(result: BatteryResult) -> str:
-    """Compare the aircraft's own battery with the smallest battery."""
+    """Return a line that states whether the aircraft's own battery keeps the reserve."""
     if result.is_guessed:
         return "the aircraft's battery is unknown, so it is not compared; state battery_wh in the scenario"
     if math.isnan(result.capacity):
-        return f"it is not judged whether the aircraft's battery of {result.own_capacity:.0f} Wh is enough"
+        return (
+            f"the aircraft's battery of {result.own_capacity:.0f} Wh is not judged, because the needed one is unknown"
+        )
     unknown_text = "may be enough (more flights would decide)" if result.has_returns else "may not cover the returns"
     verdict = {True: "is enough", False: "is too small", None: unknown_text}
     low, high = result.own_probability
@@ -145,16 +150,17 @@ def _mass_lines(result: BatteryResult) -> list[str]:
     """
     if result.goal.specific_energy is None:
         return [
-            "the aircraft's mass is assumed to be the same for every capacity; to change this, state --specific-energy"
+            "every capacity is assumed to have the same mass; for a mass that grows with the capacity, add"
+            " --specific-energy"
         ]
     if not math.isfinite(result.capacity):
         return []
     limit_text = (
-        f"; the assumed mass is at least {MIN_MASS_FACTOR:g} times this mass"
+        f"; the flights assume at least {MIN_MASS_FACTOR:g} times the present mass"
         if result.mass_factor == MIN_MASS_FACTOR
         else ""
     )
     return [
-        f"with this battery of {result.goal.specific_energy:g} Wh/kg the aircraft weighs"
-        f" {result.mass * result.mass_factor:.2f} kg (now {result.mass:.2f} kg{limit_text})"
+        f"at {result.goal.specific_energy:g} Wh/kg the aircraft weighs {result.mass * result.mass_factor:.2f} kg with"
+        f" this battery, instead of {result.mass:.2f} kg{limit_text}"
     ]

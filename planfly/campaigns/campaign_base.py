@@ -43,9 +43,9 @@ from world.frames import to_map
 from world.scenario import Scenario, with_ground
 from world.terrain import Terrain
 
-# Distance beyond the ends of a strip over which its survey holds, m: the flare and the last of the final.
+# Distance beyond the ends of a strip over which its surveyed height applies, m: the flare and the end of the approach.
 _SURVEYED_DISTANCE_M = 200.0
-# Distance over which the error changes from the survey's error to the elevation file's error, m.
+# Distance over which the height error changes from the survey's error to the elevation file's error, m.
 _SURVEY_BLEND_DISTANCE_M = 1000.0
 # Distance over which the size of a terrain pixel is measured, m.
 _PROBE_DISTANCE_M = 100.0
@@ -75,7 +75,7 @@ class CampaignBase:
     name: str
 
     def nominal_setup(self) -> FlightSetup:
-        """Return the flight setup without any variation.
+        """Return the setup of the flight without dispersions.
 
         Raises PlanflyError for a mission without a valid route.
         """
@@ -155,7 +155,7 @@ def open_campaign(
 
 
 def campaign_of_setup(setup: FlightSetup, dispersions: Dispersions) -> CampaignBase:
-    """Return the base of a campaign that flies the mission of a setup, with the draws of its aircraft.
+    """Return the base of a campaign that flies the mission of a setup, with the draws stored with its aircraft.
 
     Raises SpreadError if the aircraft cannot fly at the medians of the dispersions.
     """
@@ -170,13 +170,13 @@ def campaign_of_setup(setup: FlightSetup, dispersions: Dispersions) -> CampaignB
 
 
 def _check_base(base: CampaignBase) -> CampaignBase:
-    """Check and return a base.
+    """Return a campaign base, after checking that its aircraft can fly and its mission has a route.
 
-    Raises PlanflyError if the aircraft cannot fly at the medians of the dispersions, or if the mission has no valid
-    route.
+    Raises PlanflyError if the aircraft cannot fly level at the medians of the dispersions, or if the mission has no
+    valid route.
     """
     check_level_flight_at_medians(base)
-    # Refuse a mission without a valid route now, not in a worker.
+    # Refuse a mission without a valid route here, before the workers start.
     base.nominal_setup()
     return base
 
@@ -186,7 +186,8 @@ def _make_plan(scenario: Scenario, seed: int | None, advance: Advance | None) ->
     plan = make_plan(scenario, load_uav(scenario), choose_seed(scenario, seed), advance=advance)
     if not plan.feasible:
         raise MissionError(
-            f"{scenario.name}: no feasible plan, so nothing to fly; `planfly plan` says why", file=scenario.name
+            f"{scenario.name}: no feasible plan was found, so there is no mission to fly; `planfly plan` shows why",
+            file=scenario.name,
         )
     return plan
 
@@ -223,8 +224,8 @@ def check_level_flight_at_medians(base: CampaignBase) -> None:
         if quantity is None:
             raise
         raise SpreadError(
-            f"{base.dispersions.name}: {quantity}: the model of {aircraft.name} has no property {error.field}, which it"
-            f" varies; leave {quantity} out of a file of dispersions (--spread FILE)",
+            f"{base.dispersions.name}: {quantity}: this quantity varies the property {error.field}, which the model of"
+            f" {aircraft.name} does not have; use a file of dispersions without {quantity} (--spread FILE)",
             file=base.dispersions.name,
             field=quantity,
         ) from error
@@ -234,8 +235,8 @@ def check_level_flight_at_medians(base: CampaignBase) -> None:
             f"{name} {medians[name]:g}" for name in ("mass", "drag", "control_power") if name in medians
         )
         raise SpreadError(
-            f"{base.dispersions.name}: with the medians of its factors ({factors}) {aircraft.name} cannot fly level at"
-            f" {base.uav.airspeed:g} m/s",
+            f"{base.dispersions.name}: {aircraft.name} cannot fly level at {base.uav.airspeed:g} m/s with the medians"
+            f" of these factors: {factors}",
             file=base.dispersions.name,
             value=factors,
         )
@@ -253,8 +254,8 @@ def _check_draws(base: CampaignBase) -> None:
     try:
         Fdm(base.uav.aircraft, variation=Variation(properties=draws.properties(0)))
     except FlightError as error:
-        allowed = f"these draws belong to another aircraft: {error}"
-        raise SpreadError(f"{draws.source}: {allowed}", file=draws.source, field=error.field) from error
+        message = f"{draws.source}: these draws belong to another aircraft: {error}"
+        raise SpreadError(message, file=draws.source, field=error.field) from error
 
 
 def with_aircraft_draws(dispersions: Dispersions, aircraft: Aircraft) -> Dispersions:
@@ -307,10 +308,10 @@ class VariedFlight:
 
 
 def vary_flight(base: CampaignBase, draw: Draw, wind: GivenWind | None = None) -> VariedFlight:
-    """Apply a draw to a flight: vary its setup, its UAV, and what differs unknown to the autopilot.
+    """Return the flight of a draw: setup, UAV, and the differences that the autopilot does not know.
 
     Scenario and limits are adapted to the wind of the flight, as in `planfly fly --wind`.  The autopilot does not know
-    the varied mass, drag, control power, aircraft properties and start position.
+    the drawn mass, drag, control power, aircraft properties and start position.
 
     wind: mean wind that the draw varies; None for the wind of the scenario.
     """
@@ -340,7 +341,11 @@ def vary_flight(base: CampaignBase, draw: Draw, wind: GivenWind | None = None) -
 
 
 def _with_drawn_wind(scenario: Scenario, values: dict[str, float], mean_wind: GivenWind | None) -> Scenario:
-    """Return the scenario with the wind of a draw; the flight's seed replaces the scenario's for gusts."""
+    """Return the scenario in the drawn wind, without a seed of its own for the gusts.
+
+    values: drawn values, keyed by quantity.
+    mean_wind: mean wind that the draw varies; None for the wind of the scenario.
+    """
     old_wind = scenario.wind
     nominal = mean_wind or GivenWind(old_wind.speed, math.degrees(old_wind.from_course))
     speed = min(MAX_WIND_MPS, max(0.0, nominal.speed + values["wind_speed"]))
@@ -375,7 +380,7 @@ def vary_terrain(terrain: Terrain, error: float, strip: LandingStrip | None, str
     """
     if strip is None or strip_error is None:
         return replace(terrain, heights=terrain.heights + np.float32(error)) if error else terrain
-    # Metres on the map per column and row, from the columns and rows per metre near the strip.
+    # Invert the columns and rows per metre near the strip to metres on the map per column and row.
     centre = np.array(terrain.to_pixel(strip.east, strip.north)).ravel()
     probes = ((strip.east + _PROBE_DISTANCE_M, strip.north), (strip.east, strip.north + _PROBE_DISTANCE_M))
     steps = [np.array(terrain.to_pixel(*probe)).ravel() - centre for probe in probes]
@@ -390,9 +395,10 @@ def vary_terrain(terrain: Terrain, error: float, strip: LandingStrip | None, str
 
 
 def _terrain_error_at_home(base: CampaignBase, varied_terrain: Terrain) -> float:
-    """Return the height error of a campaign's terrain at home, m; 0 if home is off the terrain.
+    """Return the height of a flight's terrain minus the height of the campaign's terrain at home, m.
 
-    varied_terrain: terrain of a flight.
+    The result is 0 if home is off the terrain.
+    varied_terrain: terrain of the flight.
     """
     terrain, home = base.scenario.terrain, base.placed.itinerary.home
     if terrain is None or varied_terrain is terrain:

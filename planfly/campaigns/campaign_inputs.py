@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-# Beginning of the value that stands for a list or a text.
+# Prefix of the hash that represents a list or a long text.
 _HASH_PREFIX = "sha256:"
 # Maximum number of differences that are described.
 _MAX_DESCRIBED = 6

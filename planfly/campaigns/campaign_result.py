@@ -45,7 +45,8 @@ def campaign_command_line(target: str, goal: Goal, options: Mapping[str, object]
 def winds_command_line(target: str, goal: WindsGoal, options: Mapping[str, object]) -> str:
     """Return the ``planfly winds`` command line for a goal and options.
 
-    The arguments are as for `campaign_command_line`.
+    Options that are None are omitted.
+    target: scenario, plan or mission of the search.
 
     >>> winds_command_line("jacksboro-air", WindsGoal(0.9, 0.95, 8, 20.0, 5000), {"seed": 1})
     'planfly winds jacksboro-air --prove 0.9 --directions 8 --seed 1'

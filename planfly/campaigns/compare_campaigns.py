@@ -25,7 +25,8 @@ class ComparedCampaign:
 
     name: its folder.
     interval: two-sided interval of the probability of a flyable flight, at 95 % confidence.
-    failed_by_rule: number of compared flights that failed each rule: flights of pairs if there are any.
+    failed_by_rule: number of compared flights that failed each rule.  Compared flights are the pairs, or all flights if
+        there are no pairs.
     """
 
     name: str
@@ -95,7 +96,7 @@ def campaign_table(path: Path) -> Path | None:
 def compare_tables(first: Path, second: Path) -> CampaignComparison:
     """Compare the campaigns in two tables.
 
-    Raises StoreError for a file that is no table of a campaign, for an empty or damaged table, and for a table that
+    Raises StoreError for a file that is not a campaign's table, for an empty or damaged table, and for a table that
     another process has locked.
     """
     for path in (first, second):
@@ -134,9 +135,10 @@ def compare_tables(first: Path, second: Path) -> CampaignComparison:
 def _count_outcomes(
     path: Path, table: Mapping[str, NDArray[Any]], compared_rows: NDArray[np.intp], settings: Mapping[str, Any]
 ) -> ComparedCampaign:
-    """Count the outcomes of a campaign.
+    """Count a campaign's flights by outcome, and its compared flights by failed rule.
 
-    compared_rows: rows of the table, (n,), whose failures are counted by rule.
+    path: file of the campaign's table.
+    compared_rows: rows of the compared flights in the table, (n,).
     """
     outcomes = table["outcome"].tolist()
     tally = Tally(*map(outcomes.count, OUTCOMES))
@@ -166,24 +168,33 @@ def _paired_rows(first: Mapping[str, NDArray[Any]], second: Mapping[str, NDArray
 
 
 def _notes(tables: list[dict[str, NDArray[Any]]], settings: list[dict[str, Any]], pairs: int) -> list[str]:
-    """Return remarks on the compared flights, and on assumptions of the interval that do not hold."""
+    """Return remarks on the compared flights, and on assumptions of the interval that do not hold.
+
+    tables, settings: table of flights and stored settings of both campaigns.
+    pairs: number of flights with the same draws in both campaigns.
+    """
     notes = []
     counts = [len(table["flight"]) for table in tables]
     if pairs and pairs < max(counts):
         notes.append(
-            f"only {count_text(pairs, 'flight')} that both campaigns have are compared, in the difference and by rule"
+            f"the difference and the counts by rule compare only the {count_text(pairs, 'flight')} that both campaigns"
+            " have"
         )
     if undecided_count := sum(table["outcome"].tolist().count("undecided") for table in tables):
-        notes.append(
-            f"{count_text(undecided_count, 'flight')} not judged in full: the difference counts them as not flyable"
-        )
+        notes.append(f"the difference counts {count_text(undecided_count, 'flight')} not judged in full as not flyable")
     if any(setting.get("stops") or setting.get("changed") for setting in settings):
-        notes.append("a number of flights was not fixed beforehand: the interval of the difference is only approximate")
+        notes.append(
+            "the number of flights of a campaign was not fixed beforehand, so the interval of the difference is only"
+            " approximate"
+        )
     return notes
 
 
 def _disagreement_notes(difference: ProportionDifference, *, is_paired: bool) -> list[str]:
-    """Return a remark if the test contradicts the interval, which decides the answer; otherwise [].
+    """Return a remark if the exact test contradicts the interval of the difference; otherwise [].
+
+    The interval decides the answer of a comparison.
+    is_paired: True if the flights are paired, so that the test is McNemar's; otherwise it is Fisher's.
 
     >>> _disagreement_notes(ProportionDifference(0.1, Interval(0.02, 0.3), 0.04), is_paired=True)
     []
@@ -193,22 +204,22 @@ def _disagreement_notes(difference: ProportionDifference, *, is_paired: bool) ->
     if excludes_zero == (difference.p_value <= max_p_value):
         return []
     test = f"{'McNemar' if is_paired else 'Fisher'}'s exact test"
-    p_text = f"p = {difference.p_value:.2g}, {max_p_value:.2g} is the limit"
+    p_text = f"p = {difference.p_value:.2g}, limit {max_p_value:.2g}"
     texts = ("shows a difference", "shows none")
     interval_text, test_text = texts if excludes_zero else reversed(texts)
-    return [f"the interval {interval_text}, and decides the answer; {test} {test_text} ({p_text})"]
+    return [f"the interval {interval_text}, but {test} {test_text} ({p_text}); the interval decides the answer"]
 
 
 def comparison_lines(comparison: CampaignComparison) -> list[str]:
-    """Return a comparison as lines for a terminal."""
-    value, (low, high), p_value = comparison.difference
+    """Return the lines of a comparison for a terminal: answer, both campaigns, rules, inputs and notes."""
+    difference, (low, high), p_value = comparison.difference
     percent = f"{100.0 * DEFAULT_CONFIDENCE:g} %"
     answers = {
         "more likely": "flights of the second campaign are more likely to be flyable",
         "less likely": "flights of the second campaign are less likely to be flyable",
         "no difference shown": "the flights show no difference",
     }
-    lines = [f"{answers[comparison.answer]}: {value:+.4f} ({low:+.4f} to {high:+.4f} at {percent})"]
+    lines = [f"{answers[comparison.answer]}: {difference:+.4f} ({low:+.4f} to {high:+.4f} at {percent})"]
     for title, campaign in (("first ", comparison.first), ("second", comparison.second)):
         lines.append(
             f"  {title}  {campaign.name}: {campaign.tally.flyable} of {count_text(campaign.tally.flown, 'flight')}"
@@ -219,25 +230,25 @@ def comparison_lines(comparison: CampaignComparison) -> list[str]:
         f"  paired  {count_text(comparison.pairs, 'flight')} with the same draws: {comparison.only_first} flyable only"
         f" in the first, {comparison.only_second} only in the second (McNemar's exact test: p = {p_value:.2g})"
         if comparison.pairs
-        else f"  paired  no: the flights have other draws (Fisher's exact test: p = {p_value:.2g}); with the same"
-        " --seed and --spread they are compared in pairs, which shows smaller differences"
+        else f"  paired  no: the draws of the campaigns differ (Fisher's exact test: p = {p_value:.2g}). Campaigns with"
+        " the same --seed and --spread are compared in pairs, which shows smaller differences"
     )
     lines += [
         f"  fails   {RULE_WORDS[rule].title}: {_change_text(first, second, comparison)}"
         for rule, first, second in comparison.rules
     ]
-    lines += [f"  differs {text}" for text in comparison.inputs] or [
-        "  differs nothing but planfly's code, if anything"
-    ]
+    lines += [f"  differs {text}" for text in comparison.inputs] or ["  differs no input; planfly's code may differ"]
     return [*lines, *(f"  note    {note}" for note in comparison.notes)]
 
 
 def _change_text(first: int, second: int, comparison: CampaignComparison) -> str:
-    """Return a text on the change of the share of flights that failed a rule.
+    """Describe how the percentage of flights that failed a rule changes from the first campaign to the second.
 
-    first, second: numbers of these flights in both campaigns.
+    first, second: number of compared flights of each campaign that failed the rule.
     """
     first_count, second_count = comparison.compared_counts
     change = 100.0 * (second / second_count - first / first_count)
     word = "more often" if change > 0.0 else "less often" if change < 0.0 else "as often"
-    return f"{word}, in {first} and {count_text(second, 'flight')} ({change:+.1f} %)"
+    return (
+        f"{word}: {count_text(first, 'flight')} of the first, {second} of the second ({change:+.1f} percentage points)"
+    )

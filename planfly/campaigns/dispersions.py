@@ -32,10 +32,10 @@ from world.files import read_small_file, toml_table, utf8_text
 
 
 class Quantity(NamedTuple):
-    """Number that is drawn once per flight.
+    """Quantity that is drawn once per flight.
 
     name: name of the quantity's table in a dispersions file, and of its column in the table of flights.
-    combine: "added" if the drawn number is added to the scenario's value, "factor" if it multiplies this value.
+    combine: "added" if the drawn number is added to the scenario's value, "factor" if it multiplies that value.
     unit: unit of an added value; "" for a factor.
     low, high: minimum and maximum value that may be drawn; values outside this range are unrealistic.
     integer: True for a number of steps, with a discrete distribution.
@@ -115,7 +115,7 @@ class VaryingQuantity:
         return getattr(stats, self.distribution)(**dict(self.parameters))
 
     @cached_property
-    def _range_limits(self) -> tuple[float, float]:
+    def _range_probabilities(self) -> tuple[float, float]:
         """Cumulative probabilities at the lower and the upper end of the quantity's range."""
         min_value = self.quantity.low - (0.5 if self.quantity.integer else 0.0)
         return float(self._scipy_distribution.cdf(min_value)), float(self._scipy_distribution.cdf(self.quantity.high))
@@ -123,7 +123,7 @@ class VaryingQuantity:
     @property
     def fraction_inside(self) -> float:
         """Fraction of the distribution within the quantity's range, 0 to 1; NaN for invalid parameters."""
-        lower_probability, upper_probability = self._range_limits
+        lower_probability, upper_probability = self._range_probabilities
         return upper_probability - lower_probability
 
     def value(self, fraction: float) -> float:
@@ -138,8 +138,8 @@ class VaryingQuantity:
         return float(self.values(np.array([fraction]))[0])
 
     def values(self, fractions: Floats) -> Floats:
-        """Return the quantile for each of several fractions, (n,); see `value`."""
-        lower_probability, upper_probability = self._range_limits
+        """Return the quantile of each cumulative probability, (n,); see `value`."""
+        lower_probability, upper_probability = self._range_probabilities
         values = self._scipy_distribution.ppf(lower_probability + fractions * (upper_probability - lower_probability))
         return np.clip(values, self.quantity.low, self.quantity.high)
 
@@ -246,7 +246,7 @@ def parse_dispersions(text: str, name: str) -> Dispersions:
 
 
 def _read_named_draws(aircraft_table: Any, name: str) -> Draws:
-    """Read the draws of aircraft properties from the file that a dispersions file names.
+    """Read the file of draws of aircraft properties that a dispersions file names.
 
     aircraft_table: table of the dispersions file; the path in it is relative to the dispersions file.
     name: name of the dispersions file.
@@ -287,7 +287,8 @@ def _parse_quantity(quantity: Quantity, quantity_table: Any, name: str) -> Varyi
     if not fraction >= MIN_FRACTION_INSIDE:
         allowed = (
             f"only {100.0 * fraction:.1f} % of the distribution lies within {quantity.low:g}..{quantity.high:g}"
-            f" {quantity.unit or 'times the nominal value'}; at least {100.0 * MIN_FRACTION_INSIDE:.0f} % must"
+            f" {quantity.unit or 'times the nominal value'}; at least {100.0 * MIN_FRACTION_INSIDE:.0f} % must lie"
+            " there"
         )
         raise SpreadError.at(name, quantity.name, _call_text(varying), allowed)
     return varying
@@ -415,7 +416,7 @@ def standard_draws(dispersions: Dispersions, seed: int, start: int, stop: int) -
 
 
 def standard_population(dispersions: Dispersions, count: int) -> Floats:
-    """Return points that cover the dispersions evenly, in the units of `standard_draws`, (count, d).
+    """Return points that cover the dispersions evenly, in standard deviations as in `standard_draws`, (count, d).
 
     The points are a Sobol sequence, each at the center of its cell.
 

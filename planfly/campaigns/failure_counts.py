@@ -34,7 +34,7 @@ def count_failures(flights: Iterable[Iterable[tuple[str, Place]]]) -> tuple[Rule
     """
     counts: Counter[str] = Counter()
     places: dict[str, Counter[Place]] = {}
-    # Flights fail at different corners of a loiter, which is one place; the first of them stands for it.
+    # Flights fail at different corners of a loiter, which is one place; the first corner found stands for all.
     first_places: dict[Place, Place] = {}
     for flight in flights:
         failed_findings = list(flight)
@@ -46,12 +46,17 @@ def count_failures(flights: Iterable[Iterable[tuple[str, Place]]]) -> tuple[Rule
 
 
 def deciding_rule(by_rule: Sequence[RuleFailures]) -> str:
-    """Return the rule that fails the most flights, in a tie the most urgent; "" without failures."""
+    """Return the rule that fails the most flights, in a tie the most urgent; "" without failures.
+
+    by_rule: failures by rule, the most urgent rule first.
+    """
     return next(iter(deciding_rules(by_rule)), "")
 
 
 def deciding_rules(by_rule: Sequence[RuleFailures]) -> tuple[str, ...]:
     """Return the rules that fail the most flights (ties included), most urgent first; () without failures.
+
+    by_rule: failures by rule, the most urgent rule first.
 
     >>> flights = [[("slope", Place("leg", 1)), ("turn", Place("waypoint", 1))], [("clearance", Place("leg", 2))]]
     >>> deciding_rules(count_failures([*flights, *flights[1:]])), deciding_rules(count_failures(flights[:1]))
@@ -78,7 +83,7 @@ def failures_document(by_rule: Iterable[RuleFailures]) -> list[dict[str, Any]]:
 def failure_lines(by_rule: Iterable[RuleFailures], mission_fault: str = "") -> list[str]:
     """Return a line for each failed rule: number of failed flights, and the three most frequent places.
 
-    mission_fault: text for failures of the mission as a whole, which have no place; "" if it is not known.
+    mission_fault: text for failures of the mission as a whole, which have no place; "" if there is none.
     """
     lines = []
     for failures in by_rule:

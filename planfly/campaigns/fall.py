@@ -1,7 +1,7 @@
-"""Fall of an aircraft that has lost control, to the ground: without drag, and with the drag of its wing across the air.
+"""Compute where an aircraft that has lost control hits the ground: without drag, or with its wing broadside to the air.
 
-A fall without drag goes farthest ahead, and one with the wing across the air drifts farthest with the wind; the impact
-of any other fall lies between.
+A fall without drag goes farthest ahead.  A fall with the wing broadside to the air drifts farthest with the wind.  The
+impact point of any other fall lies between these two.
 """
 
 from collections.abc import Callable
@@ -13,13 +13,13 @@ from aircraft.envelope import GRAVITY
 from world.arrays import Floats
 from world.terrain import Terrain
 
-# Air density at sea level, kg/m3; it is lower higher up, which lies between the two falls.
+# Air density at sea level, kg/m3.  With the lower density at altitude, an impact lies between those of the two falls.
 _AIR_DENSITY = 1.225
-# Drag coefficient of a flat plate across the air, on the wing's area.
+# Drag coefficient of a flat plate broadside to the air, relative to the wing area.
 _PLATE_DRAG_COEFFICIENT = 1.2
 # Time step of a fall, s.
 _TIME_STEP_S = 0.05
-# Longest fall, s.
+# Maximum duration of a fall, s.
 _MAX_FALL_S = 600.0
 
 
@@ -29,32 +29,32 @@ def plate_drag(aircraft: Aircraft) -> float:
 
 
 def impact_points(
-    position: Floats, velocity: Floats, drag: float, wind_at: Callable[[Floats], Floats], terrain: Terrain
+    position: Floats, velocity: Floats, drag: float, find_wind: Callable[[Floats], Floats], terrain: Terrain
 ) -> Floats:
     """Return the positions (east, north) at which falls hit the ground, m, (n, 2).
 
     Where the terrain is unknown, the lowest known terrain below the falls is used.
 
-    position, velocity: at the start of the falls, over the ground, m and m/s, (n, 3).
+    position, velocity: position, m, and ground velocity, m/s, at the start of each fall, (n, 3).
     drag: drag per mass and square of the airspeed, 1/m.
-    wind_at: function from positions, m, (n, 3), to the wind there, m/s, (n, 2) east and north.
+    find_wind: function from positions, m, (n, 3), to the wind there, m/s, (n, 2) east and north.
     """
-    place, speed = position.astype(np.float64), velocity.astype(np.float64)
-    start_ground = terrain.height(place[:, 0], place[:, 1])
-    lowest_ground = float(np.nanmin(start_ground)) if np.isfinite(start_ground).any() else float(place[:, 2].min())
-    half_pull = np.array([0.0, 0.0, 0.5 * GRAVITY * _TIME_STEP_S])
-    is_falling = np.ones(len(place), dtype=np.bool_)
+    positions, velocities = position.astype(np.float64), velocity.astype(np.float64)
+    start_ground = terrain.height(positions[:, 0], positions[:, 1])
+    lowest_ground = float(np.nanmin(start_ground)) if np.isfinite(start_ground).any() else float(positions[:, 2].min())
+    half_step_gravity = np.array([0.0, 0.0, 0.5 * GRAVITY * _TIME_STEP_S])
+    is_falling = np.ones(len(positions), dtype=np.bool_)
     for _ in range(int(_MAX_FALL_S / _TIME_STEP_S)):
         rows = np.flatnonzero(is_falling)
         if not rows.size:
             break
-        wind_velocity = np.column_stack([wind_at(place[rows]), np.zeros(rows.size)])
-        # Half of the step's gravity, the exact loss of speed by drag alone, and the other half.
-        airspeed = speed[rows] - wind_velocity - half_pull
-        slowed = airspeed / (1.0 + drag * np.linalg.norm(airspeed, axis=1)[:, None] * _TIME_STEP_S)
-        new_speed = wind_velocity + slowed - half_pull
-        place[rows] += 0.5 * (speed[rows] + new_speed) * _TIME_STEP_S
-        speed[rows] = new_speed
-        ground = terrain.height(place[rows, 0], place[rows, 1])
-        is_falling[rows] = place[rows, 2] > np.where(np.isfinite(ground), ground, lowest_ground)
-    return np.asarray(place[:, :2])
+        wind_velocity = np.column_stack([find_wind(positions[rows]), np.zeros(rows.size)])
+        # Apply half of the step's gravity, then the exact solution for drag alone, then the other half of the gravity.
+        air_velocity = velocities[rows] - wind_velocity - half_step_gravity
+        slowed_velocity = air_velocity / (1.0 + drag * np.linalg.norm(air_velocity, axis=1)[:, None] * _TIME_STEP_S)
+        new_velocities = wind_velocity + slowed_velocity - half_step_gravity
+        positions[rows] += 0.5 * (velocities[rows] + new_velocities) * _TIME_STEP_S
+        velocities[rows] = new_velocities
+        ground = terrain.height(positions[rows, 0], positions[rows, 1])
+        is_falling[rows] = positions[rows, 2] > np.where(np.isfinite(ground), ground, lowest_ground)
+    return np.asarray(positions[:, :2])

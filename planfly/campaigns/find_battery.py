@@ -37,12 +37,12 @@ from world.errors import PlanflyError
 DEFAULT_BATTERY_FLIGHTS = 100
 # Capacity with which no flight ends early, Wh.
 _ENDLESS_BATTERY_WH = 1e9
-# Largest relative change of the capacity from one campaign to the next at which its mass counts as found.
+# Largest relative change of the capacity from one campaign to the next at which the battery's mass is settled.
 _CAPACITY_TOLERANCE = 0.005
-# Largest number of campaigns in the search for the mass.
+# Maximum number of campaigns in the search for the battery's mass.
 _MAX_ROUNDS = 8
-# Range of the aircraft's mass relative to its stated mass.  A heavier aircraft would be another one; a lighter one is
-# flown with the lowest mass, which needs more energy and so is safe.
+# Range of the aircraft's mass relative to its stated mass.  A heavier aircraft would be another one.  A lighter
+# aircraft is flown with the lowest mass, which is safe because it needs more energy.
 MIN_MASS_FACTOR = 0.6
 _MAX_MASS_FACTOR = 1.5
 # End reason of a flight that flew its mission to the end.
@@ -56,7 +56,7 @@ class BatteryGoal:
     probability: probability with which the reserve is to be kept.
     confidence: confidence of the interval of the capacity.
     flights: number of flights of each campaign.
-    interval: time between two returns, s.
+    interval: time between the starts of two simulated returns, s.
     reserve: fraction of the battery that is to be left.
     specific_energy: energy per battery mass, Wh/kg; None if the mass does not change with the battery.
     """
@@ -78,9 +78,9 @@ class EnergyRow(FlightRow):
         example against the wind; NaN if no return's energy is known.
     return_time: start of this return, s.
     return_leg: number of the leg on which this return starts, as in messages.
-    leg_energies: energy used on each leg by its number, Wh: all legs around a loiter are one.
+    leg_energies: energy used on each leg, Wh, by leg number; all legs around a loiter have one number.
     battery_factor: drawn factor on the battery's capacity.
-    blocked_returns: number of returns that hit something before they arrive, whatever the battery.
+    blocked_returns: number of returns that end at terrain, a zone or a threat; a larger battery would not help them.
     unknown_returns: number of returns whose energy is unknown, because they leave the terrain data.
     """
 
@@ -115,7 +115,7 @@ def fly_for_energy(
 
     index: number of the flight, from 0.
     wind: mean wind that replaces the scenario's wind, or None.
-    interval: time between two returns, s.
+    interval: time between the starts of two returns, s.
     mass_factor: mass of the aircraft with its battery, relative to the stated mass.
     """
     draw = draw_flight(base.dispersions, base.seed, index)
@@ -143,10 +143,12 @@ def fly_for_energy(
 
 
 def _with_returns(row: EnergyRow, varied: VariedFlight, track: Track, interval: float) -> EnergyRow:
-    """Add the return that needs the most energy to a row; without a home, return the row unchanged.
+    """Return a row with the energy and start of the return that needs the most energy.
 
-    The point mass does not know the drawn mass and drag, gusts and turns.  Its energy of a return is therefore
-    multiplied by the ratio of flown to predicted energy in the mission of this flight.
+    Without a home the row is returned unchanged.  Returns are simulated with a point mass, which does not know the
+    drawn mass and drag, gusts and turns.  The energy of a return is therefore multiplied by the ratio of the flown
+    energy to the predicted energy in the mission of this flight.
+    interval: time between the starts of two returns, s.
     """
     if varied.setup.mission.home is None:
         return row
@@ -155,13 +157,13 @@ def _with_returns(row: EnergyRow, varied: VariedFlight, track: Track, interval: 
     returns: Returns = judge_returns(
         make_return_world(varied.setup), flown_starts(varied.setup, track, interval), interval
     )
-    kinds = Counter(ret.kind for ret in returns.each if math.isnan(ret.time_to_loiter))
+    failed_kinds = Counter(ret.kind for ret in returns.each if math.isnan(ret.time_to_loiter))
     lost_returns = [ret for ret in returns.each if ret.kind == "lost"]
     arriving = [ret for ret in returns.each if math.isfinite(ret.time_to_loiter)]
     row = replace(
         row,
-        unknown_returns=kinds["unknown"] + kinds["low"],
-        blocked_returns=kinds["ground"] + kinds["threat"] + kinds["zone"],
+        unknown_returns=failed_kinds["unknown"] + failed_kinds["low"],
+        blocked_returns=failed_kinds["ground"] + failed_kinds["threat"] + failed_kinds["zone"],
     )
     if not lost_returns and not arriving:
         return row
@@ -202,7 +204,7 @@ class BatteryResult:
         do not arrive, or because the energy that it adds is needed for its own mass; NaN if it is unknown.
     interval: its interval with the goal's confidence, Wh; its upper end is inf if there are too few flights.
     own_capacity: capacity of the aircraft's battery, Wh.
-    is_guessed: True if the aircraft does not state its battery.
+    is_guessed: True if the aircraft's model and the scenario state no capacity, so that `own_capacity` is only a guess.
     kept: number of flights in which the aircraft's own battery keeps the reserve, at the stated mass.
     rows: the flights with the found battery's mass.
     mass_factor: mass of the aircraft with the found battery, relative to its stated mass.
@@ -260,7 +262,7 @@ class BatteryResult:
     @property
     def decisions(self) -> tuple[BatteryDecision, ...]:
         """Parts of a flight that decide the battery, the most frequent first."""
-        # The mission, not a return, decides the flights under -1.
+        # Key -1 stands for flights that are decided by the mission, not by a return.
         times_by_leg: dict[int, list[float]] = {}
         for row in self.completed:
             leg = row.return_leg if row.is_decided_by_return else -1
@@ -288,10 +290,9 @@ class BatteryResult:
 def find_battery(base: CampaignBase, goal: BatteryGoal, workers: Workers, advance: Advance) -> BatteryResult:
     """Find the smallest battery that keeps the reserve in the flights of a campaign.
 
+    If the mass changes with the battery, the campaign is repeated until the capacity no longer changes: with the same
+    draws, and with the mass of the battery that the previous campaign found.
     Raises PlanflyError for an aircraft that burns fuel.
-
-    If the mass changes with the battery, the campaign is repeated with the same draws and the mass of the battery found
-    last, until the battery no longer changes.
     """
     aircraft = base.uav.aircraft
     if not aircraft.battery_voltage > 0.0:
@@ -307,15 +308,16 @@ def find_battery(base: CampaignBase, goal: BatteryGoal, workers: Workers, advanc
     mass_factor = 1.0
     if goal.specific_energy is not None and math.isfinite(capacity):
         for _ in range(_MAX_ROUNDS):
-            assumed = capacity
-            mass_factor = 1.0 + (assumed - own_capacity) / goal.specific_energy / aircraft.mass
+            assumed_capacity = capacity
+            mass_factor = 1.0 + (assumed_capacity - own_capacity) / goal.specific_energy / aircraft.mass
             mass_factor = max(MIN_MASS_FACTOR, mass_factor)
             if mass_factor > _MAX_MASS_FACTOR:
                 capacity, interval = math.inf, CapacityRange(math.inf, math.inf)
                 break
             rows = fly_energy_campaign(base, goal, workers, mass_factor, advance)
             capacity, interval = quantile_of_capacities(rows, goal)
-            if not math.isfinite(capacity) or abs(capacity - assumed) <= _CAPACITY_TOLERANCE * assumed:
+            change = abs(capacity - assumed_capacity)
+            if not math.isfinite(capacity) or change <= _CAPACITY_TOLERANCE * assumed_capacity:
                 break
     setup = base.nominal_setup()
     envelope = setup.envelope
@@ -338,9 +340,10 @@ def find_battery(base: CampaignBase, goal: BatteryGoal, workers: Workers, advanc
 def fly_energy_campaign(
     base: CampaignBase, goal: BatteryGoal, workers: Workers, mass_factor: float, advance: Advance
 ) -> tuple[EnergyRow, ...]:
-    """Fly the flights of a campaign for their energy; return their rows in the order of the draws.
+    """Fly the flights of a campaign, and return rows with the energy of each, in the order of the draws.
 
-    A flight whose worker died is left out of the rows.
+    mass_factor: mass of the aircraft relative to its stated mass.
+    A flight whose worker died has no row.
     """
     indices: Iterator[int] = iter(range(goal.flights))
 
@@ -360,11 +363,11 @@ def fly_energy_campaign(
 
 
 def quantile_of_capacities(rows: tuple[EnergyRow, ...], goal: BatteryGoal) -> tuple[float, CapacityRange]:
-    """Return the quantile of the capacities that the flights need, Wh, and its interval.
+    """Return the capacity that keeps the reserve with the goal's probability, Wh, and its confidence interval.
 
-    The interval follows from order statistics.  A bound is inf if no battery is enough for that many flights.  Quantile
-    and interval are NaN if the aircraft's power is unknown.  They are also NaN if too many flights did not complete the
-    mission, or have returns of unknown energy, to reach the goal.
+    The capacity is a quantile of the capacities that the flights need; its interval follows from order statistics.
+    The capacity or a bound is inf if no battery is enough.  All three are NaN if too few flights have a known energy to
+    reach the goal's probability.
     """
     from scipy import stats
 

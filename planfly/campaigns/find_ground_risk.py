@@ -1,10 +1,11 @@
 """Find the volumes and the ground risk class of a mission by SORA 2.5, from many flights and by formulas.
 
-Each flight of a campaign gives the area over which it flies, with its returns to launch, and the area on which the
-aircraft can fall from there. The flight geography is a corridor about the planned path, and about the path of the
-flight without variations, that holds a fraction of the flights; contingency volume and ground risk buffer hold all
-flights, returns and falls, and the volumes by the formulas of SORA's annex A. Their widths are the same all along the
-path: the largest anywhere.
+Each flight of a campaign gives two areas: the area below the flight and its returns to launch, and the area in which
+the aircraft can fall from them.  The flight geography is a corridor around the planned path and around the path of the
+flight without variations; it contains a fraction of the flights.  Contingency volume and ground risk buffer contain all
+flights, returns and falls, and the volumes by the formulas of SORA's annex A.  Each volume has one width along the
+whole
+path: the largest width that is needed anywhere.
 """
 
 import itertools
@@ -52,11 +53,11 @@ from world.wind import Wind
 
 # Time between the positions of a flight from which falls begin, s.
 _SAMPLE_INTERVAL_S = 1.0
-# Number of seconds between the positions of a return from which falls begin.
+# Number of rows of a return's path, one each second, between the positions from which falls begin.
 _RETURN_SAMPLE_ROWS = 5
 # Angle between the course and the bearing of the target at which the turn of a return ends, rad.
 _TURN_END_ANGLE_RAD = math.radians(5.0)
-# Deviation of a simplified outline, m.
+# Largest deviation of a simplified outline from the exact outline, m.
 _OUTLINE_TOLERANCE_M = 0.5
 # End reason of a flight that flew its mission to the end.
 _COMPLETED = "completed"
@@ -66,14 +67,14 @@ _COMPLETED = "completed"
 class GroundRiskGoal:
     """Question about the ground risk of a mission.
 
-    probability: fraction of the flights that the flight geography holds.
+    probability: fraction of the flights that the flight geography contains.
     flights: number of flights.
-    interval: time between two returns, s.
+    interval: time between the starts of two simulated returns, s.
     glide: True to include the glide after an engine failure.
     speed: highest speed of the aircraft, m/s; None for the highest airspeed of its model.
     controlled: True for a controlled ground area.
     population: file of the population raster, or None.
-    unit: unit of its numbers.
+    unit: unit of the raster's numbers.
     """
 
     probability: float = 0.95
@@ -90,12 +91,14 @@ class GroundRiskGoal:
 class ExcursionRow(FlightRow):
     """Row of a flight with the areas that it needs.
 
-    deviation: largest horizontal distance from the planned path and the path of the flight without variations, m.
-    turn_deviation: the same in flight or in the turn at the beginning of a return, m.
+    deviation: largest horizontal distance of the flight from the nominal paths, m.  The nominal paths are the planned
+        path and the path of the flight without variations.
+    turn_deviation: largest horizontal distance from the nominal paths in flight or in the first turn of a return, m.
     height: largest height above ground in flight, m.
     return_height: largest height above ground in flight or in a return, m.
     ground_speed: highest speed over the ground, m/s.
-    flown, fallen: areas below flight and returns, and of the falls from there, as WKB in m on the map.
+    flown: area below the flight and its returns, on the map, m, as well-known binary (WKB).
+    fallen: area in which falls from the flight and its returns end, as `flown`.
     """
 
     deviation: float = math.nan
@@ -110,11 +113,12 @@ class ExcursionRow(FlightRow):
 def fly_for_excursions(
     base: CampaignBase, index: int, wind: GivenWind | None = None, *, path: BaseGeometry, interval: float, glide: bool
 ) -> ExcursionRow:
-    """Fly one flight of a campaign; find the areas below the flight and its returns, and of falls from them.
+    """Fly one flight of a campaign; find the area below flight and returns, and the area of falls from them.
 
-    index: number of the flight, from 0. wind: mean wind that replaces the scenario's wind, or None.
-    path: planned path, and that of the flight without variations, m.
-    interval: time between two returns, s.
+    index: number of the flight, from 0.
+    wind: mean wind that replaces the scenario's wind, or None.
+    path: planned path, and path of the flight without variations, m.
+    interval: time between the starts of two returns, s.
     glide: True to include the glide after an engine failure.
 
     Without terrain, and for a flight that ends at its start, the row contains only the draw and how the flight ended.
@@ -141,14 +145,14 @@ def fly_for_excursions(
     turns = turn_areas(times, positions, paths.times, paths.turns, interval)
     areas = [*shapely.buffer(lines, half_span), *paths.loiters, *areas_between(paths.returns), *turns]
     flown_area = shapely.union_all(areas)
-    # In a forecast, the wind at the middle of the flight.
-    middle = 0.5 * float(flown_mission.track.time[-1])
+    # Falls use the wind of the forecast at half the flight's duration.
+    half_time = 0.5 * float(flown_mission.track.time[-1])
 
-    def wind_at(places: Floats) -> Floats:
-        """Return the wind at places (n, 3) at the middle of the flight, m/s, (n, 2)."""
-        return setup.scenario.wind_velocities(places, np.full(len(places), middle))
+    def find_wind(places: Floats) -> Floats:
+        """Return the wind at places, m, (n, 3), at half the flight's duration, m/s, (n, 2)."""
+        return setup.scenario.wind_velocities(places, np.full(len(places), half_time))
 
-    falls = _fall_areas(sampled, uav, wind_at, terrain)
+    falls = _fall_areas(sampled, uav, find_wind, terrain)
     glides = shapely.buffer([shapely.LineString(glide_path[:, :2]) for glide_path in paths.glides], 1.0)
     fallen_area = shapely.union_all([flown_area, *falls, *glides])
     height = _largest_height(positions, terrain)
@@ -157,7 +161,7 @@ def fly_for_excursions(
         row,
         duration=float(flown_mission.track.time[-1]),
         deviation=deviation,
-        turn_deviation=max([deviation, *(_reach(area, path) for area in turns)]),
+        turn_deviation=max([deviation, *(_distance_beyond(area, path) for area in turns)]),
         height=height,
         return_height=max([height, *(_largest_height(each, terrain) for each in paths.returns)]),
         ground_speed=float(np.hypot(velocities[:, 0], velocities[:, 1]).max()),
@@ -167,9 +171,9 @@ def fly_for_excursions(
 
 
 def _sampled_flight(track: Track) -> tuple[Floats, Floats, Floats]:
-    """Sample a track at intervals, and at its end.
+    """Sample a track every `_SAMPLE_INTERVAL_S`, and at its end.
 
-    Return times, s, (n,), and positions and ground velocities, m and m/s, (n, 3) each.
+    Return times, s, (n,), positions, m, (n, 3), and ground velocities, m/s, (n, 3).
     """
     is_usable = np.isfinite(track.position).all(axis=1) & np.isfinite(track.velocity).all(axis=1)
     rows = np.flatnonzero(is_usable)
@@ -181,9 +185,9 @@ def _sampled_flight(track: Track) -> tuple[Floats, Floats, Floats]:
 
 
 def _sampled_return(path: Floats) -> tuple[Floats, Floats]:
-    """Sample positions of a return, m, and ground velocities, m/s, (n, 3) each.
+    """Return sampled positions of a return, m, and ground velocities, m/s, (n, 3) each.
 
-    The samples are every `_RETURN_SAMPLE_ROWS`th position and the last.
+    Samples are every `_RETURN_SAMPLE_ROWS`-th position and the last position.
 
     path: positions of the return, one each second, m, (t, 3).
     """
@@ -194,11 +198,11 @@ def _sampled_return(path: Floats) -> tuple[Floats, Floats]:
 class _ReturnPaths(NamedTuple):
     """Paths of the returns from a flight, in order of their starts.
 
-    times: times of their starts, s, (n,).
-    returns: positions, m, (n, 3) each.
-    turns: beginnings of the returns, up to where they head for their targets, m, (n, 3) each.
-    loiters: areas of their loiters, m.
-    glides: paths of glides to the ground, m, (n, 3) each.
+    times: start time of each return, s, (n,).
+    returns: positions of each return, m, (k, 3).
+    turns: positions of each return up to where it heads for its target, m, (k, 3).
+    loiters: areas of the loiters around the targets, m.
+    glides: positions of each glide that ends at the ground, m, (k, 3).
     """
 
     times: Floats
@@ -209,17 +213,17 @@ class _ReturnPaths(NamedTuple):
 
 
 def _return_paths(setup: FlightSetup, track: Track, interval: float, *, glide: bool) -> _ReturnPaths:
-    """Return the paths of the returns from a track; none without a home.
+    """Return the paths of the returns from a track; a mission without home has no returns.
 
-    interval: time between two returns, s.
-    glide: True to simulate the returns without an engine, too.
+    interval: time between the starts of two returns, s.
+    glide: True to simulate also glides, which are returns after an engine failure.
     """
-    none = _ReturnPaths(np.zeros(0), [], [], [], [])
+    no_returns = _ReturnPaths(np.zeros(0), [], [], [], [])
     if setup.mission.home is None:
-        return none
+        return no_returns
     world, starts = make_return_world(setup), flown_starts(setup, track, interval)
     if not len(starts):
-        return none
+        return no_returns
     targets = [world.target(row) for row in starts.rows]
     paths = world.fly(starts, targets, store_paths=True).tracks
     radius = abs(world.autopilot.returns.rules.radius)
@@ -245,8 +249,9 @@ def _return_paths(setup: FlightSetup, track: Track, interval: float, *, glide: b
 def turn_of_return(path: Floats, target: Position, radius: float) -> Floats:
     """Return the first part of a return, m, (n, 3), up to where the aircraft heads for its target.
 
-    path: positions, m, (n, 3).
-    radius: radius of the loiter around the target, m; a course that meets the loiter heads for the target, too.
+    path: positions of the return, m, (n, 3).
+    target: center of the loiter at the end of the return, m.
+    radius: radius of this loiter, m; 0 without a loiter.  A course that meets the loiter also heads for the target.
     """
     steps, to_target = np.diff(path[:, :2], axis=0), np.array(target[:2]) - path[:-1, :2]
     along = np.sum(steps * to_target, axis=1)
@@ -259,14 +264,14 @@ def turn_of_return(path: Floats, target: Position, radius: float) -> Floats:
 def turn_areas(
     times: Floats, positions: Floats, start_times: Floats, turns: list[Floats], interval: float
 ) -> list[BaseGeometry]:
-    """Return the areas of the turns of returns that begin between two successive starts.
+    """Return the areas of the turns of all returns that may start between the simulated starts.
 
-    Each area is the flight between two starts, widened on both sides by the larger of their turns.
+    Each area is the path flown between two successive starts, widened to both sides by the larger of their two turns.
 
     times, positions: times, s, (n,), and positions, m, (n, 3), of the flight.
     start_times: times of the returns' starts, s, (m,).
-    turns: turn of each return, m, (n, 3) each.
-    interval: time after the last start that is covered, s.
+    turns: positions in the turn of each return, m, (k, 3).
+    interval: time covered after the last start, s.
     """
     areas = []
     for k, (start, end) in enumerate(itertools.pairwise([*start_times, *(start_times[-1:] + interval)])):
@@ -279,23 +284,26 @@ def turn_areas(
 
 
 def areas_between(paths: list[Floats]) -> list[BaseGeometry]:
-    """Return the areas between successive returns; a return may begin at any time between their starts."""
+    """Return the areas between successive returns, which contain the returns that start between them.
+
+    paths: positions of each return, m, (k, 3).
+    """
     lines = [shapely.get_coordinates(shapely.LineString(path[:, :2]).simplify(_OUTLINE_TOLERANCE_M)) for path in paths]
     rings = [np.concatenate([line, next_line[::-1]]) for line, next_line in itertools.pairwise(lines)]
     return [shapely.make_valid(shapely.Polygon(ring)) for ring in rings]
 
 
 def _fall_areas(
-    sampled: list[tuple[Floats, Floats]], aircraft: Aircraft, wind_at: Callable[[Floats], Floats], terrain: Terrain
+    sampled: list[tuple[Floats, Floats]], aircraft: Aircraft, find_wind: Callable[[Floats], Floats], terrain: Terrain
 ) -> list[BaseGeometry]:
-    """Return the areas in which an aircraft can fall from paths.
+    """Return for each path the area in which an aircraft can fall from it.
 
-    Each area is the hull of a piece of a path and of the impact points of falls from it.
-    sampled: positions and velocities of each path, m and m/s, (n, 3) each.
-    wind_at: see `impact_points`.
+    The area is the union of hulls; each contains a piece of the path and the impact points of falls from that piece.
+    sampled: positions, m, and ground velocities, m/s, of each path, (n, 3) each.
+    find_wind: see `impact_points`.
     """
     positions, velocities = (np.concatenate(values) for values in zip(*sampled, strict=True))
-    impacts = [impact_points(positions, velocities, drag, wind_at, terrain) for drag in (0.0, plate_drag(aircraft))]
+    impacts = [impact_points(positions, velocities, drag, find_wind, terrain) for drag in (0.0, plate_drag(aircraft))]
     points = np.stack([positions[:, :2], *impacts], axis=1)
     ends = np.cumsum([len(each) for each, _ in sampled])[:-1]
     areas = []
@@ -315,8 +323,8 @@ def _largest_height(positions: Floats, terrain: Terrain) -> float:
 class FlownVolumes(NamedTuple):
     """Dimensions of the volumes that the flights need, m.
 
-    deviation: distance from the path that holds the goal's fraction of the flights.
-    height: height above ground that holds the same fraction.
+    deviation: distance from the path that the goal's fraction of the flights does not exceed.
+    height: height above ground that the same fraction of the flights does not exceed.
     contingency_width: largest distance of a flight, or of the turn of a return, beyond the flight geography.
     return_distance: largest distance of a flight or a return beyond the flight geography.
     contingency_height: largest height above ground of a flight or a return.
@@ -337,10 +345,11 @@ class GroundRiskResult:
 
     flown: dimensions that the flights need.
     formula: contingency volume by formula.
-    glide_ratio: best glide ratio of the aircraft; None if glides are not asked for.
+    glide_ratio: best glide ratio of the aircraft; None if glides are not requested.
     speed: highest speed of the aircraft, m/s.
-    geography, volume, footprint: flight geography; operational volume, which is flight geography and contingency
-        volume; and operational volume with ground risk buffer, on the map, m.
+    geography: area of the flight geography, on the map, m.
+    volume: area of the operational volume, which is flight geography and contingency volume.
+    footprint: area of the operational volume and the ground risk buffer.
     population: population in the footprint; None without a raster.
     ground_class: intrinsic ground risk class; None if it is not judged, or if the operation is not part of SORA.
     files: files written; empty if no folder was named.
@@ -416,7 +425,7 @@ class GroundRiskResult:
 
     @property
     def entered_zones(self) -> tuple[str, ...]:
-        """Names of the scenario's zones whose area the operational volume meets, at any altitude."""
+        """Names of the scenario's zones that overlap the operational volume on the map, at any altitude."""
         names = []
         for zone in self.base.scenario.zones:
             parts = [shapely.Polygon(outline, holes) for outline, *holes in zone_parts(zone)]
@@ -469,7 +478,7 @@ def with_ground_class(result: GroundRiskResult) -> GroundRiskResult:
 
 
 def nominal_path(base: CampaignBase) -> BaseGeometry:
-    """Return the path of the flight without variations, and the lines of the route, m.
+    """Return the path of the flight without variations together with the lines of the route, on the map, m.
 
     Raises FlightError if the flight ends where it starts.
     """
@@ -484,7 +493,11 @@ def nominal_path(base: CampaignBase) -> BaseGeometry:
 def _fly_excursions(
     base: CampaignBase, goal: GroundRiskGoal, path: BaseGeometry, workers: Workers, advance: Advance
 ) -> tuple[ExcursionRow, ...]:
-    """Fly the flights of a campaign, and return their rows with areas, in the order of the draws."""
+    """Fly the flights of a campaign, and return rows with their areas, in the order of the draws.
+
+    path: planned path, and path of the flight without variations, m.
+    Raises FlightError if no flight could be flown.
+    """
     indices: Iterator[int] = iter(range(goal.flights))
 
     def next_request() -> FlightRequest | None:
@@ -505,7 +518,7 @@ def _fly_excursions(
 
 
 def _best_glide_ratio(base: CampaignBase) -> float:
-    """Return the best glide ratio in calm air: distance per height lost.
+    """Return the best glide ratio in calm air, the horizontal distance divided by the lost height.
 
     Raises FlightError for a model without trims with the throttle closed.
     """
@@ -531,9 +544,9 @@ def make_volumes(
     rows: tuple[ExcursionRow, ...],
     glide_ratio: float | None,
 ) -> GroundRiskResult:
-    """Make the volumes from the rows of the flights.
+    """Make the volumes of a ground risk from the rows of its flights.
 
-    path: planned path, and that of the flight without variations, m.
+    path: planned path, and path of the flight without variations, m.
     glide_ratio: best glide ratio; None if glides are not requested.
     """
     aircraft = base.uav.aircraft
@@ -552,9 +565,9 @@ def make_volumes(
         deviation=deviation,
         height=height,
         contingency_width=max(0.0, max(row.turn_deviation for row in rows) - half_width),
-        return_distance=_reach(flown_area, geography),
+        return_distance=_distance_beyond(flown_area, geography),
         contingency_height=max(row.return_height for row in rows),
-        buffer_width=_reach(fallen_area, flown_area),
+        buffer_width=_distance_beyond(fallen_area, flown_area),
     )
     speed = goal.speed or aircraft.airspeed_max
     formula = ContingencyFormula(speed, height)
@@ -577,6 +590,6 @@ def _without_filled_holes(area: BaseGeometry, footprint: BaseGeometry) -> BaseGe
     return shapely.union_all([area, *(hole for hole in holes if footprint.covers(hole))])
 
 
-def _reach(outer: BaseGeometry, inner: BaseGeometry) -> float:
-    """Return how far an area extends beyond another area at most, m; 0 for an empty area."""
+def _distance_beyond(outer: BaseGeometry, inner: BaseGeometry) -> float:
+    """Return the largest distance by which an area extends beyond another area, m; 0 for an empty area."""
     return float(shapely.distance(shapely.points(shapely.get_coordinates(outer)), inner).max(initial=0.0))

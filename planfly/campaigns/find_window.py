@@ -33,7 +33,7 @@ class WindowGoal:
     """Question of a search for a departure window.
 
     departures: times of take-off, ascending.
-    asked: time of take-off about which the user asks; None for any.
+    asked: requested time of take-off; None if any departure will do.
     probability: probability of a flyable flight at which a departure is open.
     flights: number of flights of each departure.
     zone: offset from UTC in which the user stated the times.
@@ -53,7 +53,7 @@ class Departure:
     time: time of take-off.
     scenarios: scenario at this time in each member of the forecast; () if the forecast does not cover the flight.
     rows: the flights, in the order of their draws.
-    not_judged: why the departure was not flown; "" if it was.
+    not_judged: reason why the departure was not flown; "" if it was flown.
     """
 
     time: datetime
@@ -110,9 +110,9 @@ class Departure:
 
     @property
     def wind(self) -> tuple[float, float]:
-        """Mean wind at the start: speed, m/s, and direction it blows from, deg; NaN if not flown.
+        """Mean wind at the start: speed, m/s, and direction from which it blows, deg; NaN if not flown.
 
-        With several members of the forecast, it is their mean.
+        In an ensemble forecast it is the mean over the members.
         """
         if not self.scenarios:
             return math.nan, math.nan
@@ -138,7 +138,7 @@ class WindowResult:
         return f"<WindowResult {self.base.name}: {sum(map(bool, map(self.is_open, self.departures)))} departures open>"
 
     def is_open(self, departure: Departure) -> bool | None:
-        """Return True if a departure's fraction of flyable flights is large enough; None if not flown."""
+        """Return True if a departure's fraction of flyable flights reaches the goal; None if it was not flown."""
         return None if not departure.rows else departure.share >= self.goal.probability
 
     @property
@@ -157,14 +157,14 @@ class WindowResult:
 
     @property
     def asked(self) -> Departure | None:
-        """Departure that the user asks about; None if the user asks about any departure."""
+        """Requested departure; None if any departure will do."""
         return next((departure for departure in self.departures if departure.time == self.goal.asked), None)
 
     @property
     def is_go(self) -> bool | None:
-        """True if the requested departure is open, or any departure if none was requested; None if unknown.
+        """True if the requested departure is open, or if any departure is open when none was requested.
 
-        It is unknown if the result depends on the flights that are not judged in full.
+        None if the result depends on flights that are not judged in full.
         """
         departures = self.departures if self.asked is None else (self.asked,)
         probability = self.goal.probability
@@ -250,7 +250,7 @@ def fly_departure(
 
 
 def _open_departure(base: CampaignBase, time: datetime) -> Departure:
-    """Return a departure without flights yet; it has scenarios only if the forecast covers the flight."""
+    """Return a departure that is not yet flown; it has scenarios only if the forecast covers its flight."""
     try:
         scenarios = _member_scenarios(with_flight_time(base.scenario, time.isoformat()))
         replace(base, scenario=scenarios[0]).nominal_setup()
@@ -260,7 +260,7 @@ def _open_departure(base: CampaignBase, time: datetime) -> Departure:
 
 
 def _member_scenarios(scenario: Scenario) -> tuple[Scenario, ...]:
-    """Return a scenario in each member of its forecast."""
+    """Return the scenario once for each member of its forecast, with the wind of that member."""
     forecast = forecast_of_scenario(scenario)
     if forecast.members == 1:
         return (scenario,)

@@ -35,10 +35,10 @@ from planfly.campaigns.tables import (
 from planfly.campaigns.worker_pool import FlightRate, WorkerPool, Workers, worker_pool
 from world.wording import count_text
 
-# Target for half the width of a boundary's interval, m/s.
+# Largest half-width of the interval of an accurate boundary, m/s.
 BOUNDARY_ACCURACY_MPS = 0.25
-# Minimum number of flights in each direction.  If all of them are flyable, at most one in fifty fails (95 %).  With
-# fewer flights the intervals of the fit are too narrow.
+# Minimum number of flights in each direction.  If all of them are flyable, at most one flight in fifty fails, with 95 %
+# confidence.  With fewer flights the intervals of the fit are too narrow.
 MIN_FLIGHTS_PER_DIRECTION = 150
 # Number of points that represent the distribution of all drawn quantities.
 _POPULATION_SIZE = 4096
@@ -48,7 +48,7 @@ _FLIGHTS_PER_ROUND = 48
 _MIN_FLIGHTS_EACH = 3
 # Maximum number of flights of one direction in a round.
 _MAX_FLIGHTS_EACH = 6
-# Growth of the number of flights between two checks of an open direction, because the posterior is slow to compute.
+# Ratio of the numbers of flights at two checks of an open direction; each check computes the slow posterior.
 _CHECK_GROWTH_RATIO = 1.04
 # Minimum number of flights in calm air, none of which may be flyable, for a search to end without a flight in wind.
 _MIN_CALM_FLIGHTS = 3
@@ -81,10 +81,11 @@ DEFAULT_WIND_FLIGHTS = 5000
 
 
 def flight_limit(requested: int | None, folder: Path, *, resume: bool) -> int:
-    """Return the maximum number of flights of a search.
+    """Return the maximum number of flights of a search for winds.
 
-    It is the requested number, or else the number stored in the folder of a resumed search, or else the
-    default.  Raises StoreError for a file that planfly did not write, or that another process has locked.
+    It is the requested number.  If that is None, it is the number stored in the folder of a resumed search, or else the
+    default.
+    Raises StoreError for a file that planfly did not write, or that another process has locked.
     """
     settings = read_stored_settings(folder / WINDS_DATABASE) if resume else {}
     return int(settings.get("flights", DEFAULT_WIND_FLIGHTS)) if requested is None else requested
@@ -92,7 +93,7 @@ def flight_limit(requested: int | None, folder: Path, *, resume: bool) -> int:
 
 # Boundary below which a mission is not flyable with the target probability even in calm air, m/s; printed as 0.0.
 CALM_MPS = 0.05
-# Maximum wind whose flights show what happens in calm air, m/s: no boundary is known more accurately.
+# Maximum wind that is treated as calm air, m/s: boundaries are not known more accurately than this.
 NEARLY_CALM_MPS = 2.0 * BOUNDARY_ACCURACY_MPS
 
 
@@ -121,7 +122,7 @@ class WindsResult:
     """Result of a search: the boundary of each direction, and the flights from which the boundaries are estimated.
 
     boundaries: boundary of each direction; `judged` and `reasons` state which of them are only estimates, and why.
-    flights: direction, wind speed, m/s, and True if flyable, of each flight.
+    flights: index of the direction, wind speed, m/s, and True if flyable, for each flight.
     lost: indices, from 0, of the flights that could not be flown; they are treated as not flyable.
     conditions: conditions of the flights, without the wind, which depends on the direction.
     calm: failures in calm air if the mission is not flyable in calm air with the target probability; None otherwise.
@@ -185,9 +186,9 @@ class WindsResult:
             elif is_calm or not needs_more_flights(boundary, count, BOUNDARY_ACCURACY_MPS, MIN_FLIGHTS_PER_DIRECTION):
                 reasons.append("")
             elif count < MIN_FLIGHTS_PER_DIRECTION:
-                reasons.append(f"{count_text(count, 'flight')} of at least {MIN_FLIGHTS_PER_DIRECTION}")
+                reasons.append(f"{count} of at least {count_text(MIN_FLIGHTS_PER_DIRECTION, 'flight')}")
             else:
-                reasons.append(f"an interval of {boundary.width:.2f} m/s; at most {max_width:g} m/s is required")
+                reasons.append(f"interval {boundary.width:.2f} m/s wide; at most {max_width:g} m/s is required")
         return tuple(reasons)
 
     @property
@@ -241,8 +242,8 @@ def open_winds_store(base: CampaignBase, goal: WindsGoal, folder: Path, *, resum
 
     The number of flights may change when a search is resumed.  If it is smaller, the surplus flights stay in the table.
 
-    base: campaign base, whose dispersions must not contain `SEARCHED_QUANTITIES`.  Raises StoreError for a table that
-    cannot be used, such as that of a search with another goal.
+    base: campaign base, whose dispersions must not contain `SEARCHED_QUANTITIES`.
+    Raises StoreError for a table that cannot be used, such as the table of a search with another goal.
     """
     settings = {
         "name": base.name,
@@ -306,7 +307,7 @@ class _Search:
         self.directions = [
             Direction(goal.most, goal.target, drawn_numbers, goal.confidence) for _ in range(goal.directions)
         ]
-        self.open = list(range(goal.directions))
+        self.open_directions = list(range(goal.directions))
         # Number of flights of each direction at which it is checked next.
         self._next_check = [MIN_FLIGHTS_PER_DIRECTION] * goal.directions
         self.flown: list[tuple[int, float, bool]] = []
@@ -318,10 +319,12 @@ class _Search:
 
     def next_round(self) -> list[RequestedFlight]:
         """Return the requests of the next round; empty if the search is complete or all flights are used."""
-        self.open = [number for number in self.open if self._is_open(number)]
-        flights_each = max(_MIN_FLIGHTS_EACH, min(_MAX_FLIGHTS_EACH, _FLIGHTS_PER_ROUND // max(1, len(self.open))))
+        self.open_directions = [number for number in self.open_directions if self._is_open(number)]
+        flights_each = max(
+            _MIN_FLIGHTS_EACH, min(_MAX_FLIGHTS_EACH, _FLIGHTS_PER_ROUND // max(1, len(self.open_directions)))
+        )
         requests: list[RequestedFlight] = []
-        for number in self.open:
+        for number in self.open_directions:
             for speed, draw in next_flights(self.directions[number], flights_each):
                 requests.append(RequestedFlight(len(self.flown) + len(requests), number, speed, draw))
         return requests[: max(0, self.goal.flights - len(self.flown))]
@@ -362,8 +365,10 @@ class _Search:
         )
 
     def min_remaining_flights(self) -> int:
-        """Return the number of flights until all open directions have the minimum number of flights."""
-        remaining = sum(max(0, MIN_FLIGHTS_PER_DIRECTION - len(self.directions[number].speeds)) for number in self.open)
+        """Return the number of flights still needed to reach the minimum number in each open direction."""
+        remaining = sum(
+            max(0, MIN_FLIGHTS_PER_DIRECTION - len(self.directions[number].speeds)) for number in self.open_directions
+        )
         return min(remaining, self.goal.flights - len(self.flown))
 
     def result(self) -> WindsResult:
@@ -399,7 +404,7 @@ class _Search:
         """
         failures = []
         for number, boundary in enumerate(boundaries):
-            # Without a search, the flights in calm air have no findings here.
+            # After a search that ended in calm air, `_failed` is shorter than `flown`.
             failed_flights = [
                 (speed, failed)
                 for (direction, speed, _), failed in zip(self.flown, self._failed, strict=False)
@@ -410,9 +415,9 @@ class _Search:
         return tuple(failures)
 
     def _calm_failures(self, boundaries: tuple[WindBoundary, ...]) -> CalmFailures | None:
-        """Return the failures in the weakest flown wind, over the directions whose boundary is calm air.
+        """Return the failures in the weakest flown wind of the directions whose boundary is calm air.
 
-        Return None if there is no such direction, or if this wind is not nearly calm.
+        Return None if no boundary is calm air, or if the weakest flown wind is stronger than `NEARLY_CALM_MPS`.
         """
         calm_directions = {number for number, boundary in enumerate(boundaries) if boundary.estimate < CALM_MPS}
         numbered_flights = [
@@ -432,14 +437,11 @@ class _Search:
 
 
 def _fly_in_calm_air(pool: WorkerPool, goal: WindsGoal) -> list[FlightRow]:
-    """Fly the first draws in calm air; return the flights if none of them is flyable, otherwise [].
+    """Fly the first draws in calm air; return their rows if none is flyable, otherwise [].
 
-    [] is also returned if a flight could not be flown.
-
-    Nothing is flown, and [] is returned, if the goal permits fewer flights than this needs.
-
-    There are enough flights to disprove the target: a mission that has the target probability fails all of them with a
-    probability of at most 1 minus the confidence.
+    The number of flights is large enough to disprove the target: a mission with the target probability fails all of
+    them with a probability of at most 1 minus the confidence.  [] is also returned if a flight could not be flown, or
+    if the goal permits fewer flights than this number.
     """
     count = max(_MIN_CALM_FLIGHTS, math.ceil(math.log(1.0 - goal.confidence) / math.log(1.0 - goal.target)))
     if count > goal.flights:
@@ -451,8 +453,8 @@ def _fly_in_calm_air(pool: WorkerPool, goal: WindsGoal) -> list[FlightRow]:
 
         None if a flight was flyable or could not be flown, or if all flights are requested.
         """
-        has_none_flyable = not any(row.outcome in ("flyable", "lost") for row in rows.values())
-        draw = next(draws, None) if has_none_flyable else None
+        can_disprove_target = not any(row.outcome in ("flyable", "lost") for row in rows.values())
+        draw = next(draws, None) if can_disprove_target else None
         return None if draw is None else FlightRequest(draw, GivenWind(0.0, 0.0))
 
     for request, row in pool.fly(next_request):
@@ -545,7 +547,7 @@ class _ProgressReport:
             self._advance(float(flight_count), float(flight_count), text)
 
     def report(self, flight_count: int, is_last: bool = False) -> None:
-        """Report the settled directions, the flights, the flights per minute, and the least remaining time.
+        """Report the settled directions, the number and rate of flights, and the shortest remaining time.
 
         No remaining time is given beyond `MIN_FLIGHTS_PER_DIRECTION`, because the number of flights is then unknown.
         is_last: True to report even if no report is due.
@@ -554,7 +556,7 @@ class _ProgressReport:
             return
         search, flights_per_second = self._search, self._rate.flights_per_second(flight_count)
         remaining = len(search.flown) + search.min_remaining_flights() - flight_count
-        settled_count, total = search.goal.directions - len(search.open), search.goal.directions
+        settled_count, total = search.goal.directions - len(search.open_directions), search.goal.directions
         remark = (
             f"{settled_count} of {total} directions settled, {count_text(flight_count, 'flight')},"
             f" {60.0 * flights_per_second:.0f} a minute"

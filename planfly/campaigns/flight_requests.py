@@ -96,11 +96,11 @@ def check_fingerprint(own_fingerprint: dict[str, str], worker_fingerprint: dict[
     >>> check_fingerprint({"planfly": "0.1.0"}, {"planfly": "0.0.9"}, "tls://10.0.0.7:4000")
     Traceback (most recent call last):
     ...
-    planfly.campaigns.flight_requests.WorkerError: worker tls://10.0.0.7:4000: planfly 0.0.9, not 0.1.0 as here
+    planfly.campaigns.flight_requests.WorkerError: worker tls://10.0.0.7:4000: planfly 0.0.9, expected 0.1.0 ...
     """
     for name, value in own_fingerprint.items():
         if worker_fingerprint.get(name) != value:
-            worker_value, allowed = worker_fingerprint.get(name), f"not {value} as here"
+            worker_value, allowed = worker_fingerprint.get(name), f"expected {value} as in this process"
             message = f"worker {worker}: {name} {worker_value or 'missing'}, {allowed}"
             raise WorkerError(message, file=f"worker {worker}", field=name, value=worker_value, allowed=allowed)
 

@@ -43,10 +43,10 @@ MarginalPass = tuple[str, Place, float]
 
 
 def find_marginal_passes(findings: Iterable[Finding], scenario: Scenario, track: Track) -> tuple[MarginalPass, ...]:
-    """Return the marginal passes of a flight: findings that passed by less than their rule's scale.
+    """Return the marginal passes of a flight: findings whose margin is less than the scale of their rule.
 
-    A marginal pass consists of rule, place and margin.  The margin is a fraction of the scale, 0 to 1.  Passes close to
-    a missile's sphere follow at the end.
+    Each is a tuple of rule, place, and margin as a fraction of the rule's scale, 0 to 1.  Passes close to the sphere of
+    a missile's kill radius follow at the end.
     """
     fractions: dict[tuple[str, Place], float] = {}
     failed_keys = {(finding.rule, finding.place) for finding in findings if finding.ok is False}
@@ -65,9 +65,10 @@ def find_marginal_passes(findings: Iterable[Finding], scenario: Scenario, track:
 
 
 def _distances_outside_spheres(scenario: Scenario, track: Track) -> list[tuple[Place, float]]:
-    """Return each missile's place, and the minimum distance of the track from its sphere, m, negative inside.
+    """Return the place of each missile, and the minimum distance of the track from its sphere, m.
 
-    Radars have no entry.  Return [] for an external mission, or for a track of fewer than two rows.
+    The sphere has the missile's kill radius; distances inside are negative.  Radars have no entry.
+    Return [] for an external mission, or for a track of fewer than two rows.
     """
     threats = scenario.threats
     if scenario.external or len(track) < 2:
@@ -89,10 +90,10 @@ STATION_COUNT = 150
 
 
 def clearance_profile(route: Route, track: Track) -> Singles:
-    """Return the minimum height above ground on each piece of the route, m, (STATION_COUNT,).
+    """Return the minimum height above ground on each of STATION_COUNT equal pieces of the route, m.
 
-    The pieces are equally long; NaN for a piece that was not flown.  Each track point is assigned to the nearest point
-    of the leg that was flown at that time.
+    It is NaN for a piece that was not flown.  Each track point belongs to the piece with the nearest point of the leg
+    that was flown at that time.
     """
     starts, ends = route.positions[:-1, :2], route.positions[1:, :2]
     lengths = np.hypot(*(ends - starts).T)
@@ -108,11 +109,11 @@ def clearance_profile(route: Route, track: Track) -> Singles:
 
 
 def waypoint_crossings(route: Route, track: Track) -> Singles:
-    """Return the offsets to the right of and above each of s stops at the closest approach, m, (s, 2).
+    """Return the offset of the track from each stop of the route at the closest approach, m, (s, 2).
 
-    Offsets are NaN for a stop that was not reached.  A stop is a waypoint, or the first corner of a loiter or return;
-    the later corners are omitted, because their number differs between flights.  Right is relative to the mean of the
-    incoming and outgoing courses.
+    The columns are the offsets to the right and upward.  Right is relative to the mean of the incoming and outgoing
+    courses.  Offsets are NaN for a stop that was not reached.  A stop is a waypoint, or the first corner of a loiter or
+    return; later corners are omitted, because their number differs between flights.
     """
     points = route.positions
     crossings = np.full((len(points), 2), np.nan, dtype=np.float32)
@@ -138,8 +139,8 @@ def waypoint_crossings(route: Route, track: Track) -> Singles:
 # ----------------------------------------------------------------------
 # Define the row of a flight, which also defines the columns of every table of flights.
 
-# Outcomes of a flight, in the order of `planfly.campaigns.statistics.decision.Tally`; a lost flight could not be flown,
-# because its workers died on it, and an undecided one is not judged in full.
+# Outcomes of a flight, in the order of `planfly.campaigns.statistics.decision.Tally`.  A lost flight could not be
+# flown, because its workers died.  An undecided flight is not judged in full.
 Outcome = Literal["flyable", "not flyable", "lost", "undecided"]
 OUTCOMES: tuple[Outcome, ...] = get_args(Outcome)
 
@@ -162,7 +163,7 @@ class Column:
 
     kind: type and constraint in SQLite.
     write, read: functions that convert the value of the field to the value of the column, and back.
-    entry: shape of each entry of an array stored as bytes (a BLOB, float32); () for numbers.
+    entry: shape of each entry of a float32 array that is stored as bytes (a BLOB); () if the entries are numbers.
     same: True if the value is the same for the same flight on every machine.
     """
 
@@ -204,12 +205,12 @@ _FAILED_FINDINGS = Column("TEXT NOT NULL", _failed_findings_text, parse_failed_f
 class FlightRow:
     """Row of a flight in the campaign's table; each field ``Annotated`` with a `Column` is a column.
 
-    The draw has one column for each dispersion. The margins have two columns for each rule, and one for the closeness.
+    The draw has one column for each quantity. The margins have two columns for each rule, and one for the closeness.
     The tables of `planfly.campaigns.tables` are derived from this class.
 
     ended: "completed", or the reason why the flight ended early.
-    failed: rule and place of each failed finding, in the verdict's order; of an undecided flight, those of the findings
-    that leave it undecided.
+    failed: rule and place of each failed finding, in the verdict's order; for an undecided flight, rule and place of
+    the findings that leave it undecided.
     undecided_text: rules that leave an undecided flight undecided, with their reasons; "" for any other.
     margins: minimum margin of each judged rule whose margin has a scale.
     missile_distance: smallest distance outside a missile's sphere, m, negative inside; None if nothing was flown or
@@ -267,7 +268,7 @@ def scale_margin(rule: str, margin: MinimumMargin) -> float | None:
 
 
 def _column_fields() -> dict[str, Column]:
-    """Return the columns of `FlightRow` in order, keyed by field name."""
+    """Return the `Column` with which each stored field of `FlightRow` is annotated, keyed by field name, in order."""
     hints = get_type_hints(FlightRow, include_extras=True)
     hint_args = {name: get_args(hint) for name, hint in hints.items()}
     return {name: args[-1] for name, args in hint_args.items() if args and isinstance(args[-1], Column)}
@@ -319,7 +320,7 @@ def fly_one(base: CampaignBase, index: int, wind: GivenWind | None = None, log: 
 
 
 def find_unjudged_rules(verdict: Verdict, setup: FlightSetup) -> tuple[tuple[str, str], ...]:
-    """Return the unjudged rules of a verdict without failures, with places and reason; () if any rule failed."""
+    """Return the unjudged rules of a verdict, each with a text that states places and reason; () if a rule failed."""
     if not (verdict.flyable or verdict.undecided):
         return ()
     texts = dict(unjudged_parts(verdict.findings, setup))
@@ -346,7 +347,7 @@ def list_failed_findings(verdict: Verdict) -> tuple[tuple[str, Place], ...]:
 
 
 def find_minimum_margins(findings: tuple[Finding, ...]) -> tuple[tuple[str, MinimumMargin], ...]:
-    """Return the minimum margin of each judged rule, in the order of the verdict.
+    """Return the minimum margin of each judged rule that has one, in the order of the verdict.
 
     >>> from logs.verdict.findings import make_finding
     >>> wide, close = (make_finding("slope", Place("leg", 1), ok=True, reason="", margin=m) for m in (9.0, 4.0))
@@ -367,7 +368,7 @@ def find_minimum_margins(findings: tuple[Finding, ...]) -> tuple[tuple[str, Mini
 
 
 def _missile_distance(findings: Iterable[Finding]) -> float | None:
-    """Return the smallest distance of a flight outside a missile's sphere, m; None if no finding states one."""
+    """Return the smallest distance of a flight outside the sphere of a missile's kill radius, m; None if unknown."""
     distances = (finding.nearest for finding in findings if finding.rule == "threat" and finding.nearest is not None)
     return min(distances, default=None)
 

@@ -69,7 +69,7 @@ def resumed_goal(
     keeps_target: bool = False,
     keeps_flights: bool = False,
 ) -> Goal:
-    """Return the goal of a resumed campaign: the requested goal, with the parts of the stored goal that are kept.
+    """Return the goal of a resumed campaign: the requested goal, with parts of the stored goal.
 
     confidence: confidence of the goal; None keeps the stored confidence.
     keeps_target: True keeps the stored target, and whether the flights stop when it is decided.
@@ -113,7 +113,7 @@ def fly_campaign(
     advance: Advance | None = None,
     fly: FlyOne = fly_one,
 ) -> Estimate:
-    """Fly the flights missing from the table until the goal has its number of flights or its answer.
+    """Fly the flights missing from the table until the number of flights is reached or the goal is decided.
 
     Flights are counted in the order of their indices, and flights after the deciding flight are deleted.  Answer and
     table therefore do not depend on the speed of the workers.  Flights completed before an error or Ctrl-C stay in the
@@ -176,7 +176,7 @@ class _ProgressReport:
         return max(self._estimator.min_flights, tally.flown) if self._goal.stops else self._goal.flights
 
     def report(self, tally: Tally, is_last: bool = False) -> None:
-        """Report flights, probability of success with its bounds, rate of flights and remaining time.
+        """Report the number of flights, the fraction of flyable flights with its bounds, and the remaining time.
 
         is_last: True to report even if no report is due.
         """

@@ -26,8 +26,8 @@ def answer_line(result: GroundRiskResult) -> str:
     """Return the ground risk class in one line."""
     if not result.is_judged:
         return f"class not judged: {_unknown_reason(result)}"
-    where = "a controlled ground area" if result.goal.controlled else density_text(result.population)
-    aircraft_text = f"{result.aircraft.wing_span:g} m span, {result.speed:g} m/s, {where}"
+    ground_text = "a controlled ground area" if result.goal.controlled else density_text(result.population)
+    aircraft_text = f"{result.aircraft.wing_span:g} m span, {result.speed:g} m/s, {ground_text}"
     if result.ground_class is None:
         return f"not part of SORA: {aircraft_text} (main body, table 2)"
     return f"intrinsic ground risk class {result.ground_class}: {aircraft_text}"
@@ -44,10 +44,10 @@ def _unknown_reason(result: GroundRiskResult) -> str:
         return "the mission has no home, so its returns, which enlarge the volumes, were not simulated"
     if result.population is None:
         return "no population raster was named (--population)"
-    known = result.population.known_fraction
-    shown = "over 99.9%" if known > 0.999 else f"{known:.1%}"
+    known_fraction = result.population.known_fraction
+    fraction_text = "over 99.9%" if known_fraction > 0.999 else f"{known_fraction:.1%}"
     return (
-        f"{result.population.source} has data for only {shown} of the footprint's cells"
+        f"{result.population.source} has data for only {fraction_text} of the footprint's cells"
         f" ({density_text(result.population)} there)"
     )
 
@@ -59,11 +59,12 @@ def risk_lines(result: GroundRiskResult) -> list[str]:
         f"flight geography: {result.half_width:.0f} m to either side of the path, up to {flown.height:.0f} m above"
         f" ground ({_share_text(result)} stay inside)",
         f"contingency volume: flights and the turns of returns reach {flown.contingency_width:.0f} m beyond the flight"
-        f" geography and {flown.contingency_height:.0f} m above ground. Annex A requires {formula.width:.0f} m and"
-        f" {formula.height:.0f} m. Returns on their way home reach {flown.return_distance:.0f} m beyond the flight"
-        " geography",
+        f" geography and {flown.contingency_height:.0f} m above ground. Annex A requires a width of"
+        f" {formula.width:.0f} m and a height of {formula.height:.0f} m. After their turns, returns reach"
+        f" {flown.return_distance:.0f} m beyond the flight geography",
         f"ground risk buffer: falls{' and glides' if result.goal.glide else ''} reach {flown.buffer_width:.0f} m"
-        f" beyond flights and returns. The 1:1 rule requires {result.one_to_one_buffer:.0f} m{_glide_text(result)}",
+        f" beyond flights and returns. The 1:1 rule requires a width of {result.one_to_one_buffer:.0f}"
+        f" m{_glide_text(result)}",
         f"areas: operational volume {result.volume.area / 1e6:.2f} km², operational volume and ground risk buffer"
         f" {result.footprint.area / 1e6:.2f} km²",
     ]
@@ -98,7 +99,7 @@ def _population_line(population: Population) -> str:
 
 
 def _flight_lines(result: GroundRiskResult) -> list[str]:
-    """Return the lines on the flights."""
+    """Return the lines on the flights: their number, incomplete flights, speed, returns and glides."""
     lines = []
     if result.lost:
         lines.append(f"{result.lost} of {result.goal.flights} flights could not be simulated and are left out")
@@ -106,18 +107,18 @@ def _flight_lines(result: GroundRiskResult) -> list[str]:
     if endings:
         most_frequent = max(set(endings), key=endings.count)
         lines.append(
-            f"{len(endings)} of {len(result.rows)} flights do not complete the mission; most frequent end:"
+            f"{len(endings)} of {len(result.rows)} flights do not complete the mission; most frequent reason:"
             f" {most_frequent}. The volumes contain these flights up to their end"
         )
     ground_speed = max(row.ground_speed for row in result.rows)
     if ground_speed > result.speed:
         lines.append(
             f"flights reach a ground speed of {ground_speed:.1f} m/s, but the formulas use a highest speed of only"
-            f" {result.speed:g} m/s (--max-speed sets it)"
+            f" {result.speed:g} m/s (--max-speed changes this speed)"
         )
     spread = result.base.dispersions.name
     setup = result.base.nominal_setup()
-    returns_text = f"; returns to launch by {returning_title(setup)}'s rules every {result.goal.interval:g} s"
+    returns_text = f"; a return to launch by {returning_title(setup)}'s rules starts every {result.goal.interval:g} s"
     if setup.mission.home is None:
         returns_text = ", without returns to launch"
     lines.append(f"{count_text(len(result.rows), 'flight')} with {spread}, seed {result.base.seed}{returns_text}")
@@ -146,7 +147,7 @@ def table_rows(result: GroundRiskResult) -> list[tuple[str, str, str]]:
     """Return the rows of the table for an application: quantity, value and source; cells in bold begin with "**"."""
     flown, goal = result.flown, result.goal
     span = result.aircraft.wing_span
-    flown_by = _share_text(result)
+    share_text = _share_text(result)
     return [
         ("**aircraft**", "", ""),
         ("aircraft", result.aircraft.title, ""),
@@ -154,8 +155,8 @@ def table_rows(result: GroundRiskResult) -> list[tuple[str, str, str]]:
         ("highest speed v", f"{result.speed:g} m/s", "stated" if goal.speed else "highest airspeed of the model"),
         ("take-off mass", f"{result.aircraft.mass:g} kg", ""),
         ("**flight geography**", "", ""),
-        ("half width", f"{result.half_width:.1f} m", f"{flown_by}: {flown.deviation:.1f} m; at least 1.5 CD"),
-        ("height H_FG above ground", f"{flown.height:.1f} m", flown_by),
+        ("half width", f"{result.half_width:.1f} m", f"{share_text}: {flown.deviation:.1f} m; at least 1.5 CD"),
+        ("height H_FG above ground", f"{flown.height:.1f} m", share_text),
         *_contingency_rows(result),
         ("**ground risk buffer**", "", ""),
         (
@@ -181,15 +182,15 @@ def table_rows(result: GroundRiskResult) -> list[tuple[str, str, str]]:
         *_class_rows(result),
         ("**airspace**", "", ""),
         (
-            "zones met by the operational volume",
-            ", ".join(result.entered_zones) or "none of those given",
-            f"{count_text(len(result.base.scenario.zones), 'zone')} given, whatever their heights",
+            "zones that overlap the operational volume",
+            ", ".join(result.entered_zones) or "none of the given zones",
+            f"{count_text(len(result.base.scenario.zones), 'zone')} given, compared without their heights",
         ),
     ]
 
 
 def _contingency_rows(result: GroundRiskResult) -> list[tuple[str, str, str]]:
-    """Return the rows of the contingency volume."""
+    """Return the table's rows of the contingency volume."""
     flown, formula = result.flown, result.formula
     return [
         ("**contingency volume**", "", ""),
@@ -207,7 +208,7 @@ def _contingency_rows(result: GroundRiskResult) -> list[tuple[str, str, str]]:
         (
             "for comparison: reach of returns",
             f"{flown.return_distance:.1f} m",
-            "beyond flight geography; the operational volume also holds the areas below all returns",
+            "beyond flight geography; the operational volume also contains the areas below all returns",
         ),
         ("flown height above ground", f"{flown.contingency_height:.1f} m", "all flights and their returns"),
         (
@@ -220,7 +221,7 @@ def _contingency_rows(result: GroundRiskResult) -> list[tuple[str, str, str]]:
 
 
 def _class_rows(result: GroundRiskResult) -> list[tuple[str, str, str]]:
-    """Return the rows of population and class."""
+    """Return the table's rows of the population and the ground risk class."""
     rows = [("**intrinsic ground risk class**", "", "")]
     population = result.population
     if population is not None:

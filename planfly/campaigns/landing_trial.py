@@ -1,4 +1,4 @@
-"""Fly the landing of a plan with a steep final in dispersed conditions, because a flare is not known from the plan."""
+"""Fly the landing of a plan with a steep final in dispersed conditions, because a plan does not model the flare."""
 
 import math
 from dataclasses import replace
@@ -25,9 +25,10 @@ _WAYPOINTS_BEFORE_LANDING = 3
 
 
 def steep_landing_failures(plan: Plan, uav: Uav) -> tuple[str, ...]:
-    """Return how many landings on a steep final succeed, with what would help, if fewer than 95 % do; otherwise ().
+    """Return a text on the failed landings of a plan with a steep final; () if the landings succeed.
 
-    The landing begins in the air before the line-up and has the default dispersions of a campaign.
+    Landings succeed if at least a fraction `HOLDING_PROBABILITY` is flyable.  They begin in the air before the line-up,
+    with the default dispersions of a campaign.  A plan with a gentler final is not flown.
     """
     descent = None if plan.procedures is None else plan.procedures.descent
     if not plan.safe or descent is None or math.atan(descent.slope) <= STEEP_FINAL_RAD:
@@ -40,14 +41,13 @@ def steep_landing_failures(plan: Plan, uav: Uav) -> tuple[str, ...]:
     low, high = wilson(flyable_count, LANDING_COUNT)
     return (
         f"only {flyable_count} of {LANDING_COUNT} simulated landings succeed (P between {low:.2f} and {high:.2f} at"
-        f" 95 %), on a final of {math.degrees(math.atan(descent.slope)):.1f}°; to improve this, use a strip or a"
-        f" landing course with a clear final of at most {math.degrees(STEEP_FINAL_RAD):.0f}°, or fly in less wind or"
-        " turbulence",
+        f" 95 %) on a final of {math.degrees(math.atan(descent.slope)):.1f}°. Use a strip or a landing course with a"
+        f" clear final of at most {math.degrees(STEEP_FINAL_RAD):.0f}°, or fly in less wind or turbulence",
     )
 
 
 def landing_mission(mission: Mission) -> Mission:
-    """Return the last part of a plan's mission: from the end of the path to the line-up, to the landing."""
+    """Return the end of a plan's mission: the waypoints before the line-up, the line-up and the landing."""
     landing_index = max(k for k, item in enumerate(mission.items) if item.command == Command.NAV_LAND)
     waypoints = [k for k in range(landing_index) if mission.items[k].command == Command.NAV_WAYPOINT]
     items = mission.items[waypoints[-min(len(waypoints), _WAYPOINTS_BEFORE_LANDING)] :]

@@ -111,7 +111,7 @@ class Bar:
     """Bar of the tornado chart, for one quantity.
 
     title: title of the quantity.
-    index: first-order index, 0 to 1.
+    index: fraction of the margin's variance that the quantity explains (first-order index), 0 to 1.
     slope: rank correlation of the quantity with the margin, -1 to 1.
     """
 
@@ -194,7 +194,7 @@ def draw_probability(bins: Sequence[SpeedBin], target: float | None) -> Figure:
         axes.set_xlabel("mean wind at the start's height (m/s)")
         axes.set_ylabel("share of flyable flights")
         axes.set_title(
-            "Probability against wind speed: line, share of flyable flights; band, Wilson interval; numbers, flights"
+            "Probability against wind speed (line: share of flyable flights; band: Wilson interval; numbers: flights)"
         )
         _style_axes(axes)
     return figure
@@ -279,7 +279,9 @@ def draw_clearance_fan(
             band = np.full((2, stations), np.nan)
             band[:, has_data] = np.nanquantile(clearance[:, has_data], (lower_quantile, upper_quantile), axis=0)
             label = (
-                "all flights" if lower_quantile == 0.0 else f"{100 * (upper_quantile - lower_quantile):.0f} % of them"
+                "all flights"
+                if lower_quantile == 0.0
+                else f"{100 * (upper_quantile - lower_quantile):.0f} % of flights"
             )
             upper_axes.fill_between(
                 distance_km, band[0], band[1], color=PLANNED, alpha=alpha + 0.15, linewidth=0.0, label=label
@@ -349,16 +351,16 @@ def draw_crossings(crossings: Floats, has_failed: NDArray[np.bool_]) -> Figure:
             half_size = _panel_half_size(points)
             if is_reached.sum() > 2:
                 ellipse = covariance_ellipse(points[is_reached])
-                # Its extents are in metres until it is added to axes.
+                # The ellipse's extents are in metres until it is added to axes.
                 half_size = max(half_size, 1.05 * float(np.abs(ellipse.get_extents().get_points()).max()))
                 axes.add_patch(ellipse)
             axes.set_title(f"waypoint {waypoint}", fontsize=8.5, pad=3.0)
             axes.set_xlim(-half_size, half_size)
             axes.set_ylim(-half_size, half_size)
             axes.tick_params(labelsize=7)
-        title = "Where flights crossed each waypoint, m right of and above it, with the ellipse of 95 %"
+        title = "Flights at each waypoint, m to the right and above, with the 95 % ellipse"
         figure.text(0.07, 1.0 - 0.3 / height, title, fontsize=11, color=INK_COLOUR)
-        figure.text(0.98, 1.0 - 0.3 / height, "dots flyable, crosses not", fontsize=8, color=QUIET_COLOUR, ha="right")
+        figure.text(0.98, 1.0 - 0.3 / height, "dot: flyable, cross: not", fontsize=8, color=QUIET_COLOUR, ha="right")
     return figure
 
 
@@ -426,6 +428,7 @@ def draw_go_no_go(
 ) -> Figure:
     """Draw a polar chart, north up, of the winds in which a mission is flyable, up to `max_speed`, m/s.
 
+    target, confidence: required probability of a flyable flight, and confidence of the boundaries' intervals.
     wind: speed, m/s, and direction, degrees, of the scenario's wind, which is drawn as a star; or None.
     """
     with clean_style():
@@ -436,11 +439,10 @@ def draw_go_no_go(
         _draw_wind_areas(axes, directions, max_speed)
         for direction in directions:
             if direction.is_judged and direction.is_beyond_search:
-                marker = (3, 0, -direction.from_deg)
                 axes.plot(
                     np.radians(direction.from_deg),
                     max_speed,
-                    marker=marker,
+                    marker=(3, 0, -direction.from_deg),
                     color=QUIET_COLOUR,
                     markersize=7,
                     linewidth=0.0,
@@ -600,7 +602,7 @@ def narrow_figure(figure: Figure) -> Figure:
     panels = [axes for axes in figure.axes if axes.axison]
     legends = [*figure.legends, *(legend for axes in panels if (legend := axes.get_legend()) is not None)]
     legend_height = _LEGEND_LINE_IN * sum(-(-len(legend.get_texts()) // 2) for legend in legends)
-    # Height of the figure's own texts, in from the top.
+    # Distance of the next text of the figure from the top, in.
     text_height = _EDGE_IN
     texts = []
     for text in figure.texts:

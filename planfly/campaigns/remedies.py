@@ -7,7 +7,7 @@ from world.scenario import Scenario
 
 # Step of the lengths that are suggested, m.
 _LENGTH_STEP_M = 10.0
-# What helps against the failures of a rule; rules with a length to suggest are in `_measured_remedies`.
+# Change that helps against the failures of a rule; `_measured_remedies` handles the rules with a length to suggest.
 _REMEDIES = {
     "energy": "a larger battery or a shorter mission",
     "fence": "more distance to the fence",
@@ -16,7 +16,7 @@ _REMEDIES = {
     "slope": "gentler legs (smaller values of [limits] max_climb_deg and max_dive_deg)",
     "speed": "a lower cruise airspeed",
     "stall": "a higher cruise airspeed",
-    "threat": "more distance to missiles (plan with larger kill radii than the flight is judged with)",
+    "threat": "more distance to missiles (plan with larger kill radii than those that judge the flight)",
     "turn": "gentler turns (a smaller value of [limits] max_turn_deg) or fewer waypoints",
 }
 # Rules whose margin is a height above ground, m.
@@ -43,12 +43,12 @@ def _measured_remedies(rule: str, low_margin: float | None, scenario: Scenario) 
     shortfall = 0.0 if low_margin is None else max(0.0, -low_margin)
     if rule == "touchdown":
         # The strip is longer at both ends.
-        longer = _LENGTH_STEP_M * math.ceil(2.0 * shortfall / _LENGTH_STEP_M)
-        texts = [f"a strip that is {longer:.0f} m longer" if longer else "a longer strip"]
+        added_length = _LENGTH_STEP_M * math.ceil(2.0 * shortfall / _LENGTH_STEP_M)
+        texts = [f"a strip that is {added_length:.0f} m longer" if added_length else "a longer strip"]
         if scenario.landing is not None and scenario.landing.height_sd is None:
             texts.insert(0, "a survey of the strip's height ([landing] height_sd_m)")
         return [*texts, "another approach ([landing] course_deg, approach_m, slope_deg)"]
     if rule in _HEIGHT_RULES:
-        higher = f"{math.ceil(shortfall)} m higher" if shortfall else "higher"
-        return [f"a path that is {higher} above ground (plan with a larger [limits] min_clearance_m)"]
+        height_text = f"{math.ceil(shortfall)} m higher" if shortfall else "higher"
+        return [f"a path that is {height_text} above ground (plan with a larger [limits] min_clearance_m)"]
     return [_REMEDIES[rule]] if rule in _REMEDIES else []

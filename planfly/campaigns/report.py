@@ -321,7 +321,10 @@ def fly_row_again(base: CampaignBase, row: FlightRow, log: Path) -> FlightRow:
     new_row = fly_one(base, row.draw.index, log=log)
     if columns := differing_columns(row, new_row):
         names = ", ".join(columns[:_MAX_NAMED_COLUMNS]) + (", ..." if len(columns) > _MAX_NAMED_COLUMNS else "")
-        message = f"{log}: flight {row.draw.index} has a different outcome here than where it was flown: {names}"
+        message = (
+            f"{log}: flight {row.draw.index} differs from the stored flight, which another machine or code computed;"
+            f" differing columns: {names}"
+        )
         raise PlanflyError(message, file=log, field="flight", value=row.draw.index)
     return new_row
 
@@ -341,10 +344,10 @@ _ANSWER_STYLES: dict[WindsAnswer, AnswerStyle] = {
 # Explanation of the boundary on the page.
 _BOUNDARY_EXPLANATION = (
     "The boundary is the wind in which the mission is flyable with the requested probability. For each direction, a"
-    " regression on the wind and on the drawn quantities is fitted to every failure mode (a rule at a place); its"
-    " residuals follow a normal distribution or, as a second model of equal prior probability, a Gumbel distribution"
-    " with its longer tail. These regressions give the fraction of all draws that fails in a wind. If no flight failed,"
-    " one such distribution of the wind alone is used. The interval is that of the posterior."
+    " regression on the wind and on the drawn quantities is fitted to every failure mode (a rule at a place). Two"
+    " models of the residuals have the same prior probability: a normal distribution, and a Gumbel distribution with a"
+    " longer tail. The regressions give the fraction of all draws that fails in a wind. If no flight failed, one such"
+    " distribution is fitted to the wind alone. The interval is taken from the posterior distribution of the boundary."
 )
 
 
@@ -472,7 +475,7 @@ def _interval_text(lower: float, upper: float, max_speed: float) -> str:
 
 
 def _unsettled_lines(winds: WindsResult) -> list[str]:
-    """Return lines which state that the search or some directions are not judged, and why; [] if all are."""
+    """Return lines that state which part of a search is not judged, and why; [] if all of it is judged."""
     reasons = winds.reasons
     word, total = "not judged" if all(reasons) else "not judged in full", len(reasons)
     lines = []
@@ -480,7 +483,7 @@ def _unsettled_lines(winds: WindsResult) -> list[str]:
         _, first_text = winds.undecided[0]
         lines.append(
             f"{word}: {len(winds.undecided)} of {count_text(len(winds.flights), 'flight')} are not judged in full;"
-            f" reason of the first: {first_text}"
+            f" first reason: {first_text}"
         )
     all_counts = zip(winds.flight_counts(), winds.undecided_counts(), reasons, strict=True)
     counts = [count for count, undecided_count, reason in all_counts if reason and not undecided_count]
@@ -518,7 +521,7 @@ def _deciding_rules(winds: WindsResult) -> list[str]:
 
 
 def _deciding_lines(winds: WindsResult) -> list[str]:
-    """Return a line about the rules that fail most flights, each with its directions; [] without failures."""
+    """Return a line about the rules that fail the most flights, each with its directions; [] without failures."""
     directions_by_rule: dict[str, list[str]] = {}
     first = 0
     for rule, group in groupby(_deciding_rules(winds)):
@@ -547,8 +550,8 @@ def _lines_without_failures(winds: WindsResult) -> list[str]:
     min_count = min(counts)
     probability_text = f"{lower_bound(Tally(min(counts), 0), confidence):.3g}"
     return [
-        f"in {len(counts)} of {count_text(len(winds.boundaries), 'direction')} no flight failed: in each, at least"
-        f" {count_text(min_count, 'flight')} in {max_speed:g} m/s show P >= {probability_text}"
+        f"in {len(counts)} of {count_text(len(winds.boundaries), 'direction')} no flight failed: at least"
+        f" {count_text(min_count, 'flight')} in {max_speed:g} m/s from each of them show P >= {probability_text}"
     ]
 
 
@@ -666,7 +669,7 @@ def winds_suite(name: str, winds: WindsResult) -> JunitSuite:
 def finish_campaign(
     base: CampaignBase, goal: Goal, estimate: Estimate, folder: Path, command: str, advance: Advance | None = None
 ) -> CampaignSummary:
-    """Summarise a campaign from the table in its folder, which must not be locked, and write its files.
+    """Summarise a campaign from the table in its folder, and write its files; the table must not be locked.
 
     command: the command line that repeats the campaign, for the report.
     Raises a `world.errors.PlanflyError`, or OSError for a full disk.

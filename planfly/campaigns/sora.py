@@ -51,12 +51,14 @@ _BARO_ERROR_M = 1.0
 _CLIMB_SLOPE_RAD = math.radians(45.0)
 # Height of the arc from this slope to level flight, in v^2 / g (LBA, FOCA: 0.3, which is 1 - cos 45 degrees rounded).
 _LEVEL_OFF_FACTOR = 0.3
-# Least width of the flight geography, in characteristic dimensions (LBA).
+# Minimum width of the flight geography, in characteristic dimensions of the aircraft (LBA).
 _MIN_GEOGRAPHY_DIMENSIONS = 3.0
 
 
 def min_geography_half_width(dimension: float) -> float:
     """Return half of the minimum width of a flight geography, m.
+
+    dimension: largest dimension of the aircraft, m.
 
     >>> min_geography_half_width(2.9)
     4.35
@@ -100,49 +102,59 @@ class ContingencyFormula:
 
     @property
     def reaction_distance(self) -> float:
-        """Distance until the manoeuvre begins: S_RZ = v t."""
+        """Distance flown until the contingency manoeuvre begins, m: S_RZ = v t."""
         return self.speed * _REACTION_TIME_S
 
     @property
     def turn_distance(self) -> float:
-        """Distance of a turn by 180 degrees, its radius: S_CM = v^2 / (g tan 30 degrees)."""
+        """Radius of a turn by 180 degrees at 30 degrees of bank, m: S_CM = v^2 / (g tan 30 degrees)."""
         return self.speed**2 / (_GRAVITY * math.tan(_TURN_BANK_RAD))
 
     @property
     def width(self) -> float:
-        """Width beyond the flight geography: S_CV = S_GPS + S_Pos + S_K + S_RZ + S_CM."""
+        """Width beyond the flight geography, m: S_CV = S_GPS + S_Pos + S_K + S_RZ + S_CM.
+
+        The terms are the errors of GNSS, position holding and map, the reaction distance, and the turn radius.
+        """
         return _GNSS_ERROR_M + _POSITION_ERROR_M + _MAP_ERROR_M + self.reaction_distance + self.turn_distance
 
     @property
     def reaction_height(self) -> float:
-        """Height gained until the manoeuvre begins: H_RZ = v sin 45 degrees t (LBA rounds the sine to 0.7)."""
+        """Height gained until the manoeuvre begins, m: H_RZ = v sin 45 degrees t (LBA rounds the sine to 0.7)."""
         return self.speed * math.sin(_CLIMB_SLOPE_RAD) * _REACTION_TIME_S
 
     @property
     def level_off_height(self) -> float:
-        """Height gained in levelling off: H_CM = 0.3 v^2 / g."""
+        """Height gained in levelling off, m: H_CM = 0.3 v^2 / g."""
         return _LEVEL_OFF_FACTOR * self.speed**2 / _GRAVITY
 
     @property
     def height(self) -> float:
-        """Height above ground: H_CV = H_FG + H_baro + H_RZ + H_CM."""
+        """Height of the contingency volume above ground, m: H_CV = H_FG + H_baro + H_RZ + H_CM.
+
+        The terms are the height of the flight geography, the barometric error, and the heights gained before and while
+        levelling off.
+        """
         return self.flight_height + _BARO_ERROR_M + self.reaction_height + self.level_off_height
 
     @property
     def width_terms(self) -> str:
-        """Terms of the width as a sum of numbers, in text."""
+        """Sum of the terms of `width` as text, such as "3 + 3 + 1 + 25.0 + 110.3"."""
         errors = f"{_GNSS_ERROR_M:g} + {_POSITION_ERROR_M:g} + {_MAP_ERROR_M:g}"
         return f"{errors} + {self.reaction_distance:.1f} + {self.turn_distance:.1f}"
 
     @property
     def height_terms(self) -> str:
-        """Terms of the height as a sum of numbers, in text."""
+        """Sum of the terms of `height` as text, such as "120.0 + 1 + 17.7 + 19.1"."""
         gains = f"{self.reaction_height:.1f} + {self.level_off_height:.1f}"
         return f"{self.flight_height:.1f} + {_BARO_ERROR_M:g} + {gains}"
 
 
 def one_to_one_buffer(height: float, dimension: float) -> float:
     """Return the width of the ground risk buffer by the 1:1 rule, S_GRB = H_CV + CD / 2, m (Annex A, LBA, FOCA).
+
+    height: height of the operational volume above ground, H_CV, m.
+    dimension: largest dimension of the aircraft, CD, m.
 
     >>> one_to_one_buffer(150.0, 3.0)
     151.5
@@ -153,7 +165,9 @@ def one_to_one_buffer(height: float, dimension: float) -> float:
 def ballistic_buffer(height: float, dimension: float, speed: float) -> float:
     """Return the width of the ground risk buffer by a fall without drag, S_GRB = v sqrt(2 H_CV / g) + CD / 2, m.
 
-    Annex A, LBA and FOCA use it for rotorcraft only.
+    Annex A, LBA and FOCA use this formula for rotorcraft only.
+    height, dimension: H_CV and CD as for `one_to_one_buffer`, m.
+    speed: highest speed of the aircraft, v, m/s.
 
     >>> round(ballistic_buffer(78.48, 2.0, 25.0), 6)
     101.0
@@ -163,6 +177,9 @@ def ballistic_buffer(height: float, dimension: float, speed: float) -> float:
 
 def glide_buffer(height: float, glide_ratio: float) -> float:
     """Return the width of the ground risk buffer by a glide without power, S_GRB = E H_CV, m (Annex A, LBA).
+
+    height: height of the operational volume above ground, H_CV, m.
+    glide_ratio: best glide ratio of the aircraft, E.
 
     >>> glide_buffer(150.0, 12.0)
     1800.0

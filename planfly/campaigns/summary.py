@@ -49,7 +49,7 @@ _MAX_CHANCE = 0.05
 _MAX_NAMED_QUANTITIES = 3
 # Number of worst flights that the summary lists.
 WORST_FLIGHT_COUNT = 10
-# Number of those with a log.  A log takes as long as the flight itself, and `--refly` writes that of any flight.
+# Number of worst flights with a log.  A log takes as long as the flight itself, and `--refly` writes any other log.
 LOGGED_FLIGHT_COUNT = 3
 
 
@@ -85,9 +85,9 @@ class RankedRule:
     """Rule in the ranking of a campaign by how close its flights came to failing it.
 
     failed: number of flights that failed the rule.
-    lowest: smallest margin of all flights, in `unit`; None if it is not known, because no flight has a margin or some
-    failed by an unknown one.
-    low_margin: 5 % quantile of the margin, in `unit`; None likewise.
+    lowest: smallest margin of all flights, in `unit`; None if no flight has a margin, or if a flight failed by an
+        unknown margin that may be smaller.
+    low_margin: 5 % quantile of the margin, in `unit`; None if it is unknown.
     """
 
     rule: str
@@ -107,7 +107,8 @@ class RankedRule:
 class DecidingRule:
     """Rule that decides a campaign, and what its margin depends on.
 
-    low_margin: 5 % quantile of its margin, in `unit`; None if unknown, as with so many failures by an unknown margin.
+    low_margin: 5 % quantile of its margin, in `unit`; None if it is unknown, for example because 5 % of the flights
+        failed by an unknown margin.
     sensitivities: dependence of its margin on each varying quantity, the strongest first.
     """
 
@@ -134,16 +135,17 @@ class DecidingRule:
 class CampaignSummary:
     """Contents of the summary and the report.
 
-    deciding: the rules that most flights failed, each the same number, the most urgent first; if no rule fails, the
-    rule with the smallest reliability index, which is the mean of its margins divided by their standard deviation
-    (Cornell, "A probability-based structural code", ACI Journal 66, 1969); () if there is no such rule.
+    deciding: rules that the most flights failed (ties included), the most urgent first.  If no flight failed a rule,
+        the
+    rule with the smallest reliability index: the mean of its margins divided by their standard deviation (Cornell, "A
+    probability-based structural code", ACI Journal 66, 1969).  () if no margin is known.
     conditions: nominal conditions of the flights: aircraft, weather, world and autopilot.
-    deciding_flights: number of flights that would decide the target at this share; None if the target is decided, or
-    for more than `MAX_DECIDING_FLIGHTS`.
+    deciding_flights: number of flights that would decide the target with the same fraction of flyable flights; None if
+    the target is decided, or for more than `MAX_DECIDING_FLIGHTS`.
     unjudged_return: reason why the return after the last item is not judged in any flight; "" if it is judged.
     ranking: rules that flights failed, the most flights first, then all others with a margin, the closest first.
     undecided_text: rules not judged in the first undecided flight, with their reasons; "" if no flight is undecided.
-    mission_fault: reason why the mission fails as a whole; "" if no flight fails so, or only with varied conditions.
+    mission_fault: reason why the mission fails as a whole in nominal conditions; "" if it does not.
     """
 
     name: str
@@ -426,7 +428,7 @@ def closest_text(row: FlightRow) -> str:
     failed_rules = {rule for rule, _ in row.failures}
     for rule, place in row.failures:
         if rule not in {known_rule for _, known_rule, _ in scaled_margins}:
-            return f"{RULE_WORDS[rule].title} failed at {place_text(place)}, not by a margin"
+            return f"{RULE_WORDS[rule].title} failed at {place_text(place)} by an unknown margin"
     if not scaled_margins:
         return ""
     _, rule, margin = min(scaled_margins, key=lambda entry: (entry[1] not in failed_rules, entry[0]))
@@ -474,19 +476,21 @@ def campaign_lines(summary: CampaignSummary) -> list[str]:
 
 
 def undecided_lines(summary: CampaignSummary) -> list[str]:
-    """Return a line on the flights that are not judged in full, with the reason of the first; [] if there are none."""
+    """Return a line on the flights that are not judged in full, with the first reason; [] if there are none."""
     tally = summary.estimate.tally
     if not tally.undecided:
         return []
     flights_text = f"{tally.undecided} of {count_text(tally.flown, 'flight')}"
-    return [f"  Not judged: {flights_text}; reason of the first: {summary.undecided_text}"]
+    return [f"  Not judged: {flights_text}; first reason: {summary.undecided_text}"]
 
 
 def deciding_lines(summary: CampaignSummary) -> list[str]:
     """Return a line on the margin of each deciding rule and on what it depends on; [] if no margin is known."""
-    choice_text = "" if summary.by_rule else "no flight fails; this margin is the smallest relative to its scatter; "
+    choice_text = (
+        "" if summary.by_rule else "no flight fails, and this margin is the smallest relative to its scatter. "
+    )
     return [
-        f"  decides {RULE_WORDS[entry.rule].title}: {choice_text}{_low_margin_text(summary, entry)};"
+        f"  decides {RULE_WORDS[entry.rule].title}: {choice_text}{_low_margin_text(summary, entry)}."
         f" {_drivers_text(entry)}"
         for entry in summary.deciding
     ]
@@ -544,12 +548,12 @@ def _answer_text(summary: CampaignSummary) -> str:
 
 
 def _drivers_text(entry: DecidingRule) -> str:
-    """Return a clause on the quantities that explain most of the variance of a deciding rule's margin."""
+    """Return a sentence on the quantities that explain most of the variance of a deciding rule's margin."""
     if not entry.sensitivities:
-        return f"at least {MIN_FLIGHTS_FOR_INDEX} judged flights are needed to find what the margin depends on"
+        return f"At least {MIN_FLIGHTS_FOR_INDEX} judged flights are needed to find what the margin depends on"
     if not entry.drivers:
-        return "none of the varied quantities has a significant effect on this margin"
-    return "causes of the margin's variance: " + ", ".join(
+        return "None of the varied quantities has a significant effect on this margin"
+    return "Causes of the margin's variance: " + ", ".join(
         f"{sensitivity.title} ({100.0 * sensitivity.index:.0f} %)"
         for sensitivity in entry.drivers[:_MAX_NAMED_QUANTITIES]
     )
@@ -561,15 +565,15 @@ def _deciding_flights_lines(summary: CampaignSummary) -> list[str]:
         return []
     flights = summary.deciding_flights
     shares_text = (
-        "these fractions of flyable and unjudged" if summary.estimate.tally.undecided else "this fraction of flyable"
+        "the same fractions of flyable and unjudged"
+        if summary.estimate.tally.undecided
+        else "the same fraction of flyable"
     )
     if flights is None:
-        return [
-            f"  to decide this, more than {MAX_DECIDING_FLIGHTS:,} flights would be needed, with {shares_text} flights"
-        ]
+        return [f"  more than {MAX_DECIDING_FLIGHTS:,} flights with {shares_text} flights would decide the target"]
     if summary.estimate.tally.share == 1.0:
-        return [f"  {flights:,} flights without a failure would decide this"]
-    return [f"  about {flights:,} flights would decide this, with {shares_text} flights"]
+        return [f"  {flights:,} flights without a failure would decide the target"]
+    return [f"  about {flights:,} flights with {shares_text} flights would decide the target"]
 
 
 def _to_plain_number(value: float | None) -> float | None:

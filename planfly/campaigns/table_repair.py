@@ -46,8 +46,8 @@ class Examination(NamedTuple):
     """Numbers of undamaged and damaged flights, both in ascending order.
 
     is_sound: True if SQLite finds no error in the file, even if some rows are damaged.
-    last_known: last known flight of an unsound file with fewer known than requested flights, because later flights may
-        have been lost; -1 if no flight is known; otherwise None.
+    last_known: number of the last known flight of a broken file, if flights after it may have been lost; -1 if no
+        flight is known; None if no later flight can be missing.
     """
 
     undamaged: list[int]
@@ -55,10 +55,10 @@ class Examination(NamedTuple):
     is_sound: bool = True
     last_known: int | None = None
 
-    def text(self) -> str:
+    def describe(self) -> str:
         """Return a clause on the damage of a table and on its consequence.
 
-        >>> Examination([0, 1, 3], [2]).text()
+        >>> Examination([0, 1, 3], [2]).describe()
         'flight 2 is damaged and was removed; intact flights: 3; --resume flies the missing ones'
         """
         intact_text = f"intact flights: {len(self.undamaged)}; --resume flies the missing ones"
@@ -139,7 +139,7 @@ def _check_rows(rows: Iterable[tuple[Any, ...]]) -> Examination:
 
 
 def _read_row(connection: sqlite3.Connection, query: str, number: int) -> tuple[Any, ...] | None:
-    """Return a row by its number, with the checksum None if the row cannot be read."""
+    """Return the row of a flight number; (number, None) if it cannot be read, None if it does not exist."""
     try:
         row: tuple[Any, ...] | None = connection.execute(f"{query} WHERE flight = ?", (number,)).fetchone()
     except sqlite3.Error as error:

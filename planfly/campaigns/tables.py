@@ -98,12 +98,12 @@ def make_flight_row(index: int, values: Mapping[str, Any]) -> FlightRow:
 
 
 def is_same_flight(first: FlightRow, second: FlightRow) -> bool:
-    """Return True if two rows describe the same flight, ignoring the machine and its speed."""
+    """Return True if two rows describe the same flight; columns that depend on the machine are ignored."""
     return first.draw.index == second.draw.index and not differing_columns(first, second)
 
 
 def differing_columns(first: FlightRow, second: FlightRow) -> list[str]:
-    """Return the names of the columns in which two rows differ, except those of the machine and its speed."""
+    """Return the names of the columns in which two rows differ, except columns that depend on the machine."""
     first_values, second_values = (row_values(replace(row, made_of="")) for row in (first, second))
     return [
         name for name in ROW_COLUMNS if name not in RUN_DEPENDENT_COLUMNS and first_values[name] != second_values[name]
@@ -153,7 +153,7 @@ class TableKind:
 
 
 class LockedTable:
-    """Table of a campaign or of a search, locked until the context ends.
+    """Table of a campaign or of a search for winds, locked until the context ends.
 
     made_of: hash of code, model, mission, scenario, dispersions and seed; flights with another hash are refused.
     """
@@ -161,9 +161,9 @@ class LockedTable:
     def __init__(self, path: Path, kind: TableKind, made_of: str, settings: dict[str, Any], *, resume: bool) -> None:
         """Create the table, or open it to resume.
 
-        settings: the request, stored in the file.
-        Raises StoreError for a file of another kind or campaign, and for a file that another process has locked;
-        OSError for a full disk.
+        settings: settings of the request, which are stored in the file.
+        Raises StoreError for a file of another kind or campaign, and for a file that another process has locked.
+        Raises OSError for a full disk.
         """
         self.path, self.made_of, self._kind = path, made_of, kind
         if resume and not path.is_file():
@@ -188,7 +188,8 @@ class LockedTable:
             stored_settings = _read_settings(self._connection) if "campaign" in tables else {}
             self._check_same_campaign(stored_settings, settings)
             self._repair_file(stored_settings)
-        execute = self._connection.execute  # a repair opens another connection
+        # Use the connection only from here, because a repair opens another one.
+        execute = self._connection.execute
         for statement in self._create_statements():
             execute(statement)
         # Refuse the request before its settings are written, because they would stay in the file.
@@ -264,10 +265,10 @@ class LockedTable:
             Path(f"{self.path}{ending}").unlink(missing_ok=True)
         self._connection = sqlite3.connect(self.path, timeout=1.0, isolation_level=None)
         self._lock_file()
-        report_line(f"{self.path}: {examination.text()}")
+        report_line(f"{self.path}: {examination.describe()}")
 
     def _last_number(self) -> int:
-        """Return the largest flight number that can be read from either end of the table; -1 without any."""
+        """Return the largest flight number that can be read from either end of a damaged table; -1 without any."""
         last_number = -1
         for order in ("", " DESC"):
             with suppress(sqlite3.Error, UnicodeDecodeError):
@@ -374,7 +375,7 @@ def check_not_locked(path: Path) -> None:
         connection.execute("BEGIN EXCLUSIVE")
     except sqlite3.Error as error:
         if getattr(error, "sqlite_errorcode", sqlite3.SQLITE_NOTADB) & 0xFF in LOCKED_CODES:
-            raise StoreError(f"{path}: is held by another process", file=path) from error
+            raise StoreError(f"{path}: is locked by another process", file=path) from error
     finally:
         connection.close()
 
@@ -406,7 +407,7 @@ class convert_errors:
                 errno.ENOSPC, "no space left; finished flights are kept: continue with --resume", str(self._path)
             )
         if code is not None and code & 0xFF in LOCKED_CODES:
-            raise StoreError(f"{self._path}: is held by another process", file=self._path) from error
+            raise StoreError(f"{self._path}: is locked by another process", file=self._path) from error
         raise StoreError(f"{self._path}: {error}", file=self._path) from error
 
 
@@ -505,10 +506,7 @@ class Store(LockedTable):
 
 
 def _check_column(name: str) -> str:
-    """Check and return the name of a column.
-
-    Raises KeyError for an unknown name, which must not get into a query.
-    """
+    """Return the name of a column; raise KeyError for an unknown name, which must not get into a query."""
     if name not in COLUMN_NAMES:
         raise KeyError(name)
     return name
@@ -547,7 +545,7 @@ class RequestedFlight:
     """Flight that a search requests.
 
     number: position in the order of the search.
-    direction: index of the direction, from the north.
+    direction: index of the wind's direction, clockwise from north.
     speed: mean wind speed, m/s.
     draw: index of the draw of variations around this wind; the indices are the same in all directions.
     """

@@ -22,14 +22,14 @@ _UNKNOWN_COLOUR = theme.colour("quiet")
 _GRID_COLOUR = theme.colour("grid")
 _INK_COLOUR = theme.colour("ink")
 _WIND_COLOUR = theme.colour("second")
-# Largest number of times on the axis: more overlap on a narrow page.
+# Largest number of times on the axis; more times would overlap on a narrow page.
 _MAX_TIME_TICKS = 7
-# Largest number of departures at which each has a label of its own.
+# Largest number of departures for which each bar is labelled with its deciding rules.
 _MAX_LABELS = 26
 
 
 def draw_window(result: WindowResult) -> Figure:
-    """Draw each departure's probability with interval and deciding rule, its mean wind and least energy."""
+    """Draw for each departure the fraction of flyable flights, the deciding rules, the wind and the least energy."""
     with clean_style():
         figure = new_figure(6.4)
         probability = figure.add_axes((0.08, 0.54, 0.89, 0.37))
@@ -37,7 +37,7 @@ def draw_window(result: WindowResult) -> Figure:
         energy = figure.add_axes((0.08, 0.09, 0.89, 0.15), sharex=probability)
         departures = result.departures
         times = [_to_matplotlib_days(departure.time) for departure in departures]
-        width = 0.8 * min((after - before for before, after in itertools.pairwise(times)), default=1.0 / 24.0)
+        width = 0.8 * min((later - earlier for earlier, later in itertools.pairwise(times)), default=1.0 / 24.0)
         _draw_probability(probability, result, times, width)
         for axes in (probability, wind, energy):
             _hatch_unjudged(axes, result, times, width)
@@ -83,8 +83,8 @@ def _to_matplotlib_days(time: datetime) -> float:
 def _hatch_unjudged(axes: Axes, result: WindowResult, times: list[float], width: float) -> None:
     """Hatch the columns of the departures that are not judged.
 
-    times: (d,) matplotlib's numbers of the departures.
-    width: of a column, days.
+    times: departures in days since 1970, (d,).
+    width: width of a column, days.
     """
     for time, departure in zip(times, result.departures, strict=True):
         if not departure.rows:
@@ -101,8 +101,8 @@ def _hatch_unjudged(axes: Axes, result: WindowResult, times: list[float], width:
 def _draw_probability(axes: Axes, result: WindowResult, times: list[float], width: float) -> None:
     """Draw the fraction of flyable flights of each departure, with its interval and the deciding rule.
 
-    times: (d,) matplotlib's numbers of the departures.
-    width: of a bar, days.
+    times: departures in days since 1970, (d,).
+    width: width of a bar, days.
     """
     colours = {True: _OPEN_COLOUR, False: _CLOSED_COLOUR, None: _UNKNOWN_COLOUR}
     for time, departure in zip(times, result.departures, strict=True):
@@ -121,15 +121,17 @@ def _draw_probability(axes: Axes, result: WindowResult, times: list[float], widt
             axes.text(time, 0.03, text, rotation=90, ha="right", va="bottom", color=_INK_COLOUR, fontsize=7.5)
     axes.axhline(result.goal.probability, color=_INK_COLOUR, linewidth=1.0, linestyle="--")
     if result.goal.asked is not None:
-        place = (_to_matplotlib_days(result.goal.asked), 1.03)
-        axes.annotate("asked", place, color=_WIND_COLOUR, ha="center", va="bottom", fontsize=8, fontweight="bold")
+        position = (_to_matplotlib_days(result.goal.asked), 1.03)
+        axes.annotate(
+            "requested", position, color=_WIND_COLOUR, ha="center", va="bottom", fontsize=8, fontweight="bold"
+        )
     axes.set_ylim(0.0, 1.15)
     axes.set_yticks([0.0, 0.2, 0.4, 0.6, 0.8, 1.0])
     axes.set_ylabel("flyable flights")
     axes.set_title(
         f"{result.base.name}: {result.goal.flights} flights at each take-off, green with at least"
         f" {result.goal.probability:.0%} flyable\n"
-        "(thin line: 95 % interval; text at a bar: the rules that fail most flights; grey: not judged in full)",
+        "(thin line: 95 % interval; text at a bar: rules that fail the most flights; grey: not judged in full)",
         fontsize=9.5,
         pad=8,
     )

@@ -201,13 +201,13 @@ def _make_folder(args: argparse.Namespace) -> int:
 
 def _print_parameters(args: argparse.Namespace) -> None:
     """Print the values of a parameter file that were used, and those that the data sheet overrides."""
-    from planfly.workflow.data_sheets import overridden_texts, stated_parameters
+    from planfly.workflow.data_sheets import overridden_texts, read_aircraft_parameters
 
-    stated = stated_parameters(Path(args.params))
+    stated = read_aircraft_parameters(Path(args.params))
     values_text = ", ".join(stated.texts.values()) or "no value differs from its default"
     print(f"  params   {args.params}: {values_text}")
     if overridden := overridden_texts(vars(args), stated):
-        print(f"  params   the data sheet applies instead of {', '.join(overridden)}")
+        print(f"  params   the data sheet overrides {', '.join(overridden)}")
 
 
 def _identify(args: argparse.Namespace) -> int:
@@ -278,9 +278,12 @@ def _print_predictions(result: "planfly.IdentifiedAircraft", check: str | None) 
 def _print_uncertain_properties(result: "planfly.IdentifiedAircraft") -> None:
     """Print the properties that the logs do not determine, and the flights that would determine them."""
     if not result.estimate.dynamics:
-        print("  performance only: fewer than 10 rows of inertial sensors or outputs a second do not show the moments")
+        print("  performance only: moments need at least 10 rows of inertial sensors and of outputs per second")
     for log in result.slow:
-        print(f"  rows     {log.source}: {log.hertz:.1f} a second of sensors or outputs; {log.setting} records more")
+        print(
+            f"  rows     {log.source}: {log.hertz:.1f} rows of sensors or outputs per second;"
+            f" {log.setting} records more"
+        )
     if result.conflict is not None:
         print(f"  conflict {result.conflict.text}")
     for wide_number in result.wide:
@@ -289,7 +292,8 @@ def _print_uncertain_properties(result: "planfly.IdentifiedAircraft") -> None:
         print(f"  not seen {line}")
     for log_name in result.without_current:
         print(
-            f"  current  not used, as {log_name} has none (BAT): identify from only the other logs to use their current"
+            f"  current  not used, because {log_name} has no current (BAT); identify from the other logs alone to use"
+            " their current"
         )
 
 
@@ -371,7 +375,7 @@ def _print_limits(aircraft: "Aircraft", envelope: "Envelope") -> None:
 
 def _print_trims(trims: "tuple[TrimRow, ...]", amsl: float) -> None:
     """Print a table of trims in level flight, one row for each airspeed.  amsl: altitude, m AMSL."""
-    print(f"\nlevel flight at {amsl:.0f} m AMSL (endurance and range: still air, 80 % of what it carries)")
+    print(f"\nlevel flight at {amsl:.0f} m AMSL (endurance and range: still air, 80 % of the energy carried)")
     print("  airspeed   alpha  elevator  aileron  rudder  throttle    power  endurance   range")
     print("       m/s     deg       deg      deg     deg         %       kW          h      km")
     for row in trims:
@@ -406,13 +410,13 @@ def _print_envelope(aircraft: "Aircraft", envelope: "Envelope") -> None:
         cells = "".join(f"{envelope.level_speeds(amsl)[index]:11.1f} m/s" for amsl in altitudes)
         print(f"  {title:<5}{cells[len(title) - 5 :]}")
     print(f"\nsteepest climb / descent relative to the ground at {aircraft.airspeed:g} m/s and 500 m, deg")
-    for title, tail, cross in (
+    for title, tailwind, crosswind in (
         ("calm", 0.0, 0.0),
         (f"{_WIND_MPS:g} m/s tailwind", _WIND_MPS, 0.0),
         (f"{_WIND_MPS:g} m/s headwind", -_WIND_MPS, 0.0),
         (f"{_WIND_MPS:g} m/s crosswind", 0.0, _WIND_MPS),
     ):
-        print(f"  {title:<18}{_angle_pair_text(*envelope.slope_limits(aircraft.airspeed, 500.0, tail, cross))}")
+        print(f"  {title:<18}{_angle_pair_text(*envelope.slope_limits(aircraft.airspeed, 500.0, tailwind, crosswind))}")
 
 
 def _print_turns(aircraft: "Aircraft") -> None:

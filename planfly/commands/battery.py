@@ -71,7 +71,7 @@ def battery(args: argparse.Namespace) -> int:
 def _json_answer(target: str, result: "BatteryResult", code: int) -> "BatteryAnswer":
     """Return the answer of ``planfly battery`` for --json."""
     from planfly.campaigns.battery_text import answer_line
-    from planfly.terminal.battery_answers import BatteryAnswer, DecisionEntry, finite
+    from planfly.terminal.battery_answers import BatteryAnswer, DecisionEntry, finite_or_none
 
     goal = result.goal
     return BatteryAnswer(
@@ -79,9 +79,9 @@ def _json_answer(target: str, result: "BatteryResult", code: int) -> "BatteryAns
         what=target,
         headline=answer_line(result),
         is_enough=result.is_enough,
-        capacity_wh=finite(result.capacity),
-        lowest_wh=finite(result.interval.low),
-        highest_wh=finite(result.interval.high),
+        capacity_wh=finite_or_none(result.capacity),
+        lowest_wh=finite_or_none(result.interval.low),
+        highest_wh=finite_or_none(result.interval.high),
         own_capacity_wh=None if result.is_guessed else result.own_capacity,
         mass_kg=result.mass * result.mass_factor,
         probability=goal.probability,
@@ -95,7 +95,7 @@ def _json_answer(target: str, result: "BatteryResult", code: int) -> "BatteryAns
             DecisionEntry(
                 flights=decision.flights,
                 returns_from_leg=None if decision.leg < 0 else decision.leg,
-                start_s=finite(decision.time),
+                start_s=finite_or_none(decision.time),
             )
             for decision in result.decisions
         ],

@@ -178,10 +178,10 @@ def campaign(args: argparse.Namespace) -> int:
     folder = _result_folder(args, "campaign")
     if args.refly is not None:
         return _repeat_flight(args, folder)
-    with _report_stored_flights(args, folder, "campaign.sqlite") as interrupted:
+    with _report_stored_flights(args, folder, "campaign.sqlite") as interruption_code:
         result = call_api(planfly.campaign, args, out=folder)
-    if interrupted():
-        return interrupted()
+    if interruption_code():
+        return interruption_code()
     from planfly.campaigns.summary import campaign_lines, campaign_suite
 
     print("\n".join(campaign_lines(result.summary)))
@@ -196,10 +196,10 @@ def campaign(args: argparse.Namespace) -> int:
 def winds(args: argparse.Namespace) -> int:
     """Find the strongest wind from each direction in which a mission succeeds, or resume the search; draw a chart."""
     folder = _result_folder(args, "winds")
-    with _report_stored_flights(args, folder, "winds.sqlite") as interrupted:
+    with _report_stored_flights(args, folder, "winds.sqlite") as interruption_code:
         result = call_api(planfly.winds, args, out=folder)
-    if interrupted():
-        return interrupted()
+    if interruption_code():
+        return interruption_code()
     from planfly.campaigns.report import wind_lines, winds_suite
 
     print("\n".join(wind_lines(result)))
@@ -232,7 +232,7 @@ def _repeat_flight(args: argparse.Namespace, folder: Path) -> int:
                 f"{option}: cannot be combined with --refly, which flies a single flight", field=option, value=target
             )
     flight = call_api(planfly.campaign_flight, args, index=args.refly, out=folder)
-    print(f"flight {args.refly}: {flight.row.outcome}, ended: {flight.row.ended}, as in the table")
+    print(f"flight {args.refly}: {flight.row.outcome}, ended: {flight.row.ended} (as in the campaign's table)")
     if flight.row.undecided_text:
         print(f"  Not judged: {flight.row.undecided_text}")
     for rule, place in flight.row.failures:
@@ -243,11 +243,10 @@ def _repeat_flight(args: argparse.Namespace, folder: Path) -> int:
 
 @contextmanager
 def _report_stored_flights(args: argparse.Namespace, folder: Path, table: str) -> Iterator[Callable[[], int]]:
-    """Report the number of stored flights after an interruption.
+    """Report the number of stored flights if the block is interrupted.
 
-    Yields a function that returns the exit code.
-
-    The exit code is 0 without an interruption. An interruption before the table exists is raised again.
+    Yields a function that returns the exit code of the interruption, or 0 without an interruption.
+    An interruption before the table exists is raised again.
     """
     code = 0
     try:

@@ -38,10 +38,7 @@ LOGS = "LOG.BIN|.tlog|.ulg|.gpx|.igc|.kml|.kmz"
 
 
 def add_mission_or_log_argument(parser: CommandParser) -> None:
-    """Add the argument for a mission or a flight log of planfly or another program.
-
-    A mission is flown first.
-    """
+    """Add the argument for a mission, which is then flown, or for a flight log of planfly or another program."""
     with_completer(
         parser.add_argument(
             "what", metavar="MISSION|LOG", help=f"plan.json, .waypoints or .plan, or a flight log (.mcap, or {LOGS})"

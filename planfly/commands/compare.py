@@ -25,10 +25,10 @@ def add_compare_parser(command_line: LineParser) -> None:
         "compare two flights: a table of differences, and pictures; or two campaigns: how likely their flights succeed",
         "planfly compare calm.mcap windy.mcap --out both",
         "planfly compare runs/calm-campaign runs/windy-campaign",
-        details="  The exit code of two campaigns is 0 whatever the answer is: --json states it as `answer`.",
+        details="  For two campaigns the exit code is 0 for every answer; --json states the answer.",
     )
     add_log_argument(parser, "first", "A", "a flight log (.mcap), or the folder of a campaign")
-    add_log_argument(parser, "second", "B", "another")
+    add_log_argument(parser, "second", "B", "another log, or the folder of another campaign")
     parser.add_argument("--svg", action="store_true", help="also write the pictures as SVG")
     add_result_options(parser, "folder for pictures and compare.html (default: no files, only the table)")
 
@@ -112,7 +112,7 @@ def _json_answer(comparison: "Comparison", files: list[Path], code: int) -> obje
     """Return the answer of ``planfly compare`` for --json."""
     from planfly.terminal.answers import CompareAnswer, QuantityPair
 
-    def number(value: float) -> float | None:
+    def number_or_none(value: float) -> float | None:
         """Return a finite number unchanged, and None for NaN and infinity."""
         return value if math.isfinite(value) else None
 
@@ -124,8 +124,8 @@ def _json_answer(comparison: "Comparison", files: list[Path], code: int) -> obje
             QuantityPair(
                 name=difference.name,
                 unit=difference.unit,
-                first=number(difference.first),
-                second=number(difference.second),
+                first=number_or_none(difference.first),
+                second=number_or_none(difference.second),
             )
             for difference in comparison.differences
         ],

@@ -79,16 +79,17 @@ def import_log(args: argparse.Namespace) -> int:
 
 
 def _guess_columns(args: argparse.Namespace) -> int:
-    """Write a table of columns guessed from data files, and print how many guesses are to be checked."""
+    """Write a table of columns guessed from data files, and print the number of guesses to check."""
     for name, value in (("FLIGHT.mcap", args.target), ("--json", args.json), ("--junit", args.junit)):
         if value is not None:
-            raise PlanflyError(f"--columns-from writes a table and no flight log: without {name}", field=name)
+            message = f"--columns-from cannot be combined with {name}, because it writes a table and no flight log"
+            raise PlanflyError(message, field=name)
     guesses = planfly.guess_columns(args.files, args.log, overwrite=args.overwrite)
     print(f"table     {args.log}: {guesses.guesses} {'guess' if guesses.guesses == 1 else 'guesses'} to check")
     for line in guesses.missing:
         print(f"  {line}")
     print(
-        f"next      check it, then `planfly import {args.log} FLIGHT.mcap`, or"
+        f"next      check the table, then `planfly import {args.log} FLIGHT.mcap`, or"
         f" `planfly aircraft --identify {args.log} ...`"
     )
     return FLYABLE

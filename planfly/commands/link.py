@@ -55,8 +55,8 @@ def add_link_parser(command_line: LineParser) -> None:
     group.add_argument(
         "--use",
         choices=CHOICES["use"],
-        help="link to the ground station (telemetry) or of the remote control (control): the autopilot reacts"
-        " differently to their loss (default: telemetry)",
+        help="kind of link: telemetry (to the ground station) or control (from the remote control); the autopilot"
+        " reacts differently to the loss of each (default: telemetry)",
     )
     add_imported_log_options(parser)
     add_world_options(parser)

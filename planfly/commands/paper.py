@@ -46,7 +46,10 @@ def add_paper_parser(command_line: LineParser) -> None:
 
 
 def paper(args: argparse.Namespace) -> int:
-    """Plan, and write and print the table; return 0 for every result, because "no path" is also an answer."""
+    """Plan the problems of the paper, write the tables, and print the main table.
+
+    The exit code is 0 for every result, because "no path" is also an answer.
+    """
     folder = Path(args.out) if args.out else RESULTS / "paper"
     tables = call_api(planfly.paper_tables, args, out=folder, overwrite=args.overwrite or args.out is None)
     from planfly.planning.paper import table_text

@@ -26,7 +26,8 @@ def add_predict_parser(command_line: LineParser) -> None:
     """Add the parser of ``planfly predict``."""
     parser = command_line.add_command(
         "predict",
-        "predict a logged flight that a model has not seen, as bands of 95 %, and count how often it is inside",
+        "predict a logged flight, which the model has not seen, as bands of 95 %, and count how often the flight is"
+        " inside them",
         "planfly predict flight.columns.toml --aircraft ./mine --out predicted",
     )
     with_completer(

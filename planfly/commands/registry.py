@@ -35,9 +35,9 @@ class Command(NamedTuple):
     function: str = ""
 
     def load(self, name_format: str = "{}") -> Any:
-        """Import the command's module, and return its function with the formatted name of the command.
+        """Import the command's module, and return the function of this command.
 
-        name_format: "{}" for the function that executes the command, "add_{}_parser" for that which adds its parser.
+        name_format: "{}" for the function that executes the command, "add_{}_parser" for the one that adds its parser.
         """
         module = import_module(f"planfly.commands.{self.module or self.name}")
         return getattr(module, name_format.format(self.function or self.name))

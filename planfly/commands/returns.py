@@ -33,8 +33,8 @@ def add_returns_parser(command_line: LineParser) -> None:
     """Add the parser of ``planfly returns``."""
     parser = command_line.add_command(
         "returns",
-        "simulate a return to launch from points all along the route: is each safe, where does it end and why; and"
-        " what can the aircraft reach without its engine",
+        "simulate a return to launch from points all along the route, state where each return ends and if it is safe,"
+        " and find what the aircraft can reach without its engine",
         "planfly returns mission.waypoints --terrain jacksboro --wind 5,250",
         "planfly returns flight.mcap --every 5 --out pictures",
         "planfly returns flight.mcap --sitl ./arduplane --points 5",
@@ -97,19 +97,19 @@ def returns(args: argparse.Namespace) -> int:
     for text in result.range_lines[:_MAX_LISTED_RANGES]:
         print(f"  {text}")
     if len(result.range_lines) > _MAX_LISTED_RANGES:
-        print(f"  and {len(result.range_lines) - _MAX_LISTED_RANGES} ranges more; --json FILE has them all")
+        print(f"  and {len(result.range_lines) - _MAX_LISTED_RANGES} more ranges; --json FILE lists them all")
     for text in result.program_lines:
         print(f"  {text}")
     print(f"  {result.no_return_line}")
     for text in result.suggestion_lines:
         print(colour_text("  would help: ", "hint") + text)
     if args.suggest and not result.safe and not result.suggested:
-        print(f"  no {result.returns.trials_text} or set of rally points that would help was found")
+        print(f"  no {result.returns.trials_text} or set of rally points was found that would help")
     print(f"engine out: {result.glide_headline}")
     for text in result.glide_lines[:_MAX_LISTED_RANGES]:
         print(f"  {text}")
     if len(result.glide_lines) > _MAX_LISTED_RANGES:
-        print(f"  and {len(result.glide_lines) - _MAX_LISTED_RANGES} ranges more; --json FILE has them all")
+        print(f"  and {len(result.glide_lines) - _MAX_LISTED_RANGES} more ranges; --json FILE lists them all")
     for text in result.notes:
         print(f"  note    {text}")
     for path in result.files:

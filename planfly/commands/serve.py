@@ -19,8 +19,8 @@ from planfly.terminal.options import (
 # Help text on the modes and commands of the vehicle.
 _VEHICLE_HELP = """
 It flies the modes AUTO, LOITER, GUIDED (to a place) and RTL, and changes between them in flight.
-Parameters are read, listed and set by name before a flight: those of the simulated autopilot, and PFLY_FORCE,
-which at 1 lets the vehicle arm and fly even a mission that is judged not flyable (default: 0)."""
+Before a flight, ground stations can list, read and set parameters by name: the parameters of the simulated autopilot,
+and PFLY_FORCE.  With PFLY_FORCE 1 the vehicle arms and flies even a mission that is judged not flyable (default: 0)."""
 
 
 def add_serve_parser(command_line: LineParser) -> None:

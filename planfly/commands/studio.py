@@ -23,10 +23,10 @@ from planfly.terminal.options import (
 
 # Help text on mouse and keyboard.
 _CONTROLS_HELP = """
-Waypoints are dragged on the map, heights on the profile below it; a diamond on a leg inserts one.  During a drag
-only the geometry is judged; after the drag the simulated autopilot flies the mission.  Keys: arrows move a waypoint by
-10 m (with Shift 100 m), Page Up and Page Down by 5 m of height, Delete deletes it, Ctrl+Z and Ctrl+Shift+Z undo and
-redo, Escape cancels a drag.
+Drag waypoints on the map, and their heights on the profile below it.  A diamond on a leg inserts a waypoint.  During a
+drag only the geometry is judged; after the drag the simulated autopilot flies the mission.  Keys: the arrows move a
+waypoint by 10 m (with Shift 100 m), Page Up and Page Down change its height by 5 m, and Delete deletes it.  Ctrl+Z and
+Ctrl+Shift+Z undo and redo, and Escape cancels a drag.
 The page can be reached only from this machine, at the printed address."""
 
 

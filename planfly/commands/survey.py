@@ -26,7 +26,7 @@ def add_survey_parser(command_line: LineParser) -> None:
     """Add the parser of ``planfly survey``."""
     parser = command_line.add_command(
         "survey",
-        "fly a survey: how much of each photo line can be used, and what would help the lines that are lost",
+        "fly a survey, state how much of each photo line can be used, and suggest changes for the lines that are lost",
         "planfly survey field.plan --terrain dem.tif --aircraft x8 --autopilot ardupilot --wind 5,250",
         "planfly survey field.waypoints --suggest --out better",
     )
@@ -83,7 +83,7 @@ def survey(args: argparse.Namespace) -> int:
     if args.suggest and not result.usable and not result.remedies:
         for text in result.no_remedy_lines:
             print(f"  {text}")
-    # A camera of --camera belongs to no survey of the file.
+    # A camera from --camera belongs to no survey of the file.
     has_survey_item = any(plan.photo is not None for plan in result.setup.mission.survey_plans)
     for path in result.files:
         note = " (the survey as plain items, without its camera)" if path.suffix == ".plan" and has_survey_item else ""
@@ -108,7 +108,7 @@ def _camera_option(result: "SurveyResult") -> str:
     camera = next((overlap.camera for overlap in result.overlaps if overlap is not None), None)
     if camera is None:
         return ""
-    # A camera with a focal length of 10 mm and the same footprint.
+    # State a camera with a focal length of 10 mm and the same footprint.
     text = f" --camera {10.0 * camera.across:.4g}x{10.0 * camera.along:.4g},10"
     if camera.front is None or camera.side is None:
         return text

@@ -19,7 +19,7 @@ def add_terrain_parser(command_line: LineParser) -> None:
     """Add the parser of ``planfly terrain``."""
     parser = command_line.add_command(
         "terrain",
-        "write the ground of an area as a GeoTIFF, from a folder of tiles or the Copernicus DEM's server",
+        "write the terrain of an area as a GeoTIFF, from a folder of tiles or the Copernicus DEM's server",
         "planfly terrain --around field.waypoints --out dem.tif",
         "planfly terrain --box 46.4,7.9,46.7,8.3 --source ./tiles --out dem.tif",
     )

@@ -73,7 +73,7 @@ def _json_answer(target: str, result: "WindowResult", code: int) -> "WindowAnswe
     """Return the answer of ``planfly window`` for --json."""
     from planfly.campaigns.failure_counts import failures_document
     from planfly.campaigns.window_text import answer_line, unjudged_lines
-    from planfly.terminal.battery_answers import finite
+    from planfly.terminal.battery_answers import finite_or_none
     from planfly.terminal.window_answers import DepartureEntry, WindowAnswer, WindowEntry
 
     return WindowAnswer(
@@ -95,9 +95,9 @@ def _json_answer(target: str, result: "WindowResult", code: int) -> "WindowAnswe
                 flyable=departure.flyable,
                 lowest=departure.interval.low if departure.rows else None,
                 highest=departure.interval.high if departure.rows else None,
-                wind_mps=finite(departure.wind[0]),
-                wind_from_deg=finite(departure.wind[1]),
-                energy_left_wh=finite(departure.energy_left),
+                wind_mps=finite_or_none(departure.wind[0]),
+                wind_from_deg=finite_or_none(departure.wind[1]),
+                energy_left_wh=finite_or_none(departure.energy_left),
                 undecided=departure.undecided,
                 rules=list(departure.rules),
                 by_rule=failures_document(departure.failures),

@@ -268,7 +268,7 @@ def flown_parameters(log: MotionLog) -> dict[str, float]:
     """
     old_names = {definition.old[0] for definition in DEFINITIONS.values() if definition.old is not None}
     current_names = {definition.name for definition in DEFINITIONS.values()}
-    law_parameters, _ = ArduPilotParameters.of_log(log.parameters, log.source)
+    law_parameters, _ = ArduPilotParameters.from_log(log.parameters, log.source)
     other_parameters = {
         name: value
         for name, value in log.parameters.items()

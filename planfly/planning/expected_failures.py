@@ -1,9 +1,9 @@
 """Find out without a flight why a safe plan is expected to fail in more than one of twenty dispersed flights.
 
-A plan is safe within the limits of its scenario, in its stated wind and over the heights of its map.  Two causes of
-failures are known from the plan alone: limits that are looser than the aircraft's, and a strip that is too short for
-what is known of its height.  `planfly.campaigns.landing_trial` flies the landings of steep finals.  All other causes
-take flights of the whole plan (`planfly plan --flights N`).
+A safe plan meets the limits of its scenario in the wind of the scenario and over the heights of its map.  Two causes of
+failures can be found from the plan alone: limits that are looser than the aircraft's limits, and a strip that is too
+short for the uncertainty of its altitude.  `planfly.campaigns.landing_trial` flies the landings of steep finals.  Other
+causes can only be found by flights of the whole plan (`planfly plan --flights N`).
 """
 
 import math
@@ -17,16 +17,18 @@ from planner.plan import Plan
 from planner.search.lay_ground_ways import MAP_HEIGHT_SD_M
 from world.wind import W20
 
-# Probability with which a plan is to hold in dispersed flights.
+# Fraction of the dispersed flights that a plan should pass.
 HOLDING_PROBABILITY = 0.95
-# Standard deviation of a touchdown along the strip in light turbulence, with GNSS errors and a surveyed height, m: the
-# largest of ten plans of four aircraft, 24 flights each (16 to 66 m).  It is assumed to grow with the gusts.
+# Standard deviation of the touchdown point along the strip in light turbulence, with GNSS errors and a surveyed
+# altitude, m.  It is the largest of ten plans of four aircraft, with 24 flights each (16 to 66 m), and is assumed to
+# grow with the gusts.
 _TOUCHDOWN_SD_IN_LIGHT_TURBULENCE_M = 66.0
-# The same without turbulence: 5 touchdowns of ArduPlane in steady wind were within 15 m of the simulated ones.
+# The same standard deviation without turbulence, m: 5 touchdowns of ArduPlane in steady wind were within 15 m of the
+# simulated touchdowns.
 _TOUCHDOWN_SD_IN_CALM_AIR_M = 8.0
-# Quantile of the normal distribution: 95 % of all values are within this number of standard deviations.
+# Number of standard deviations from the mean within which 95 % of normally distributed values are.
 _SIGMAS_OF_95_PERCENT = 1.96
-# Step of the strip lengths that are suggested, m.
+# Suggested strip lengths are multiples of this length, m.
 _STRIP_STEP_M = 10.0
 
 
@@ -39,7 +41,7 @@ def expected_failures(plan: Plan, uav: Uav) -> tuple[str, ...]:
     >>> scenario = load_scenario("tight")
     >>> uav = load_uav(scenario)
     >>> expected_failures(plan_path(scenario, uav.limits, seed=1), uav)[0][:57]
-    'flights are expected to fail, because the limits of the s'
+    'flights are expected to fail: the limits of the scenario '
     """
     if not plan.safe:
         return ()
@@ -47,7 +49,10 @@ def expected_failures(plan: Plan, uav: Uav) -> tuple[str, ...]:
 
 
 def _loose_limits_text(plan: Plan, uav: Uav) -> str:
-    """Describe the first part of a plan that the scenario's limits allow but the aircraft cannot fly; or ""."""
+    """Describe the first part of a plan that the scenario's limits allow but the aircraft cannot fly.
+
+    Return "" if there is no such part.
+    """
     limits = uav.limits
     aircraft_limits = replace(limits, max_turn=None, max_climb=None, max_dive=None, tracking=None)
     if (limits.max_turn, limits.max_climb, limits.max_dive) == (None, None, None):
@@ -56,13 +61,13 @@ def _loose_limits_text(plan: Plan, uav: Uav) -> str:
     if not problems:
         return ""
     return (
-        "flights are expected to fail, because the limits of the scenario are looser than those of the aircraft"
-        f' ({problems[0]}); to plan within both, write "aircraft" instead of the numbers in [limits]'
+        "flights are expected to fail: the limits of the scenario are looser than the limits of the aircraft"
+        f' ({problems[0]}). To plan within both, write "aircraft" instead of the numbers in [limits]'
     )
 
 
 def _short_strip_text(plan: Plan) -> str:
-    """Explain why a strip is too short for the expected touchdowns, and what would help.
+    """Explain why a strip is too short for the expected touchdowns, and state the remedies.
 
     Return "" if the strip is long enough, or if the plan does not land on a strip.
     """
@@ -90,14 +95,15 @@ def _short_strip_text(plan: Plan) -> str:
     source = "the elevation file" if strip.height_sd is None else "its survey"
     return (
         f"only {100.0 * probability:.0f} % of the landings are expected to touch down on the strip of"
-        f" {strip.length:.0f} m. The altitude of the strip has a standard deviation of {height_sd:.1f} m ({source}),"
-        f" and the touchdown point one of {touchdown_sd:.0f} m (largest scatter of measured landings)."
+        f" {strip.length:.0f} m. The standard deviation of the strip's altitude is {height_sd:.1f} m ({source})."
+        f" With the largest scatter of measured landings, the standard deviation of the touchdown point along the strip"
+        f" is {touchdown_sd:.0f} m."
         f" To improve this, {', or '.join(remedies)}"
     )
 
 
 def _sufficient_strip_length(touchdown_sd: float) -> float:
-    """Return the strip length that contains 95 % of the touchdowns, m, rounded up.
+    """Return the length of a strip on which 95 % of the landings touch down, m, rounded up.
 
     touchdown_sd: standard deviation of the touchdown along the strip, m.
     """

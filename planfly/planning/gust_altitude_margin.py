@@ -41,17 +41,17 @@ _UNUSED_CLIMB_FRACTION_BELOW_A_LIMIT = 0.75
 _UNUSED_SINK_SIGMAS = 1.0
 # Maximum fraction of the maximum sink rate that is left unused.
 _UNUSED_SINK_FRACTION = 0.6
-# Fraction of the margin needed in level flight that a plan has at a fixed end, where a flight spends only seconds.  Of
-# 24 flights each of a Zagi in moderate turbulence between ends with a half, none came below its clearance over ground
-# at 0, 1,500 and 3,000 m; with a quarter, 5 did at 3,000 m.
+# Margin required at a fixed end of a plan, as a fraction of the margin in level flight: a flight spends only seconds
+# there.  A Zagi made 24 flights in moderate turbulence over ground at each of 0, 1,500 and 3,000 m.  With a half, no
+# flight came below its clearance; with a quarter, 5 flights did at 3,000 m.
 _END_HEIGHT_FRACTION = 0.5
-# Distance from an end at which a plan has the full margin that its leg needs, m; the margin grows linearly up to there.
+# Distance from an end of the plan beyond which a leg needs its full margin, m; up to there the margin grows linearly.
 _FULL_HEIGHT_DISTANCE_M = 1500.0
 # Length of the parts of a leg near an end that are judged separately, m.
 _PART_LENGTH_M = 250.0
-# Height step at which a path is compared with missiles and zones, m; none that is thicker than this step is missed.
+# Step of the displacements for which a path is compared with missiles and zones, m; thicker hazards are not missed.
 _HEIGHT_STEP_M = 2.5
-# Minimum ratio of the length of a leg's part to the tangent of the turn in this part.
+# Minimum length of the part of a leg at a turn, as a ratio to the tangent length of the turn.
 _TANGENT_RATIO = 1.05
 # Tolerance for rounding, m.
 _ROUNDING_TOLERANCE_M = 1e-6
@@ -81,9 +81,8 @@ class Shortfall(NamedTuple):
 def ensure_altitude_margin(plan: Plan, uav: Uav, search: Search | None = None) -> Plan:
     """Return a plan whose legs have an altitude margin for a one-in-a-hundred gust.
 
-    This is the given plan, or another plan that `search` finds.
-
-    If no such plan is found, the given plan is returned as not safe, with the reason in its certificate.
+    This is the given plan, or another plan that `search` finds.  If no such plan is found, the given plan is returned
+    as not safe, with the reason in its certificate.
 
     search: function that plans the same scenario within other limits; None to search for no other path.
 
@@ -121,7 +120,7 @@ def _gusts_displace_aircraft(plan: Plan, uav: Uav) -> bool:
 def _gust_displacements(
     scenario: Scenario, autopilot: Autopilot
 ) -> list[tuple[Gust, Callable[[float, Turbulence], float]]]:
-    """Return the kinds of gusts to consider, each with the function for its altitude displacement, m.
+    """Return pairs of a kind of gust and the function that computes its altitude displacement, m.
 
     The function's arguments are the climb or sink rate that the aircraft holds in reserve (m/s) and the turbulence.
     Updrafts are considered only if the scenario has zones or a maximum height.
@@ -145,9 +144,9 @@ def _climb_problem_text(plan: Plan, uav: Uav) -> str:
 
     Return "" for any other aircraft.
 
-    With a climb rate of less than `MIN_SPARE_RATE_SIGMAS`, more downdrafts arrive before the aircraft has climbed back.
-    Of 24 flights of a Zagi with a climb rate of 0.57 standard deviations, 3 lost more than 47 m; of 24 with 0.8, none
-    did.
+    The required climb rate is `MIN_SPARE_RATE_SIGMAS` standard deviations of the vertical gusts.  With less, further
+    downdrafts arrive before the aircraft has climbed back.  Of 24 flights of a Zagi with a climb rate of 0.57 standard
+    deviations, 3 lost more than 47 m; of 24 flights with 0.8, none did.
     """
     amsl, turbulence = float(plan.waypoints[:, 2].max()), plan.scenario.wind.turbulence
     climb_rate = uav.limits.with_margin().max_climb_and_sink_rates(amsl)[0]
@@ -155,16 +154,16 @@ def _climb_problem_text(plan: Plan, uav: Uav) -> str:
     if climb_rate >= min_climb_rate or not uav.autopilot.deviations.gust_sink(climb_rate, turbulence):
         return ""
     return (
-        f"the aircraft climbs at most {climb_rate:.2f} m/s at {amsl:.0f} m; with less than {min_climb_rate:.2f} m/s,"
-        f" downdrafts of {turbulence} turbulence may push it down further than any height margin covers; less"
-        " turbulence, a lower mission or an aircraft that climbs better would help"
+        f"the aircraft climbs at most {climb_rate:.2f} m/s at an altitude of {amsl:.0f} m. With less than"
+        f" {min_climb_rate:.2f} m/s, downdrafts of {turbulence} turbulence may push it down further than any height"
+        " margin covers. Less turbulence, a lower mission or an aircraft that climbs better would help"
     )
 
 
 def _search_other_plan(plan: Plan, uav: Uav, search: Search, shortfalls: list[Shortfall]) -> Plan | None:
     """Search for a plan without shortfalls, within limits that leave climb and sink rate unused.
 
-    Returns None if no such plan is found.
+    Return None if no such plan is found.
 
     shortfalls: shortfalls of the given plan.
     """
@@ -172,18 +171,18 @@ def _search_other_plan(plan: Plan, uav: Uav, search: Search, shortfalls: list[Sh
     if _exceeds_height_limit(plan, limits_in_gusts(plan, uav).reserve_height):
         fractions.append(_UNUSED_CLIMB_FRACTION_BELOW_A_LIMIT)
     all_shortfalls = list(shortfalls)
-    for unused_fraction, from_threats in product(fractions, (False, True)):
-        # Most paths pass missiles and zones at the side, so a margin above them is required only if a path led above.
-        if from_threats and not any(shortfall.is_threat for shortfall in all_shortfalls):
+    for unused_fraction, needs_threat_margin in product(fractions, (False, True)):
+        # Most paths pass missiles and zones at the side: require a margin above them only if a path led over one.
+        if needs_threat_margin and not any(shortfall.is_threat for shortfall in all_shortfalls):
             continue
         search_limits = limits_in_gusts(plan, uav, unused_fraction)
         # Without a maximum height, the limits without a margin at threats only leave sink rate unused.
         has_only_threats = (
             all(shortfall.is_threat for shortfall in shortfalls) and plan.scenario.limits.max_height_m is None
         )
-        if not from_threats and has_only_threats and not search_limits.reserve_height:
+        if not needs_threat_margin and has_only_threats and not search_limits.reserve_height:
             continue
-        other_plan = search(_with_margin_at_threats(search_limits) if from_threats else search_limits)
+        other_plan = search(_with_margin_at_threats(search_limits) if needs_threat_margin else search_limits)
         if not other_plan.safe:
             continue
         remaining = find_shortfalls(other_plan, uav)
@@ -274,7 +273,7 @@ class _Parts(NamedTuple):
 
 
 def find_shortfalls(plan: Plan, uav: Uav) -> list[Shortfall]:
-    """Find where each kind of gust displaces the aircraft deepest into each kind of hazard, if at all.
+    """Find the places where each kind of gust displaces the aircraft deepest into each kind of hazard.
 
     Hazards are the required clearance, the maximum height, missiles and zones.  Only displacements into a hazard are
     returned.
@@ -292,7 +291,7 @@ def find_shortfalls(plan: Plan, uav: Uav) -> list[Shortfall]:
         )
         # Minimum of the unused rates at the start and at the end of each leg.
         unused_rates = np.minimum(max_rates[:-1] - used_rates[:, 0], max_rates[1:] - used_rates[:, 1])
-        # ArduPlane and PX4 have an altitude error even without such a gust; planfly's guidance does not.
+        # In an updraft ArduPlane and PX4 have their usual altitude error, too; planfly's guidance has none.
         altitude_error = 0.0 if is_downdraft else float(problem.certified.tracking.up)
         margins = np.array([displacement(float(rate), turbulence) + altitude_error for rate in unused_rates])
         end_margins = _END_HEIGHT_FRACTION * np.array(
@@ -308,11 +307,9 @@ def find_shortfalls(plan: Plan, uav: Uav) -> list[Shortfall]:
 
 
 def _cut_into_parts(problem: Problem, waypoints: Floats, gust: Gust, margins: Floats, end_margins: Floats) -> _Parts:
-    """Cut the legs near the ends of a path into short parts.
+    """Cut the legs near the ends of a path into short parts, each with the margin that it needs.
 
-    Near an end, the needed margin grows with the distance from the end.
-
-    Legs are not cut within turns.
+    Near an end of the path, the margin grows with the distance from the end.  Legs are not cut within turns.
 
     waypoints: (w, 3) m.
     margins: altitude that gusts may cost or add on each leg, (w - 1,) m.
@@ -349,7 +346,7 @@ def _heights_at_ends(problem: Problem, parts: _Parts) -> list[tuple[str, float, 
     The result is empty without terrain.
     """
     terrain = problem.scenario.terrain
-    if terrain is None:  # pragma: no cover - a problem has one
+    if terrain is None:  # pragma: no cover - a problem always has terrain
         return []
     end_heights = parts.points[:, 2] - terrain.height(parts.points[:, 0], parts.points[:, 1])
     return [("start", float(end_heights[0]), 0), ("destination", float(end_heights[-1]), -1)]
@@ -417,7 +414,7 @@ def _missile_shortfall(problem: Problem, parts: _Parts) -> Shortfall | None:
     )
     leg = parts.legs[int(part)]
     return Shortfall(
-        parts.gust, -distance, f"into the reach of {threats.names[missile]}", f"on leg {leg}", is_threat=True
+        parts.gust, -distance, f"into the kill zone of {threats.names[missile]}", f"on leg {leg}", is_threat=True
     )
 
 
@@ -441,9 +438,10 @@ def _zone_shortfall(problem: Problem, parts: _Parts) -> Shortfall | None:
 
 
 def _gust_paths(parts: _Parts) -> list[Floats]:
-    """Return paths (p, 3) displaced by gusts in steps, up to the full displacement.
+    """Return copies of a path (p, 3) that are displaced vertically by 1, 2, ... steps.
 
-    A step is at most `_HEIGHT_STEP_M` high, so that no hazard is missed.
+    The last copy has the full displacement of the gusts. A step is at most `_HEIGHT_STEP_M` high, so that no hazard is
+    missed.
     """
     margins = np.maximum(parts.margin_before, parts.margin_after)
     step_count = max(1, math.ceil(float(margins.max()) / _HEIGHT_STEP_M))
@@ -454,14 +452,14 @@ def _gust_paths(parts: _Parts) -> list[Floats]:
 def _shortfall_text(shortfall: Shortfall, plan: Plan, uav: Uav) -> str:
     """Describe a shortfall and its remedies in one line."""
     ability_text = "climbs better" if shortfall.gust == "downdrafts" else "sinks faster"
-    remedies = f"less turbulence, an aircraft that {ability_text}"
+    remedies = f"Less turbulence, an aircraft that {ability_text}"
     is_below_height_limit = shortfall.gust == "updrafts" and not shortfall.is_threat
     if shortfall.end_name:
         direction = "higher" if shortfall.gust == "downdrafts" else "lower"
         remedies += f" or a {shortfall.end_name} that is {math.ceil(shortfall.depth)} m {direction}"
     elif is_below_height_limit or _exceeds_height_limit(plan, limits_in_gusts(plan, uav).reserve_height):
-        remedies += " or a higher limit on its height"
+        remedies += " or a higher limit on the height"
     else:
-        remedies = f"less turbulence, or an aircraft that {ability_text},"
-    effect_text = f"in {plan.scenario.wind.turbulence} turbulence {shortfall.gust} may take the aircraft"
-    return f"{effect_text} {shortfall.depth:.0f} m {shortfall.hazard} {shortfall.place}; {remedies} would help"
+        remedies = f"Less turbulence or an aircraft that {ability_text}"
+    effect_text = f"in {plan.scenario.wind.turbulence} turbulence, {shortfall.gust} may move the aircraft"
+    return f"{effect_text} {shortfall.depth:.0f} m {shortfall.hazard} {shortfall.place}. {remedies} would help"

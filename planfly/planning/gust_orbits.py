@@ -23,7 +23,7 @@ from world.scenario import Scenario
 # Maximum expected number of orbits in a flight; about every second orbit leaves the corridor (of 186 flights, with 58
 # waypoints passed too high or too low, 30 failed).
 MAX_EXPECTED_ORBITS = 0.03
-# Growth of the excursion at a corner in gusts, m; in 8 flights, gusts increased it from 28 m to 36 m at most.
+# Distance by which gusts increase the excursion at a corner, m; in 8 flights it grew from 28 m to at most 36 m.
 GUST_CORNER_MARGIN_M = 8.0
 # Values of the autopilot's altitude parameter that are tried as a remedy, m.
 _TRIED_ALTITUDE_RADII_M = range(5, 105, 5)
@@ -39,14 +39,12 @@ def limit_waypoint_orbits(
 ) -> Plan:
     """Return a plan with few enough waypoints that gusts rarely make the aircraft orbit at one of them.
 
-    The given plan is returned if it has few enough waypoints, otherwise a plan with fewer waypoints.
-
-    If no plan with fewer waypoints is found, the given plan is returned as not safe, with the reason in its
-    certificate.
+    This is the given plan if it has few enough waypoints, otherwise a plan with fewer waypoints.  If none is found, the
+    given plan is returned as not safe, with the reason in its certificate.
 
     search: function that plans a scenario in the same way as the plan; None to search for no other path.
     search_limits: limits within which the plan was made; None for the limits of the aircraft.
-    keeps_waypoints: True to keep the waypoints of the plan, and to reject it if they are too many.
+    keeps_waypoints: True to keep the waypoints of the plan; a plan with too many is then returned as not safe.
 
     >>> from planfly.workflow.uav import load_uav
     >>> from planner.search.plan_path import plan_path
@@ -101,7 +99,7 @@ def _is_safe_in_gusts(plan: Plan, uav: Uav) -> bool:
 
 
 def _plan_corridor_half_width(plan: Plan, uav: Uav) -> float:
-    """Return the maximum distance from the legs for a flight of the plan, m."""
+    """Return the maximum distance from the legs that a flight of the plan may have, m."""
     return corridor_half_width(plan.scenario.limits.corridor_m, uav.autopilot.turns.acceptance_radius)
 
 
@@ -122,12 +120,12 @@ def _corner_excursions(plan: Plan, uav: Uav) -> list[float]:
 
 
 def _corridor_problem_text(plan: Plan, uav: Uav) -> str:
-    """Return the problem text on the corner with the largest distance from the legs."""
+    """Return the problem text on the corner at which gusts take the aircraft furthest from the legs."""
     excursions = _corner_excursions(plan, uav)
     max_excursion = max(excursions)
     return (
-        f"in {plan.scenario.wind.turbulence} turbulence {uav.autopilot.title} is {max_excursion:.0f} m off"
-        f" the legs at the corner of waypoint {1 + excursions.index(max_excursion)}; the corridor is"
+        f"in {plan.scenario.wind.turbulence} turbulence, {uav.autopilot.title} is expected up to {max_excursion:.0f} m"
+        f" from the legs at the corner of waypoint {1 + excursions.index(max_excursion)}, but the corridor allows only"
         f" {_plan_corridor_half_width(plan, uav):.0f} m"
     )
 
@@ -151,7 +149,7 @@ def expected_orbits(plan: Plan, autopilot: Autopilot, limits: Limits) -> float:
 def max_waypoints_in_gusts(plan: Plan, uav: Uav) -> int:
     """Return the maximum number of waypoints, including the ends, for alternatives to a safe plan.
 
-    The probability of an orbit is that of level flight.
+    Alternatives are assumed to fly level, so that the probability of an orbit is the same at each of their waypoints.
 
     >>> from planfly.workflow.uav import load_uav
     >>> from planner.search.plan_path import plan_path
@@ -184,7 +182,7 @@ def _orbit_problem_text(plan: Plan, autopilot: Autopilot, limits: Limits) -> str
     )
     remedy = "Less turbulence" if radius is None else f"{name} of {radius} m"
     return (
-        f"in {plan.scenario.wind.turbulence} turbulence {autopilot.title} circles at a waypoint if gusts push it off"
-        f" the waypoint's altitude: at one of {count} waypoints in {min(orbits, 1.0):.0%} of flights, and at most"
-        f" {MAX_EXPECTED_ORBITS:.0%} is accepted as safe. {remedy} would help"
+        f"in {plan.scenario.wind.turbulence} turbulence, {autopilot.title} circles at a waypoint if gusts push it off"
+        f" the waypoint's altitude. This is expected in {min(orbits, 1.0):.0%} of the flights over {count} waypoints,"
+        f" but only {MAX_EXPECTED_ORBITS:.0%} is accepted as safe. {remedy} would help"
     )

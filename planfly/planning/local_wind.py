@@ -23,17 +23,17 @@ from planner.plan import Plan
 from world.arrays import Floats
 from world.scenario import Scenario
 
-# Rules that judge what the planner limits in the mean wind.
+# Rules on slopes and turns, which the planner limits in the mean wind.
 _RULES = ("turn", "slope", "climbout", "approach")
-# Number of searches with the ground speeds along the last path, before the highest one on the map is assumed.
+# Number of searches for the ground speeds along the last path; later searches assume the highest one on the map.
 _PATH_SEARCHES = 2
 # Number of values of east, north, altitude and time at which the wind of the map is looked up.
 _MAP_SAMPLES = (9, 9, 9, 5)
-# Number of courses that are compared there.
+# Number of courses that are compared at each of these samples.
 _COURSE_COUNT = 36
-# Time during which the wind of the map may matter, as a multiple of the duration of the first path.
+# Longest time after take-off for which winds are compared, as a multiple of the duration of the first path.
 _MAX_DURATION_RATIO = 1.5
-# Lowest ground speed in the mean wind that is compared, m/s.
+# Lower limit of the ground speed in the mean wind, m/s, so that the ratio stays finite.
 _MIN_GROUND_SPEED_MPS = 1.0
 
 
@@ -98,7 +98,7 @@ def _failure_text(failure: Finding) -> str:
 
 
 def limits_at_ground_speed(limits: Limits, ratio: float) -> Limits:
-    """Return limits that hold at ground speeds that are higher, by a ratio, than in the mean wind.
+    """Tighten limits so that a plan can be flown at `ratio` times the ground speed in the mean wind.
 
     Slopes over the ground are inversely proportional to the ground speed, and radii to its square.
     """
@@ -119,10 +119,9 @@ def limits_at_ground_speed(limits: Limits, ratio: float) -> Limits:
 
 
 def max_ground_speed_ratio(scenario: Scenario, airspeed: float, duration: float) -> float:
-    """Return the largest ratio of ground speed in the local wind to ground speed in the mean wind.
+    """Return the largest ratio of local-wind to mean-wind ground speed on the whole map, at least 1.
 
-    The ratio covers all courses, the whole map between its floor and its ceiling, and the time of a flight.  It is at
-    least 1.
+    All courses, all altitudes between floor and ceiling and the times of a flight are compared.
 
     airspeed: m/s.
     duration: duration of the flight, s.
@@ -136,7 +135,7 @@ def max_ground_speed_ratio(scenario: Scenario, airspeed: float, duration: float)
 
 
 def _path_ground_speed_ratio(requirements: RouteRequirements) -> float:
-    """Return the largest ratio of ground speed in the local wind to that in the mean wind on a planned path."""
+    """Return the largest ratio of local-wind to mean-wind ground speed along a planned path, at least 1."""
     path, airspeed = requirements.path, float(requirements.route.leg_airspeeds.min())
     steps = np.diff(path.points, axis=0)
     samples = np.column_stack([path.points[:-1] + 0.5 * steps, 0.5 * (path.times[:-1] + path.times[1:])])
@@ -144,7 +143,7 @@ def _path_ground_speed_ratio(requirements: RouteRequirements) -> float:
 
 
 def _ground_speed_ratio(scenario: Scenario, airspeed: float, samples: Floats, courses: Floats) -> float:
-    """Return the largest ratio, at least 1, of ground speed in the local wind to that in the mean wind.
+    """Return the largest ratio of local-wind to mean-wind ground speed at samples, at least 1.
 
     samples: (n, 4) east, north and altitude, m, and time after take-off, s.
     courses: (n,) rad, or (c, 1) to combine each of c courses with each sample.
@@ -158,7 +157,10 @@ def _ground_speed_ratio(scenario: Scenario, airspeed: float, samples: Floats, co
 
 
 def _ground_speeds(airspeed: float, wind_east: Floats, wind_north: Floats, courses: Floats) -> Floats:
-    """Return the ground speeds on courses (rad) in winds, m/s."""
+    """Return the ground speeds on courses (rad), m/s.
+
+    airspeed, wind_east, wind_north: airspeed, and wind towards east and north, m/s.
+    """
     sin, cos = np.sin(courses), np.cos(courses)
     crosswinds = wind_east * cos - wind_north * sin
     return np.sqrt(np.maximum(0.0, airspeed**2 - crosswinds**2)) + wind_east * sin + wind_north * cos

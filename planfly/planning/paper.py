@@ -71,10 +71,7 @@ class SeededPlan:
 
     @property
     def safe(self) -> bool:
-        """True if the plan is safe by the paper's definition.
-
-        It has no violation and no kill exposure on its six points per leg.
-        """
+        """True if the plan has no violation and no kill exposure at the paper's six points per leg."""
         return not any(self.violations) and self.objectives.kill_exposure == 0.0
 
 
@@ -174,7 +171,8 @@ def plan_section(
     The order does not depend on the number of processes.
 
     algorithm: algorithm in place of the paper's; the strip and the baselines are always planned, too.
-    jobs: number of processes; None for one for each core that this process may use.
+    jobs: number of processes; None for one per available core.
+    advance: function called with the progress after each plan.
     Raises ScenarioError for an unknown algorithm.
     """
     names = [find_algorithm(algorithm, "algorithm").name]
@@ -268,7 +266,7 @@ def _table_row(group: list[SeededPlan]) -> TableRow:
 
 
 def _seed_values(group: list[SeededPlan], value: Callable[[SeededPlan], float]) -> Floats:
-    """Return a value of each plan, (n,).  value: function that computes the value of a plan."""
+    """Return the value of each plan of a group, (n,).  value: function that computes the value of one plan."""
     return np.array([value(seeded_plan) for seeded_plan in group])
 
 
@@ -281,9 +279,9 @@ TABLE_FILES = ("table.csv", "runs.csv", "runs.json", "times.csv", "convergence.p
 
 
 def paper_file_names(problems: Sequence[int]) -> list[str]:
-    """Return the names of all files that are written for the given problems.
+    """Return the names of all files that are written for some problems.
 
-    problems: numbers of threats.
+    problems: numbers of threats, which name the problems.
     """
     pictures = [f"{kind}-{threats:02d}.png" for threats in problems for kind in ("paths", "encodings")]
     return [*TABLE_FILES, *pictures]
@@ -317,9 +315,9 @@ def _number_text(value: float | None, digits: int) -> str:
 
 
 def write_tables(folder: Path, rows: Sequence[TableRow], plans: Sequence[SeededPlan]) -> None:
-    """Write the tables of a run.
+    """Write table.csv, runs.csv, runs.json and times.csv into a folder.
 
-    They are table.csv, runs.csv and runs.json, which depend only on the seeds, and times.csv.
+    Runs with the same seeds differ only in times.csv.
     """
     columns = [field.name for field in fields(TableRow) if field.name != "seconds_median"]
     write_atomically(

@@ -23,12 +23,15 @@ def make_pareto_plans(
     stop: StopCondition | None = None,
     continues: bool = False,
 ) -> Front:
-    """Plan a Pareto front of at most `count` plans, each safe by all checks of `make_plan`.
+    """Plan a Pareto front of at most `count` plans, each of which passes all safety checks of `make_plan`.
 
     The default plan is made by `make_plan`; if it is not safe, the front is empty.  Alternatives that are unsafe with
-    their departure and approach are omitted.  If gusts make the autopilot orbit, alternatives have no more waypoints
-    than gusts allow.
-    stop, continues: see `make_plan`.
+    their departure and approach are omitted.  If gusts can make the autopilot orbit waypoints, the alternatives have
+    few enough waypoints to make this rare.
+
+    advance: function called with the progress.
+    stop: stop condition of the searches.
+    continues: True if the mission continues beyond the destination of the plans.
     """
     default_plan = make_plan(scenario, uav, seed, advance=advance, stop=stop, continues=continues)
 

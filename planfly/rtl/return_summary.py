@@ -16,9 +16,7 @@ from world.errors import PlanflyError
 def return_starts(
     setup: FlightSetup, track: Track | None, interval: float, requirements: RouteRequirements | None = None
 ) -> ReturnStarts:
-    """Return the states from which returns start, on the track or on the planned path.
-
-    The planned path is used if nothing was flown.
+    """Return the states from which returns start, on the flown track, or on the planned path without a flight.
 
     interval: time between two returns, s.
     requirements: the setup's route requirements if already known.
@@ -34,7 +32,7 @@ _SUMMARY_RETURN_COUNT = 50
 
 @dataclass(frozen=True, slots=True)
 class ReturnSummary:
-    """Returns from a few points of a flight, without simulation in JSBSim, to accompany its verdict.
+    """Returns from a few points of a flight, simulated only with a point mass, to accompany its verdict.
 
     line: summary of all returns in a line; "" if no return can be judged.
     world, starts, returns: data of the returns; None if no return is judged.

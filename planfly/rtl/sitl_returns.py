@@ -13,7 +13,7 @@ import numpy as np
 
 from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane_sitl.autopilot import ArduPlaneSitl
-from flight.autopilots.catalog import program_class_for
+from flight.autopilots.catalog import find_program_class
 from flight.autopilots.simulated_returns import (
     RETURN_ARRIVED,
     RETURN_GROUND_IMPACT,
@@ -154,7 +154,7 @@ class ProgramReturns:
 
 def check_is_arduplane(program: Path) -> None:
     """Raise ArgumentError for a program other than ArduPlane, whose returns planfly does not simulate."""
-    autopilot_class = program_class_for(program)
+    autopilot_class = find_program_class(program)
     if not issubclass(autopilot_class, ArduPlaneSitl):
         allowed = f"expected ArduPlane's program; returns of {autopilot_class.title} are not supported"
         raise ArgumentError.of_argument("autopilot", str(program), allowed)
@@ -170,9 +170,7 @@ def check_returns_as_arduplane(world: ReturnWorld, program: Path) -> None:
 def choose_worst_returns(
     world: ReturnWorld, starts: ReturnStarts, returns: Returns, points: int
 ) -> list[tuple[SimulatedReturn, int]]:
-    """Choose at most `points` returns for the program to fly.
-
-    Each return comes with the index of its start, the worst first.
+    """Choose at most `points` returns for the program to fly, the worst first, each with the index of its start.
 
     Starts that the program cannot reach safely are skipped.  Returns from neighbouring starts are similar, so starts
     closer to a chosen start than half the path length divided by `points` are skipped, too.
@@ -318,9 +316,7 @@ def _end_position(target: ReturnTarget) -> tuple[float, float, float]:
 
 
 def _cut_at_landing(target: ReturnTarget, position: Floats) -> Floats:
-    """Cut a path to a landing sequence after its last waypoint before the landing.
-
-    Returns other paths unchanged.
+    """Return a path to a landing sequence up to the last waypoint before the landing; other paths unchanged.
 
     position: path points, (t, 3) m.
     """

@@ -116,12 +116,12 @@ def _feed_process(
 # ----------------------------------------------------------------------
 # Warm-up: when the first kernel has to be compiled, all kernels that the work needs are compiled in parallel.
 
-# Title of the stage; a command may show it more than once, because each group is compiled at its first use.
+# Title of the stage; a command may show it more than once, because each group of kernels is compiled at its first use.
 STAGE_TITLE = "compiling numeric kernels"
-# End of the message on compiled kernels.
+# End of the title if the compiled kernels are stored.
 _CACHE_NOTE = ", which later runs load"
-# Hint at the variable that names another cache folder.
-_CACHE_DIR_HINT = f"{CACHE_DIR_VARIABLE}=FOLDER names one that can"
+# Hint at the environment variable that names another cache folder.
+_CACHE_DIR_HINT = f"set {CACHE_DIR_VARIABLE} to a folder that can be written"
 # Units that this process has compiled or tried to compile.
 _compiled_units: set[str] = set()
 
@@ -178,11 +178,11 @@ def _report_and_compile(units: list[str]) -> None:
 # ----------------------------------------------------------------------
 # Functions of the public API, which compile the kernels that they need.
 
-_Taken = ParamSpec("_Taken")
-_Given = TypeVar("_Given")
+_Parameters = ParamSpec("_Parameters")
+_Result = TypeVar("_Result")
 
 
-def api_function(*kernel_units: str) -> Callable[[Callable[_Taken, _Given]], Callable[_Taken, _Given]]:
+def api_function(*kernel_units: str) -> Callable[[Callable[_Parameters, _Result]], Callable[_Parameters, _Result]]:
     """Return a decorator for a function of the API: its arguments are checked, and it runs inside `warm_up`.
 
     The options of an ``Unpack[...]`` parameter are listed in its signature, with their defaults.
@@ -202,7 +202,7 @@ def api_function(*kernel_units: str) -> Callable[[Callable[_Taken, _Given]], Cal
     TypeError: fly() got an unexpected keyword argument 'winds': did you mean 'wind'?
     """
 
-    def decorate(function: Callable[_Taken, _Given]) -> Callable[_Taken, _Given]:
+    def decorate(function: Callable[_Parameters, _Result]) -> Callable[_Parameters, _Result]:
         """Extend a function's signature by its options, and wrap the function."""
         signature, defaults = inspect.signature(function), dict[str, object]()
         *parameters, last = signature.parameters.values()
@@ -216,7 +216,7 @@ def api_function(*kernel_units: str) -> Callable[[Callable[_Taken, _Given]], Cal
             signature = signature.replace(parameters=parameters)
 
         @functools.wraps(function)
-        def checked_function(*args: _Taken.args, **keywords: _Taken.kwargs) -> _Given:
+        def checked_function(*args: _Parameters.args, **keywords: _Parameters.kwargs) -> _Result:
             """Check the arguments, add the defaults of missing options, and call the function inside `warm_up`."""
             for name in keywords if defaults else ():
                 if name not in signature.parameters:

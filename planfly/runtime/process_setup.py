@@ -16,7 +16,7 @@ _STACK_VALUES = 2**17
 # Number of new objects after which garbage is collected.  The imports of a command leave some 300,000, and nothing to
 # collect; a flight allocates few more.
 _MIN_OBJECTS_TO_COLLECT = 1_000_000
-# Exit code of a process that would call the function again which started it.
+# Exit code of a worker process that would call the function that started it.
 _REPEATED_CALL_EXIT_CODE = 78
 # Environment variable of a process set up by `prepare_process`, inherited by its child processes.
 _OWN_PROCESS_VARIABLE = "PLANFLY_OWN_PROCESS"
@@ -67,7 +67,10 @@ def check_script_guard(workers: "Iterable[BaseProcess]") -> None:
     from world.errors import PlanflyError
 
     script = getattr(sys.modules.get("__main__"), "__file__", None) or "the script"
-    reason = 'its calls need the line `if __name__ == "__main__":` above them, because worker processes import it'
+    reason = (
+        'the line `if __name__ == "__main__":` is missing above the calls of planfly, because worker processes import'
+        " the script"
+    )
     raise PlanflyError(f"{script}: {reason}", file=script) from None
 
 

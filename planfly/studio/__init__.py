@@ -1,1 +1,1 @@
-"""The studio: a page of this machine on which a mission is dragged, judged meanwhile, and flown when it is let go."""
+"""The studio: a local page on which a mission is judged while it is dragged, and flown after each drag."""

@@ -1,7 +1,7 @@
 """Save the mission, settings and plan of a session automatically, in case the server dies.
 
-An autosave is restored only into its own document, which is identified by its first mission, or by the file that the
-studio has written over it.  Options of the command line take precedence over the saved settings.
+An autosave is restored only into its own document, which is identified by its mission as opened, or by the mission file
+that the studio has written.  Options of the command line take precedence over the saved settings.
 """
 
 import hashlib
@@ -61,8 +61,8 @@ class Restored(NamedTuple):
     steps: edits in effect, each with its description; the last one results in the edited mission.
     undone_steps: undone edits after the edited mission, each with its description, for redo.
     replaced: saved settings that are not restored, each with the reason or the value that replaces it.
-    by_options: True if options of the command line replaced them, which are then saved in their place.
-    unused_edits: number of unsaved edits of another content of the mission file, which are not restored.
+    by_options: True if options of the command line replaced saved settings, so that the autosave is written again.
+    unused_edits: number of unsaved edits that are not restored, because the mission file has changed.
     """
 
     mission: Mission
@@ -107,7 +107,7 @@ def autosave_text(
 
 
 def settings_data(context: EditContext) -> Json:
-    """Return the settings of an editing context as data, with the name of the scenario that they belong to."""
+    """Return the settings of an editing context as data, with the name of the scenario to which they belong."""
     spec = context.scenario.to_json()
     # An area made around a mission is not saved; it is made again when the mission is restored.
     names = [table for table in _SAVED_TABLES if table in spec and (table != "area" or not context.scenario.external)]
@@ -120,7 +120,7 @@ def settings_data(context: EditContext) -> Json:
 
 
 def _steps_to_save(document: Document, history: History) -> list[tuple[Mission, str]]:
-    """Return the newest edits in effect, as many as are saved: each new mission with the text of its edit.
+    """Return the newest edits in effect that an autosave contains: each new mission with the text of its edit.
 
     Edits before the last saving of the document's file are left out, because the file contains their result.
     """
@@ -146,9 +146,9 @@ def _scenario_name(context: EditContext) -> str:
 def read_autosave(
     file: Path, context: EditContext, document: Document, options: MissionOptions, settings: Json | None = None
 ) -> Restored | None:
-    """Return the saved mission and its editing context; None without a file, or if it is of another version.
+    """Return the state of a session from its autosave; None if there is no file, or if another version wrote it.
 
-    If the opened mission is not the mission that the edits were made in, only the settings are restored.
+    If the opened mission is not the mission in which the edits were made, only the settings are restored.
 
     options: options of the command line, which replace saved settings.
     settings: settings of the session, which replace all saved settings of the same scenario; None for a new session.
@@ -169,7 +169,7 @@ def read_autosave(
         unused_edits = max(1, len(data.get("steps", []))) if is_unsaved else 0
         data |= {"mission": mission_data(first), "steps": [], "undone": [], "plan": None}
     if settings is not None and settings["scenario"] == data.get("scenario"):
-        # The certificate of a plan applies only to the settings that it was made for.
+        # The certificate of a plan applies only to the settings for which it was made.
         has_same_settings = all(data.get(key) == value for key, value in settings.items())
         data |= settings | ({} if has_same_settings else {"plan": None})
     is_opened = data["mission"] == mission_data(first) or (is_same_file and data.get("in_file") is True)
@@ -215,7 +215,7 @@ def restore_settings(
     The context is `context` itself if the settings do not differ.
 
     options: options of the command line, which replace saved settings.
-    file_autopilot: True if the autopilot that the opened file was written for replaces the saved one.
+    file_autopilot: True if the autopilot of the opened file replaces the saved autopilot.
     """
     scenario: Scenario = context.scenario
     scenario_name = data.get("scenario", _scenario_name(context))
@@ -227,7 +227,7 @@ def restore_settings(
     flight = spec.get("flight", {})
     is_other_autopilot = flight.get("autopilot") != new_spec.get("flight", {}).get("autopilot")
     if file_autopilot and "autopilot_from" in flight and is_other_autopilot:
-        replaced += _take_entries(new_spec, spec, "flight", _AUTOPILOT_KEYS)
+        replaced += _replace_entries(new_spec, spec, "flight", _AUTOPILOT_KEYS)
     saved_parameters = data.get("parameters") or asdict(ChangedParameters())
     parameters = ChangedParameters(
         dict(saved_parameters["values"]),
@@ -251,9 +251,9 @@ def restore_settings(
 
 
 def _apply_options(saved_spec: Json, opened_spec: Json, options: MissionOptions) -> list[str]:
-    """Replace the entries of a saved scenario that options set, using the opened scenario's entries.
+    """Replace the entries of a saved scenario that options set by the entries of the opened scenario.
 
-    Returns one text for each entry that was different, with both values.
+    Returns a text with both values for each entry that was different.
     """
     replaced: list[str] = []
     for option, (table, keys) in _OPTION_ENTRIES.items():
@@ -262,14 +262,14 @@ def _apply_options(saved_spec: Json, opened_spec: Json, options: MissionOptions)
         saved, opened = saved_spec.setdefault(table, {}), opened_spec.get(table, {})
         if option == "aircraft" and not _is_same_value(saved.get("aircraft"), opened.get("aircraft")):
             keys = (*keys, *_AIRCRAFT_KEYS)
-        replaced += _take_entries(saved_spec, opened_spec, table, keys)
+        replaced += _replace_entries(saved_spec, opened_spec, table, keys)
     return replaced
 
 
-def _take_entries(saved_spec: Json, opened_spec: Json, table: str, keys: tuple[str, ...]) -> list[str]:
-    """Replace entries of a table of a saved scenario by those of the opened scenario.
+def _replace_entries(saved_spec: Json, opened_spec: Json, table: str, keys: tuple[str, ...]) -> list[str]:
+    """Replace entries in a table of a saved scenario by the entries of the opened scenario.
 
-    Returns one text for each entry that was different, with both values.
+    Returns a text with both values for each entry that was different.
     """
     replaced, saved, opened = [], saved_spec.setdefault(table, {}), opened_spec.get(table, {})
     for key in keys:
@@ -305,7 +305,7 @@ def _restore_plan(context: EditContext, mission: Mission, data: Json) -> tuple[M
     plan = parse_plan(data["plan"], "kept", ground=context.scenario.terrain)
     plan = replace(plan, scenario=context.scenario)
     mission_of_saved_plan = planned_mission(plan, context.planning_uav(mission))
-    # The autosave keeps all digits, so items that differ mean that the mission was changed after planning.
+    # The autosave contains all digits, so different items mean that the mission was changed after planning.
     return (
         (mission_of_saved_plan, context.with_plan(plan, mission_of_saved_plan))
         if mission_of_saved_plan.items == mission.items
@@ -343,8 +343,8 @@ def mission_from_data(data: Json, first: Mission) -> Mission:
     Raises ValueError, LookupError or TypeError for other data.
     """
 
-    def number(value: Any) -> float:
-        """Return a stored number; None stands for NaN."""
+    def to_number(value: Any) -> float:
+        """Return a stored number; None becomes NaN."""
         return float("nan") if value is None else float(value)
 
     items = [
@@ -359,10 +359,12 @@ def mission_from_data(data: Json, first: Mission) -> Mission:
             bool(autocontinue),
         )
         for seq, command, frame, *numbers, autocontinue in data["items"]
-        for values in [[number(value) for value in numbers]]
+        for values in [[to_number(value) for value in numbers]]
     ]
     for item in items:
         if (problem := item_problem(item)) is not None:
             raise ValueError(f"item {item.seq}: {problem}")
     home = data["home"]
-    return replace(first, items=tuple(items), home=None if home is None else Home(*(number(value) for value in home)))
+    return replace(
+        first, items=tuple(items), home=None if home is None else Home(*(to_number(value) for value in home))
+    )

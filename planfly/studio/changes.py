@@ -34,7 +34,7 @@ class PlaceResult(NamedTuple):
 
     ok: True if the place passes the rule, False if it fails, None if it was not judged.
     value, margin: value and margin in ``unit``, or None if there are none.
-    cause: what a failure was seen by, if its value is within the limit; "" otherwise.
+    cause: reason of a failure whose value is within the limit and so does not show it; "" otherwise.
     place: description of the place, with the item numbers of its own mission.
     scale: smallest noticeable difference of the margin.
     level: "flown" or "planned", according to the value, or "not reached" if the flight ended before the place; only
@@ -108,7 +108,7 @@ def flight_results(mission: Mission, route: Route, findings: Iterable[Finding], 
 
 
 def _is_decided_by_plan(finding: Finding) -> bool:
-    """Return True if the margin of a flown place is that of its planned value, which then decides."""
+    """Return True if the margin of a flown place belongs to its planned value, not to its flown value."""
     if finding.margin is None or finding.limit is None or finding.planned is None or finding.flown is None:
         return False
     planned_error, flown_error = (
@@ -119,9 +119,9 @@ def _is_decided_by_plan(finding: Finding) -> bool:
 
 
 def _other_cause(finding: Finding, value: float | None) -> str:
-    """Return the cause of a failed finding if its value does not show it; otherwise "".
+    """Return the cause of a failed finding if its value is within the limit; otherwise "".
 
-    value: the value of the finding that is compared, in its unit.
+    value: value of the finding that is compared, in the finding's unit.
     """
     if finding.ok is not False or finding.limit is None or value is None:
         return ""
@@ -257,7 +257,7 @@ def _renumber(previous: FlightResults, current: FlightResults) -> _Results:
 
 
 def _state_changes(old_results: _Results, new_results: _Results) -> list[str]:
-    """Return a line for each new failure, and then for each earlier failure that no longer occurs."""
+    """Return a line for each new failure, then a line for each earlier failure that no longer occurs."""
     new_failures, ended_failures = [], []
     for (rule, key), result in new_results.items():
         old_result = old_results.get((rule, key))
@@ -324,7 +324,7 @@ def _quantity_name(rule: str) -> str:
 
 
 def _value_changes(old_results: _Results, new_results: _Results) -> list[str]:
-    """Return lines on continued failures with another value, then on rules with another smallest margin.
+    """Return lines on continued failures whose value changed, then on rules whose smallest margin changed.
 
     At most `_MAX_VALUE_CHANGES` lines of each kind are returned, the largest changes of margin first.
     """

@@ -45,7 +45,7 @@ class _UnknownConnection:
         self.transport.abort()
 
 
-class ShortLived(_UnknownConnection, H11Protocol):
+class ShortLivedHttpProtocol(_UnknownConnection, H11Protocol):
     """HTTP protocol that closes its connection after `HTTP_LIFETIME_S`.
 
     Otherwise idle connections would accumulate.
@@ -63,7 +63,7 @@ class ShortLived(_UnknownConnection, H11Protocol):
             transport.abort()
 
 
-class FirstMessageBounded(_UnknownConnection, WebSocketsSansIOProtocol):
+class BoundedWebSocketProtocol(_UnknownConnection, WebSocketsSansIOProtocol):
     """Websocket protocol that limits the size of messages until the token is given.
 
     The limit is `MAX_FIRST_MESSAGE_CHARACTERS`.
@@ -91,7 +91,7 @@ class FirstMessageBounded(_UnknownConnection, WebSocketsSansIOProtocol):
 
     def _limit_messages(self, max_size: int) -> None:
         """Set the maximum size of a received message, bytes."""
-        # The first name is that of websockets 16 and later, the second that of earlier versions.
+        # websockets 16 and later use the first name, earlier versions the second.
         for name in ("max_message_size", "max_size"):
             if hasattr(self.conn, name):
                 setattr(self.conn, name, max_size)

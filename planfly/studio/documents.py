@@ -144,7 +144,7 @@ def _check_log_names_no_files(name: str, file: Path) -> None:
     container = Container()
     with file.open("rb") as stream, contextlib.suppress(PlanflyError, *PARSE_ERRORS):
         stream.seek(len(MAGIC))
-        # Errors in the log are reported when the log is read; here the attachments before an error are checked.
+        # Errors in the log are reported when the log is read; only the attachments before an error are checked.
         for _ in read_chunks(stream, container):
             pass
     if SCENARIO_FILE in container.attachments:
@@ -189,7 +189,7 @@ def _open_file(path: Path, options: MissionOptions) -> FlightSetup:
 def _read_imported_log(path: Path, options: MissionOptions) -> ImportedFlight:
     """Read a log of another program.
 
-    Raises PlanflyError.  The message for a log without a mission is worded for users of the studio.
+    Raises PlanflyError for a log that cannot be read, and MissionError for a log without a mission.
     """
     world: LogOptions = {
         "scenario": options.get("scenario"),
@@ -238,7 +238,7 @@ def planned_mission(plan: Plan, uav: Uav) -> Mission:
 
 @dataclass(frozen=True, slots=True)
 class SavedFile:
-    """Name and bytes of a saved file, and one line for each content that the format cannot store."""
+    """Name and bytes of a saved file, and a line for each part of the mission that the format cannot store."""
 
     name: str
     data: bytes
@@ -264,7 +264,9 @@ def save_document(document: Document, context: EditContext, judged_mission: Judg
         return _saved_plan(name, context, judged_mission)
     if kind == "kml":
         text = kml_text(context.scenario.name, [plan_line(judged_mission.setup)], map_zones(judged_mission.setup))
-        return SavedFile(name, _to_bytes(text), ("the commands, speeds and frames of the items: it is only a map",))
+        return SavedFile(
+            name, _to_bytes(text), ("the commands, speeds and frames of the items, because the file is only a map",)
+        )
     start_airspeed = float(judged_mission.setup.route.leg_airspeeds[0])
     is_stated_in_file = document.kind == "plan" and start_airspeed == document.setup.route.leg_airspeeds[0]
     if kind == "plan" and not is_stated_in_file:
@@ -299,7 +301,7 @@ def _format_losses(context: EditContext, mission: Mission, text: str, name: str,
     threats, zones = len(context.scenario.threats), len(context.scenario.zones)
     world_contents = [count_text(count, noun) for count, noun in ((threats, "threat"), (zones, "zone")) if count]
     if world_contents:
-        losses.append(f"the scenario's {' and '.join(world_contents)}: planfly export writes a fence of them")
+        losses.append(f"the scenario's {' and '.join(world_contents)}: planfly export writes them as a fence")
     return tuple(losses)
 
 
@@ -316,14 +318,14 @@ def _lost_settings(opened_setup: FlightSetup, context: EditContext) -> tuple[str
         )
     )
     names = changed_settings(opened, current)
-    losses = (f"the settings changed here: {', '.join(names)}",) if names else ()
+    losses = (f"the settings changed in the studio: {', '.join(names)}",) if names else ()
     return (*losses, *_lost_parameters(context))
 
 
 def _lost_parameters(context: EditContext) -> tuple[str, ...]:
     """Return a line on the autopilot parameters set in the studio, which only a parameter file can store."""
     count = len(context.parameters.values)
-    return (f"{count_text(count, 'parameter')} set here: only in a .parm",) if count else ()
+    return (f"{count_text(count, 'parameter')} set in the studio: only a .parm contains them",) if count else ()
 
 
 def _saved_parameters(name: str, context: EditContext) -> SavedFile:
@@ -345,7 +347,7 @@ def _saved_plan(name: str, context: EditContext, judged_mission: JudgedMission) 
     has_changed_items = (
         not context.planned or planned_mission(new_plan, context.uav).items != judged_mission.mission.items
     )
-    losses = ["the items: a plan stores only positions, and its mission is made from them"] if has_changed_items else []
+    losses = ["the items, because a plan stores only positions"] if has_changed_items else []
     if new_plan.failures:
         losses.append(f"the plan is not feasible: {new_plan.failures[0]}")
     elif new_plan.unmet_margins:
@@ -391,7 +393,8 @@ def make_certified_plan(context: EditContext, judged_mission: JudgedMission) -> 
         or any(item.frame not in AMSL and item.has_position for item in mission.items)
     ):
         raise MissionError(
-            f"{name}: a plan contains only plain waypoints with altitudes above mean sea level, each once", file=name
+            f"{name}: a plan can contain only plain waypoints with altitudes above mean sea level, each flown once",
+            file=name,
         )
     if (plan := _plan_with_ground_phases(context, mission)) is not None:
         return plan

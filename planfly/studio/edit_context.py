@@ -1,4 +1,4 @@
-"""Hold the settings in which an edited mission is judged, and compute its route while it is dragged."""
+"""Store the settings with which an edited mission is judged, and compute its route while it is dragged."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -54,7 +54,7 @@ class EditContext(MissionContext):
     def with_settings(self, scenario: Scenario, parameters: ChangedParameters) -> "EditContext":
         """Return the context of the opened mission in another scenario and with other autopilot parameters.
 
-        The new context has no plan, because the certificate of a plan applies only to the scenario it was made for.
+        The new context has no plan, because the certificate of a plan applies only to the scenario of the plan.
         """
         uav = parameters.load_uav(scenario)
         setup = make_setup(scenario, uav, self.opened_setup.mission, self.seed)
@@ -109,29 +109,29 @@ class EditContext(MissionContext):
     # ------------------------------------------------------------------
     # Verdicts while a mission is dragged.
 
-    def airframe_for_mission(self, mission: Mission) -> Uav:
+    def uav_for_mission(self, mission: Mission) -> Uav:
         """Return the UAV with the autopilot's landing parameters for a mission, as in `make_setup`."""
         return replace(self.uav, autopilot=with_landing_parameters(self.uav.autopilot, mission))
 
     def route(self, mission: Mission) -> Route:
         """Return the route that the autopilot flies in a mission, without notes for the user."""
-        frame, fly_over = self.airframe_for_mission(mission), self.scenario.flight.fly_over
-        rules = frame.autopilot.route_rules
-        route = route_through_stops(self.place_mission(mission), frame.airspeed, fly_over, frame.limits, rules)
-        return with_end_courses(route, self.scenario, frame.limits)
+        uav, fly_over = self.uav_for_mission(mission), self.scenario.flight.fly_over
+        rules = uav.autopilot.route_rules
+        route = route_through_stops(self.place_mission(mission), uav.airspeed, fly_over, uav.limits, rules)
+        return with_end_courses(route, self.scenario, uav.limits)
 
     def part_setup(self, mission: Mission, route: Route) -> FlightSetup:
         """Return a setup for judging a route, which may be only a part of the mission's route."""
-        frame = self.airframe_for_mission(mission)
+        uav = self.uav_for_mission(mission)
         return FlightSetup(
             scenario=self.scenario,
             mission=mission,
             route=route,
-            limits=frame.limits,
-            aircraft=frame.aircraft.name,
-            battery=frame.battery,
+            limits=uav.limits,
+            aircraft=uav.aircraft.name,
+            battery=uav.battery,
             seed=self.seed,
-            autopilot=frame.autopilot,
+            autopilot=uav.autopilot,
             nav=self.scenario.flight.steering.nav,
             guidance_hz=self.scenario.flight.guidance_hz,
         )

@@ -11,7 +11,7 @@ from world.errors import MissionError
 _MAX_FILES = 200
 _READABLE_SUFFIXES = (*DROPPED_SUFFIXES, *PARAMETER_FILES)
 _LISTED_SUFFIXES = tuple(suffix for suffix in _READABLE_SUFFIXES if suffix not in MAP_SUFFIXES)
-# Bytes that a plan or a mission contains, by suffixes that files without a mission have, too.
+# Bytes that identify a plan or a mission, for suffixes that other files also have.
 _MISSION_MARKS = {".json": b"planfly.plan/", ".txt": b"QGC WPL"}
 # Size of the part of a file that is searched for these bytes.
 _SEARCHED_BYTES = 2**20

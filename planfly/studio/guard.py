@@ -38,8 +38,8 @@ def request_refusal(scope: Scope, port: int) -> tuple[int, str]:
 
     Returns (0, "") if the request is accepted.
 
-    >>> asked = {"type": "http", "method": "GET", "path": "/", "headers": [(b"host", b"evil.test:80")]}
-    >>> request_refusal(asked, 80)
+    >>> scope = {"type": "http", "method": "GET", "path": "/", "headers": [(b"host", b"evil.test:80")]}
+    >>> request_refusal(scope, 80)
     (421, 'this host is not served here')
     """
     headers = [(name.lower(), value.decode("latin-1").strip().lower()) for name, value in scope["headers"]]

@@ -37,7 +37,7 @@ class Window:
 
     first, last: first and last waypoint of the judged legs and corners.
     start: waypoint of the whole route at which the judged part starts.
-    requirements, findings: results for the part; their leg and corner numbers are relative to ``start``.
+    requirements, findings: results for the part; their numbers of legs and corners count from ``start``.
     """
 
     first: int
@@ -68,7 +68,7 @@ def judge_windows(
             previous_setup.mission,
             mission,
             context.scenario,
-            context.airframe_for_mission(mission),
+            context.uav_for_mission(mission),
         )
     if route is None:
         route = context.route(mission)
@@ -95,7 +95,7 @@ def _may_contain_survey(context: EditContext, mission: Mission, route: Route) ->
 
 
 def _add_extreme_legs(context: EditContext, route: Route, part: Route, *, before_part: bool) -> tuple[Route, int]:
-    """Extend a part of a route by the fastest legs and the altitude with the most wind in the route.
+    """Extend a part of a route by legs with the highest airspeeds and the strongest wind of the whole route.
 
     Returns the extended part, and the number of waypoints added before the part.
 
@@ -157,9 +157,9 @@ def _judge_window(setup: FlightSetup, first: int, last: int, start: int) -> Wind
 
 
 def _is_in_window(finding: Finding, first: int, last: int) -> bool:
-    """Return True if a finding is on a leg or corner between two waypoints.
+    """Return True if a finding is on a leg or corner between two waypoints, or on any violated threat or zone.
 
-    The result is also True for any violated threat or zone.
+    first, last: numbers of the two waypoints in the judged part of the route.
     """
     place = finding.place
     if finding.ok is False and place.kind in ("missile", "exclusion", "inclusion"):

@@ -74,12 +74,12 @@ class Jobs:
     _flight_message: Json | None = None
     _last_results: FlightResults | None = None
     _other_messages: list[Json] = field(default_factory=list)
-    _uses_first_path: bool = False
+    _is_first_path_pending: bool = False
 
     def start_first_task(self, session: Session) -> None:
         """Start a flight of the opened mission, or a search for a path if a scenario was opened."""
         if session.document.to_plan and not session.is_edited:
-            self._uses_first_path = True
+            self._is_first_path_pending = True
             self._submit_task(
                 LONG_WORKER,
                 "plan",
@@ -117,7 +117,7 @@ class Jobs:
 
         Until then the mission of the scenario is a placeholder.
         """
-        return self._uses_first_path and not session.is_edited
+        return self._is_first_path_pending and not session.is_edited
 
     def discard_results(self) -> None:
         """Cancel all tasks and discard all results, because another mission was opened."""
@@ -147,7 +147,7 @@ class Jobs:
     def plan(self, message: messages.Plan, session: Session) -> None:
         """Plan one or several paths. Raises PlanflyError for items between which no path can be planned."""
         request = self._plan_request(message, session)
-        self._uses_first_path = False
+        self._is_first_path_pending = False
         self._submit_task(LONG_WORKER, "plan", "planfly.studio.worker_tasks.plan", request, session.rev)
         if message.first is not None and message.last is not None:
             self._active[LONG_WORKER].item_range = (message.first, message.last)
@@ -195,7 +195,7 @@ class Jobs:
         ends = [session.item_position(index) for index in (message.first, message.last)]
         if message.first >= message.last:
             raise MissionError(
-                f"{session.document.name}: of the two items to plan between, the second must come later in the mission",
+                f"{session.document.name}: the second item to plan between must come after the first in the mission",
                 field="last",
             )
         return replace(request, ends=(ends[0], ends[1]))
@@ -252,7 +252,7 @@ class Jobs:
             reason = "the mission was changed while its path was planned, so the path is not used: plan again"
             return [self._stopped_message("plan"), {"kind": "fault", "text": reason}]
         result = self._result_message(task, answer.value, session)
-        # The task that follows begins before it reports progress.
+        # Send the message of a follow-up task, which may not report progress for a while.
         return [result, *(following.message for following in [self._active.get(worker)] if following is not None)]
 
     def _stopped_message(self, name: str) -> Json:
@@ -261,7 +261,7 @@ class Jobs:
         name: kind of the task, as in `_ActiveTask`.
         """
         if name == "plan":
-            self._uses_first_path = False
+            self._is_first_path_pending = False
         return {"kind": "stopped", "job": name}
 
     def _result_message(self, task: _ActiveTask, value: Any, session: Session) -> Json:
@@ -297,18 +297,18 @@ class Jobs:
                 self.fly(session)
             return {"kind": "tried", "rev": task.rev, "job": task.name, "findings": findings}
         if task.name == "plan":
-            # Until then the paths of an earlier search can be chosen, also if this one is stopped.
+            # The paths of an earlier search can be chosen until a new search has finished.
             session.plans = ([front_plan.plan for front_plan in value], task.item_range)
-            return {"kind": "ways", "rev": task.rev, "ways": paths_json(value), "at_once": self._uses_first_path}
+            return {"kind": "ways", "rev": task.rev, "ways": paths_json(value), "at_once": self._is_first_path_pending}
         message = {"kind": task.name, "rev": task.rev, **value}
         self._other_messages = [*(message for message in self._other_messages if message["kind"] != task.name), message]
         return message
 
     def has_new_initial_plan(self, session: Session) -> bool:
         """Return True only at the first call after the path of the opened scenario has arrived."""
-        has_path = self._uses_first_path and bool(session.plans[0])
+        has_path = self._is_first_path_pending and bool(session.plans[0])
         if has_path:
-            self._uses_first_path = False
+            self._is_first_path_pending = False
         return has_path
 
 

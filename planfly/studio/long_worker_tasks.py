@@ -37,7 +37,7 @@ _WINDOW_FLIGHTS = 10
 _WINDOW_STEP = timedelta(hours=1)
 # Time after the first take-off at which the last one is tried.
 _WINDOW_SPAN = timedelta(hours=12)
-# One process besides this one: the other core flies for the page.
+# One worker process, because another core flies for the page.
 _WORKERS = Workers(count=1)
 
 
@@ -97,11 +97,14 @@ def run_campaign_task(payload: tuple[EditContext, Mission], advance: Advance) ->
     lower, upper = Estimator(Goal(None, False, FLIGHT_COUNT)).estimate(tally).interval
     headline = f"{flyable} of {FLIGHT_COUNT} flights are flyable"
     headline += f", {undecided} not judged in full" if undecided else ""
-    common = [f"{rule_word(rule)} fails in {count}" for rule, count in failure_counts.most_common(5)]
+    failure_texts = [f"{rule_word(rule)} fails in {count}" for rule, count in failure_counts.most_common(5)]
     return {
         "state": "ok" if flyable == FLIGHT_COUNT else "open" if flyable or undecided else "fail",
-        "headline": f"{headline}: {lower:.0%} to {upper:.0%} at 95 %",
-        "lines": [*common, f"planfly campaign flies more: {FLIGHT_COUNT} flights show little about rare failures"],
+        "headline": f"{headline} (probability {lower:.0%} to {upper:.0%} at 95 % confidence)",
+        "lines": [
+            *failure_texts,
+            f"{FLIGHT_COUNT} flights show little about rare failures; planfly campaign flies more",
+        ],
     }
 
 

@@ -34,8 +34,9 @@ def update_moved_route(
 ) -> Route | None:
     """Return the route after moves of a few waypoints; None if the whole route must be computed again.
 
-    This is necessary if a move may change more than the waypoint itself.  It is the case next to loiters, merged
-    waypoints and kept altitudes, and with jumps, gates, RTL, landings and courses at the ends.
+    The whole route must be computed again if a move may change more than the waypoint itself.  This is so next to
+    loiters, merged waypoints and waypoints without an altitude, and for routes with jumps, gates, RTL, landings, or
+    courses at the ends.
 
     route: route of the previous mission.
     """
@@ -112,8 +113,8 @@ def _map_position(item: MissionItem, mission: Mission, scenario: Scenario) -> tu
 
     Returns None if the position depends on other items or is off the map.
     """
-    x, y = to_map(scenario.origin, [item.lat_deg], [item.lon_deg])
-    east, north, home, altitude = float(x[0]), float(y[0]), mission.home, math.nan
+    map_east, map_north = to_map(scenario.origin, [item.lat_deg], [item.lon_deg])
+    east, north, home, altitude = float(map_east[0]), float(map_north[0]), mission.home, math.nan
     if item.frame in AMSL:
         altitude = item.alt
     elif item.frame in OVER_HOME and home is not None:

@@ -147,10 +147,10 @@ async def _run_web_server(server: "Server", listener: socket.socket, stop: Calla
     import uvicorn
 
     from planfly.studio.app import make_app
-    from planfly.studio.connections import FirstMessageBounded, ShortLived
+    from planfly.studio.connections import BoundedWebSocketProtocol, ShortLivedHttpProtocol
     from planfly.studio.messages import MAX_DROPPED_MESSAGE_CHARACTERS, MAX_MESSAGE_CHARACTERS
 
-    class Quiet(uvicorn.Server):
+    class SignalFreeServer(uvicorn.Server):
         """Server that leaves signals to the caller."""
 
         @contextlib.contextmanager
@@ -166,13 +166,13 @@ async def _run_web_server(server: "Server", listener: socket.socket, stop: Calla
         server_header=False,
         date_header=False,
         lifespan="off",
-        ws=FirstMessageBounded,
+        ws=BoundedWebSocketProtocol,
         ws_max_size=MAX_DROPPED_MESSAGE_CHARACTERS + MAX_MESSAGE_CHARACTERS,
         timeout_graceful_shutdown=_SHUTDOWN_TIMEOUT_S,
         h11_max_incomplete_event_size=16_384,
-        http=ShortLived,
+        http=ShortLivedHttpProtocol,
     )
-    web_server = Quiet(config)
+    web_server = SignalFreeServer(config)
     serve_task = asyncio.create_task(web_server.serve(sockets=[listener]))
     run_task = asyncio.create_task(server.run())
     try:

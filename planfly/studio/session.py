@@ -92,9 +92,9 @@ class Session:
     undone_states: states of the documents whose opening was undone.
     replaced_settings: autosaved settings of this document that were not restored, each as text.
     must_autosave: True if options of the command replaced autosaved settings, so that the autosave is written again.
-    unused_text: text on autosaved edits of another content of the mission file, which were set aside; "" without any.
+    unused_text: text on autosaved edits that were set aside because the mission file has changed; "" if there are none.
     aircraft_folders: folders of the user's own aircraft that the session has flown, by name.
-    named_parameters: scenario's entries of the autopilot with its parameter file, by the autopilots flown with a file.
+    named_parameters: for each autopilot that was flown with a parameter file, the scenario's entries of both, by name.
     """
 
     document: Document
@@ -260,7 +260,7 @@ class Session:
             raise
 
     def _read_changed_file(self) -> None:
-        """Read the mission file again if another program has changed it; its mission then counts as the saved one.
+        """Read the mission file again if another program has changed it; its mission becomes the saved mission.
 
         Raises PlanflyError if the file cannot be read.
         """
@@ -506,8 +506,8 @@ class Session:
         """Text on the autosaved settings that were not restored; "" if all were restored."""
         if not self.replaced_settings:
             return ""
-        verb = "replaced by the command, and kept as they are now" if self.must_autosave else "not used"
-        return f"kept settings {verb}: {'; '.join(self.replaced_settings)}"
+        outcome_text = "replaced by options of the command" if self.must_autosave else "not used"
+        return f"autosaved settings {outcome_text}: {'; '.join(self.replaced_settings)}"
 
     def world_message(self) -> Json:
         """Return the message with the map, threats, zones and settings."""
@@ -521,7 +521,7 @@ class Session:
     def save(self, form: str) -> SavedFile:
         """Return the mission as a file of a format. Raises PlanflyError if the format cannot store it.
 
-        If the mission has no file to overwrite, it then counts as saved.
+        A mission without a file to overwrite is then no longer unsaved.
         """
         saved_file = save_document(self.document, self.context, self.judged, form)
         if form in KINDS and form != "kml" and not self.file_kind:
@@ -625,9 +625,9 @@ class Session:
         except OSError:
             self.unreadable.append(file)
             kept_file = file
-        what = "mission" if self.document.path is None else "mission file"
+        subject = "mission" if self.document.path is None else "mission file"
         edits_text = f"{count_text(count, 'earlier edit')} {'was' if count == 1 else 'were'} set aside"
-        self.unused_text = f"the {what} has changed since; {edits_text} in {kept_file}"
+        self.unused_text = f"the {subject} has changed since its last edit in the studio; {edits_text} in {kept_file}"
 
 
 def open_session(target: str, options: MissionOptions, autosave_file: Path | None = None) -> tuple[Session, bool]:

@@ -46,7 +46,7 @@ _LABELS = {
     "surveys": "Photo lines",
     "parameter": "Parameter",
 }
-# Keys whose change is stated as a change of another setting.
+# Setting under whose label the change of another key is stated.
 _CHANGED_WITH = {"autopilot_title": "autopilot", "wind_from": "wind_speed", "forecast": "wind_speed"}
 # Names of the settings in scenarios and options, in the patterns of their messages, by the settings' keys.
 _NAME_PATTERNS = {
@@ -113,7 +113,7 @@ def autopilot_parameters(scenario: Scenario, uav: Uav) -> dict[str, dict[str, st
 def error_in_page_words(error: PlanflyError, settings: Settings, scenario_name: str) -> PlanflyError:
     """Return an error of a change of settings that names the settings by their labels on the page.
 
-    The scenario's name, which may be that of the mission's file, is omitted.
+    The scenario's name, which may be the name of the mission file, is omitted.
 
     >>> error = PlanflyError("m.waypoints: limits: max_height_m: 20: must be above min_clearance_m 30")
     >>> str(error_in_page_words(error, Settings(kind="settings"), "m.waypoints"))

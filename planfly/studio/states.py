@@ -27,7 +27,7 @@ class State(NamedTuple):
     """State of a place.
 
     state: "fail", "open", "near" or "ok".
-    closeness: margin relative to the largest margin that is near the limit; below 0 beyond the limit.
+    closeness: margin divided by the margin below which a value is near its limit; negative beyond the limit.
     text: short text of the finding, shown at the pointer.
     """
 
@@ -139,9 +139,9 @@ def finding_state(finding: Finding, *, unjudged: bool = False) -> State | None:
 
 
 def _closeness(finding: Finding, tolerance: float = 0.0) -> float:
-    """Return the margin of a finding as a fraction of the margin below which it counts as near its limit.
+    """Return the margin of a finding divided by the margin below which a value is near its limit.
 
-    That margin is a tenth of the limit, but at most the scale of the rule's margin.
+    The latter is a tenth of the limit, but at most the scale of the rule's margin.
 
     tolerance: added to the margin, in the finding's unit.
     """

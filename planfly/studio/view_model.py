@@ -266,7 +266,7 @@ def states_json(states: PlaceStates, first: int, last: int) -> Json:
 def _state_data(state: State) -> list[str | float | None]:
     """Return a state as page data: its name, its text, and its closeness, or None if no limit is near.
 
-    By the closeness the page finds the worst of the laps that pass the same item.
+    The page uses the closeness to find the worst of several laps past the same item.
     """
     closeness = None if state.closeness == math.inf else max(_MIN_CLOSENESS, round(state.closeness, 3))
     return [state.state, state.text, closeness]

@@ -73,7 +73,7 @@ def fly(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any
 
 
 def try_planned_suggestions(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any]:
-    """Try a mission's suggestions by geometry; return passed ones like `try_flown_suggestions`."""
+    """Try the suggestions of a mission's geometric verdict; return those that pass, as `try_flown_suggestions`."""
     context, mission = payload
     return _try_suggestions(context, context.judge(mission), advance)
 
@@ -91,7 +91,7 @@ def try_flown_suggestions(payload: tuple[EditContext, bytes], advance: Advance) 
 
 
 def _try_suggestions(context: EditContext, judged_mission: JudgedMission, advance: Advance) -> dict[str, Any]:
-    """Try a verdict's suggestions; return passed ones like `try_flown_suggestions`."""
+    """Try the suggestions of a verdict; return those that pass, as described in `try_flown_suggestions`."""
 
     def report_and_continue() -> bool:
         """Report that suggestions are tried; return False, so that the trials are not aborted."""
@@ -104,10 +104,10 @@ def _try_suggestions(context: EditContext, judged_mission: JudgedMission, advanc
     missions = {(finding_key(trial.finding), trial.suggestion): trial.setup.mission for trial in passed_trials}
     offered = with_passing_suggestions(verdict.findings, tried)
     changes = {
-        (number, which): (missions[finding_key(finding), suggestion], suggestion)
+        (number, choice): (missions[finding_key(finding), suggestion], suggestion)
         for number, finding in enumerate(verdict.findings)
         if finding.ok is False
-        for which, suggestion in enumerate(offered[number].suggestions)
+        for choice, suggestion in enumerate(offered[number].suggestions)
         if can_apply(suggestion)
     }
     return {"findings": findings_json(verdict, tried), "changes": changes}

@@ -41,7 +41,7 @@ AIRSPEED_FACTORS = (0.95, 0.9, 0.85, 0.8, 0.7)
 _MIN_AIRSPEED_RATIO = 1.1
 # Step of the airspeeds that are tried, m/s.
 _AIRSPEED_STEP_MPS = 0.1
-# Reserve for the variation of the ground speed: the ratio of the ground speed aimed at to the highest allowed.
+# Ratio of the intended to the highest allowed ground speed; the difference is a reserve for gusts.
 _GROUND_SPEED_RATIO = 0.98
 
 
@@ -166,12 +166,12 @@ def _count_usable(verdict: Verdict) -> tuple[int, int]:
 
 
 def _usable_parts(verdict: Verdict) -> list[float]:
-    """Return the usable part of each photo line that was measured, %; 0 for a line that was not flown or judged."""
+    """Return the usable part of each photo line, %; 0 for a line that was not flown or not judged."""
     return [0.0 if finding.flown is None else finding.flown for finding in _line_findings(verdict)]
 
 
 def _line_findings(verdict: Verdict) -> list[Finding]:
-    """Return the findings on the photo lines of a flight, without those on the overlap of their photos."""
+    """Return the findings on the photo lines of a flight, except the findings on the overlap of their photos."""
     return [finding for finding in verdict.findings if finding.rule == "survey" and finding.check in ("", GROUND_PATH)]
 
 
@@ -698,7 +698,8 @@ def _commanded_airspeed(item: MissionItem) -> float:
 def _other_courses(course: float, wind: float) -> Iterator[float]:
     """Yield the courses along and across the wind, unless they are close to the current course.
 
-    Courses within 15 degrees of the current course, in either direction, are left out.
+    Courses within 15 degrees of the current course, in either direction of flight, are left out.
+    course, wind: current course of the lines, and course of the wind, rad.
     """
     for new_course in (wind, wind + 0.5 * math.pi):
         if abs(math.sin(new_course - course)) > math.sin(math.radians(15.0)):

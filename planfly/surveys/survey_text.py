@@ -58,7 +58,7 @@ def lines_headline(measures: list[LineMeasure | None]) -> str:
     measure = measures[worst_index]
     return (
         f"{summary}; line {worst_index + 1} is the worst:"
-        f" {'not flown' if measure is None else f'{100.0 * measure.usable:.0f} %'}"
+        f" {'not flown' if measure is None else f'{100.0 * measure.usable:.0f} % usable'}"
     )
 
 
@@ -161,10 +161,7 @@ def count_line_photos(lines: Sequence[LineMeasure | None]) -> int:
 
 
 def usable_segments_text(survey: Survey, lines: Sequence[LineMeasure | None]) -> str:
-    """Describe the loss at the ends of the lines.
-
-    This loss indicates the turn-around distance that would be needed.
-    """
+    """Describe the length lost at the ends of the lines, which indicates the needed turn-around distance."""
     usable_lines = [measure for measure in lines if measure is not None and measure.usable > 0.0]
     if not usable_lines:
         return (

@@ -33,7 +33,7 @@ class TrimEntry:
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class ModeEntry:
-    """A mode in cruise: its root; for a conjugate pair, the root with the positive imaginary part."""
+    """A dynamic mode in cruise, with its root; of a conjugate pair, the root with the positive imaginary part."""
 
     name: str
     root_real_1_s: float
@@ -140,7 +140,7 @@ def aircraft_detail(numbers: AircraftNumbers) -> AircraftDetail:
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class FailedPlace:
-    """Flights that failed a rule at a place; the place as in a finding of a verdict."""
+    """Number of flights that failed a rule at a place; the place is stated as in a finding of a verdict."""
 
     where: str
     flights: int
@@ -154,7 +154,7 @@ class FailedPlace:
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class FailedRule:
-    """Flights that failed a rule."""
+    """Number of flights that failed a rule, in total and at each place."""
 
     rule: str
     flights: int
@@ -174,7 +174,7 @@ class DispersedFlights:
     holds: bool
     """False if the upper end of the interval is below 0.95."""
     deciding_rule: str
-    """Rule that most flights failed, or with the smallest margin if none failed."""
+    """Rule that the most flights failed; if none failed, the rule with the smallest margin relative to its scatter."""
     failed_by_rule: list[FailedRule]
     remedies: list[str]
     """Changes that would raise the probability."""
@@ -205,13 +205,13 @@ class TiedRule:
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class ClosestRule:
-    """Rule by how close the flights came to failing it."""
+    """Rule in the ranking by how close the flights came to failing it."""
 
     rule: str
     failed: int
     """Number of flights that failed the rule."""
     smallest_margin: float | None
-    """Negative beyond the limit; a rule that no flight failed then passed within its tolerance."""
+    """Smallest margin of all flights; it may be negative without a failure, within the rule's tolerance."""
     margin_of_one_in_twenty: float | None
     unit: str
 
@@ -229,16 +229,16 @@ class CampaignDocument:
     answer: str
     """reached, missed, undecided, or "no target" if no probability was requested."""
     deciding_flights: int | None
-    """Number of flights that would decide an undecided target at this share of flyable ones."""
+    """Number of flights that would decide an undecided target with the same fraction of flyable flights."""
     unjudged_return: str
     """Reason why the return after the last item is not judged in any flight; empty if it is judged."""
     flights: int
     flyable: int
     not_flyable: int
     undecided: int
-    """Flights that are not judged in full; the bounds count them as not flyable and as flyable."""
+    """Flights that are not judged in full; the lower bound counts them as not flyable, the upper bound as flyable."""
     not_judged: str
-    """Why the first of them is not judged in full; empty if there is none."""
+    """Reason why the first undecided flight is not judged in full; empty if there is none."""
     lost: list[int]
     """Flights without an outcome."""
     probability: float | None
@@ -311,7 +311,7 @@ class WindsDocument:
     seed: int
     target: float
     answer: str
-    """judged, not judged in full, not judged, or "not flyable" if not flyable even in calm air with the target."""
+    """judged, not judged in full, not judged, or "not flyable" if the mission misses the target even in calm air."""
     reason: str
     """Reason why the search or some of its directions are not judged; "" if all are judged."""
     confidence: float
@@ -355,7 +355,7 @@ class RunAnswer:
     """With --refine: each round; the results of the last round are in the folder itself."""
     verdict: VerdictDocument
     dispersed: DispersedFlights | None
-    """With --flights: dispersed flights of the plan; null without, or if there is no feasible plan."""
+    """Dispersed flights of the plan (--flights); null without this option or without a feasible plan."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
@@ -500,7 +500,7 @@ class CompareCampaignsAnswer:
     interval: list[float]
     """Two-sided interval of the difference, at 95 % confidence."""
     p_value: float
-    """Of McNemar's exact test if the flights are pairs, otherwise of Fisher's exact test."""
+    """p-value of McNemar's exact test if the flights are pairs, otherwise of Fisher's exact test."""
     pairs: int
     """Number of flights with the same draws in both campaigns; 0 if the draws differ."""
     only_first: int

@@ -45,7 +45,8 @@ def parse_wind(text: str) -> tuple[float, float]:
         speed, from_deg = math.nan, 0.0
     if not is_valid_wind(speed, from_deg):
         raise argparse.ArgumentTypeError(
-            f"{text!r}: expected SPEED,FROM: 0 to 40 m/s, and the degrees that the wind blows from (-360..360)"
+            f"{text!r}: expected SPEED,FROM: a speed of 0 to 40 m/s, and the direction from which the wind blows, -360"
+            " to 360 degrees"
         )
     return speed, from_deg
 
@@ -204,6 +205,7 @@ def complete_aircraft(prefix: str, **_context: object) -> list[str]:
     ['aerosonde']
     """
     names = sorted(file.stem for file in (_ROOT / "aircraft").glob("*/*.toml") if file.stem == file.parent.name)
+    # No file has this suffix, so that only folders are proposed.
     return [*(name for name in names if name.startswith(prefix)), *file_completer("no-suffix")(prefix)]
 
 

@@ -9,7 +9,7 @@ from logs.verdict.conditions import Conditions
 from planfly.terminal.verdict_answers import STRICT
 
 
-def finite(value: float) -> float | None:
+def finite_or_none(value: float) -> float | None:
     """Return a number, or None for NaN and infinity, which JSON does not have."""
     return value if math.isfinite(value) else None
 
@@ -20,8 +20,8 @@ class DecisionEntry:
 
     flights: int
     returns_from_leg: int | None
-    """Number of the leg on which the return starts that needs the most energy, as in texts; null for the end of the
-    mission."""
+    """Number of the leg, as in texts, on which the most expensive return starts; null if the mission itself needs the
+    most energy."""
     start_s: float | None
     """Median start of these returns, s."""
 

@@ -68,10 +68,10 @@ def _dispersed_lines(result: "CampaignResult", answer: "DispersedFlights") -> li
     from planfly.campaigns.summary import deciding_lines, undecided_lines
 
     low, high = answer.interval
-    state = "" if answer.holds else "; 0.95 is required"
+    requirement_text = "" if answer.holds else "; a probability of 0.95 is required"
     lines = [
         f"flights   the plan succeeds in {answer.flyable} of {answer.flights} flights with the default dispersions"
-        f" (P between {low:.2f} and {high:.2f} at 95 %){state}",
+        f" (P between {low:.2f} and {high:.2f} at 95 %){requirement_text}",
         *undecided_lines(result.summary),
         *failure_lines(result.summary.by_rule, result.summary.mission_fault),
         *deciding_lines(result.summary),

@@ -73,8 +73,8 @@ def add_json_and_quiet_options(group: OptionGroup, command: str) -> None:
     group.add_argument(
         "--json",
         metavar="FILE",
-        help="also write the answer as JSON to FILE; - writes it to standard output, and all other output to standard "
-        f"error; 'planfly help {command} --schema' prints its schema",
+        help="also write the answer as JSON to FILE. The name - writes the answer to standard output, and all other "
+        f"output to standard error. 'planfly help {command} --schema' prints the schema of the answer",
     )
     group.add_argument(
         "--quiet", action="store_true", help="print neither progress nor results; errors and the exit code remain"
@@ -129,8 +129,8 @@ def add_time_option(group: OptionGroup) -> None:
         "--at",
         metavar="TIME",
         help=(
-            "time of the flight in ISO 8601 format, START or START/END, as in 2026-05-01T10:00+02:00; inactive zones "
-            "are then ignored, and a forecast is read from START on (default: all zones are active)"
+            "time of the flight in ISO 8601 format, START or START/END, as in 2026-05-01T10:00+02:00. Zones that are "
+            "inactive at this time are ignored, and a forecast is read from START on (default: all zones are active)"
         ),
     )
 
@@ -190,7 +190,7 @@ def add_autopilot_options(parser: CommandParser) -> OptionGroup:
         metavar="FILE",
         help=(
             "parameter file of the simulated autopilot, as saved by a ground station; it also "
-            "selects the autopilot if --autopilot is not given"
+            "selects the autopilot if --autopilot is missing"
         ),
     )
     with_completer(option, file_completer("param", "parm", "params"))
@@ -276,9 +276,9 @@ def add_flights_option(group: OptionGroup) -> None:
         "--flights",
         metavar="N",
         type=number_parser("flights"),
-        help="then fly the plan N times with the default dispersions of 'planfly campaign', and report the share of "
-        "flyable flights and what would help; the exit code is 4 if the share's whole confidence interval is below "
-        "0.95; 40 flights take some 20 s",
+        help="after planning, fly the plan N times with the default dispersions of 'planfly campaign'. The output "
+        "states the share of flyable flights, and changes that would raise it. The exit code is 4 if the whole "
+        "confidence interval of this share is below 0.95. 40 flights take about 20 s",
     )
 
 
@@ -306,7 +306,7 @@ def add_imported_log_options(parser: CommandParser) -> None:
         "--flight",
         metavar="N",
         type=number_parser("flight"),
-        help="number of the flight in the log (default: the longest in AUTO)",
+        help="number of the flight in the log (default: the longest flight in AUTO mode)",
     )
     group.add_argument(
         "--datum", choices=CHOICES["datum"], help="reference of the altitudes in the log, if the log does not state it"

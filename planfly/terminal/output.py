@@ -128,7 +128,7 @@ def open_standard_streams() -> None:
         sys.stderr = io.TextIOWrapper(io.FileIO(2, "w", closefd=False), "utf-8")
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
-            # For a terminal with a small character set, or a file name that is not valid text.
+            # Escape characters that the terminal lacks, and file names that are not valid text.
             stream.reconfigure(errors="backslashreplace")
 
 
@@ -261,9 +261,9 @@ class _TimeLeft:
         """
         last_duration = _last_durations().get(self._kind)
         if last_duration is not None and remaining_units > 0.0 and last_duration.per_unit > 0.0:
-            return f"about {_duration_text(last_duration.per_unit * remaining_units)}, at the pace of the last run here"
+            return f"about {_duration_text(last_duration.per_unit * remaining_units)}, at the rate of the last run"
         if last_duration is not None:
-            return f"the last run here took {_duration_text(last_duration.total)}"
+            return f"the last run took {_duration_text(last_duration.total)}"
         return "no estimate yet" if remaining_units > 0.0 else "no estimate"
 
     def is_due(self) -> bool:
@@ -457,7 +457,7 @@ class _Lines:
                 )
 
     def _print_first_line(self, estimate: str) -> None:
-        """Print a line which states that a stage begins, with an estimate of its duration."""
+        """Print the line that announces a stage, with an estimate of its duration."""
         self._has_started = True
         self._print_and_note_time(f"{self._title} ... ({estimate})")
 

@@ -36,9 +36,9 @@ class PlanAnswer:
     problems: list[str]
     """Reasons why the plan is not feasible."""
     expected_failures: list[str]
-    """Known causes for which more than one of twenty dispersed flights of a safe plan is expected to fail."""
+    """Known reasons to expect that more than 5 % of the dispersed flights of a safe plan fail."""
     dispersed: DispersedFlights | None
-    """With --flights: dispersed flights of the plan; null without, or if the plan is not feasible."""
+    """Dispersed flights of the plan (--flights); null without this option, or if the plan is not feasible."""
     conditions: Conditions
     """Conditions for which the plan was made."""
 
@@ -50,7 +50,7 @@ class FrontEntry:
     file: str
     length_m: float
     exposure_s: float
-    """Exposure to radars: density of detection, integrated over the flight time; not the time inside their range."""
+    """Exposure to radars: the density of detection integrated over the flight time, not the time inside their range."""
     clearance_m: float
     """Lowest height above ground, m."""
     energy_wh: float | None
@@ -75,7 +75,7 @@ class FrontAnswer:
     problems: list[str]
     """Reasons why there is no plan."""
     conditions: Conditions
-    """Conditions that the plans were made for."""
+    """Conditions for which the plans were made."""
 
 
 # Answer of ``planfly plan``, without or with --front.
@@ -114,23 +114,22 @@ def fewer_plans_line(front: "Front") -> str:
         cause = "the time budget" if front.ended == "budget" else "an interruption"
         unit = "evaluation" if front.evaluations == 1 else "evaluations"
         return (
-            f"{len(front.plans)} of the {front.asked} requested: stopped by {cause} after {front.evaluations:,} "
-            f"{unit}; more time may find more plans"
+            f"{len(front.plans)} of the {front.asked} requested plans: the search was stopped by {cause} after "
+            f"{front.evaluations:,} {unit}; more time may find more plans"
         )
     from planner.search.plan_front import NOTICEABLE_CLEARANCE_M, NOTICEABLE_EXPOSURE_FRACTION, NOTICEABLE_GAIN_FRACTION
 
     min_fraction, min_exposure = f"{NOTICEABLE_GAIN_FRACTION:.1%}", f"{NOTICEABLE_EXPOSURE_FRACTION:.0%}"
     min_height = f"{NOTICEABLE_CLEARANCE_M:g} m"
-    refused_verbs = ("was", "is") if front.refused == 1 else ("were", "are")
+    refused_verb = "was" if front.refused == 1 else "were"
     refused_text = (
-        f"{count_text(front.refused, 'plan')} that {refused_verbs[0]} found {refused_verbs[1]} not safe when completed,"
-        " and "
+        f"{count_text(front.refused, 'other plan')} {refused_verb} not safe after completion, and "
         if front.refused
         else ""
     )
     return (
-        f"{len(front.plans)} of the {front.asked} requested: {refused_text}no other plan that was "
-        f"found gains more than {min_fraction} in length or {front.fourth}, {min_exposure} in "
+        f"{len(front.plans)} of the {front.asked} requested plans: {refused_text}no further plan "
+        f"gains more than {min_fraction} in length or {front.fourth}, {min_exposure} in "
         f"exposure or {min_height} in height above ground"
     )
 
@@ -147,7 +146,11 @@ def front_lines(front: "Front", folder: Path) -> list[str]:
     default_plan = front.default.plan
     if not front.plans:
         reasons = [f"  failed  {problem}" for problem in default_plan.certificate.problems]
-        return ["no safe plan, so no front", *reasons, f"front     {folder}/ (front.csv, front.json)"]
+        return [
+            "no safe plan was found, so there is no front",
+            *reasons,
+            f"front     {folder}/ (front.csv, front.json)",
+        ]
     conditions = conditions_of_plan(default_plan)
     comparison = f", none better than another in length, exposure, height above ground and {front.fourth} at once"
     lines = [

@@ -30,7 +30,7 @@ class CauseEntry:
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class ReturnEntry:
-    """Range of seconds whose returns have the same target and outcome; numbers are of the worst return."""
+    """Consecutive returns with the same target and outcome; the numbers are those of the worst return."""
 
     first_s: float
     last_s: float
@@ -117,7 +117,7 @@ class ByProgram:
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class GlideEntry:
-    """Range of seconds with the same reachable place without engine; numbers are of the least height."""
+    """Consecutive glides that reach the same place; the numbers are those of the glide with the least height left."""
 
     first_s: float
     last_s: float
@@ -136,9 +136,9 @@ class GlideEntry:
     """Outcome of the autopilot's own return without thrust: arrives, low, ground, threat, unknown or not flown."""
     own_target: str
     own_over_m: float | None
-    """Height above ground of that return at its target, m; null if it does not arrive."""
+    """Height above ground of the autopilot's return at its target, m; null if it does not arrive."""
     own_short_m: float | None
-    """Distance of that return's touchdown from its target, m; null if it does not come down."""
+    """Distance of the touchdown of the autopilot's return from its target, m; null if it does not come down."""
     text: str
 
 
@@ -167,13 +167,13 @@ class GlidesEntry:
     cell_m: float | None
     sites: list[GlideSiteEntry]
     home: int
-    """Number of places from which home can be reached; the next four fields count the places from which it cannot."""
+    """Number of places from which home can be reached; the next four fields count the other places."""
     site: int
     flat: int
     nothing: int
     unknown: int
     own_arrives: int
-    """Number of places from which the return that the autopilot itself flies arrives."""
+    """Number of places from which the autopilot's return without thrust arrives."""
     ranges: list[GlideEntry]
 
 
@@ -201,7 +201,7 @@ class ReturnsAnswer:
     left_out: int
     """Number of places that were left out: on the ground, or too low in a take-off or a landing to return."""
     no_return: str
-    """Point of no return by energy: never, at once or later (no_return_s); or why unknown: battery, used or arrives."""
+    """Point of no return by energy: never, at once or later (no_return_s); if unknown, battery, used or arrives."""
     no_return_s: float | None
     engine_out: GlidesEntry
     suggestions: list[ReturnSuggestion]
@@ -259,7 +259,7 @@ def program_returns_entry(result: ReturnsResult) -> ByProgram | None:
 
 
 def _measured_return(simulated_return: SimulatedReturn) -> MeasuredReturn:
-    """Return the outcome of a return, its target, and its smallest distances from ground and missiles, m."""
+    """Return the JSON entry of a return: outcome, target, and smallest distances from ground and missiles."""
     return MeasuredReturn(
         kind=simulated_return.kind,
         target=simulated_return.target.name,
@@ -274,10 +274,7 @@ def _round_to_tenths(value: float) -> float | None:
 
 
 def glides_entry(result: ReturnsResult) -> GlidesEntry:
-    """Return the JSON entry of all glides after an engine failure.
-
-    It names the place in reach at each second of the flight.
-    """
+    """Return the JSON entry of all glides after an engine failure, with the place in reach at each second."""
     glides = result.glides
     entries = []
     for glide_range in glides.ranges:
@@ -321,10 +318,7 @@ def glides_entry(result: ReturnsResult) -> GlidesEntry:
 
 
 def return_range_entry(result: ReturnsResult, return_range: ReturnRange) -> ReturnEntry:
-    """Return the JSON entry of consecutive returns with the same outcome.
-
-    Its numbers are those of the worst return.
-    """
+    """Return the JSON entry of consecutive returns with the same outcome; its numbers are those of the worst return."""
     worst_return, scenario, round_to_tenths = return_range.worst, result.setup.scenario, _round_to_tenths
     return ReturnEntry(
         first_s=round(return_range.first, 2),

@@ -15,9 +15,9 @@ from planfly.terminal.verdict_answers import STRICT
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class PhotoLineEntry:
-    """A photo line as flown; if not flown, all fields but its items are null.
+    """A photo line as flown; if it was not flown, all fields except its items are null.
 
-    Shares are fractions of its length.
+    Shares are fractions of the line's length.
     """
 
     first_item: int
@@ -25,21 +25,24 @@ class PhotoLineEntry:
     length_m: float | None
     usable: float | None
     away: float | None
-    """Share not flown, or flown too far off the line; of the rest, banked too much; then with a wrong height above
-    ground; then with the camera off; then over ground outside the terrain data, which is not judged."""
+    """Share that was not flown, or flown too far off the line."""
     banked: float | None
+    """Share flown on the line, but banked too much."""
     high: float | None
+    """Share without these faults, but at a wrong height above ground."""
     dark: float | None
+    """Share without these faults, but with the camera off."""
     unknown: float | None
+    """Share without these faults, but over ground outside the terrain data, so that it is not judged."""
     lost_m: list[tuple[float, float]]
-    """Segments that cannot be used, m from the start of the line, without those over unknown ground."""
+    """Segments that cannot be used, m from the start of the line; segments over unknown ground are not included."""
     photos: int | None
     missed: int | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class SurveyRemedyEntry:
-    """A change with which the survey was flown so that all lines can be used."""
+    """A change that made all photo lines usable when the survey was flown with it."""
 
     kind: str
     """Kind of the change: trigger, side, turn-around, gates, every, course, parameter or airspeed."""

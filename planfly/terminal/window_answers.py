@@ -30,7 +30,7 @@ class DepartureEntry:
     undecided: int
     """Flights that are not judged in full."""
     rules: list[str]
-    """Rules that fail most flights, each the same number; empty without failures."""
+    """Rules that fail the most flights (ties included); empty without failures."""
     by_rule: list[dict[str, Any]]
     """Failed flights by rule and place."""
 
@@ -52,10 +52,10 @@ class WindowAnswer:
     what: str
     headline: str
     is_go: bool | None
-    """True if the asked departure is open, or any departure if none is asked; null if it is not known, also because
-    flights are not judged in full."""
+    """True if the requested departure is open, or any departure if none is requested; null if it is not known, for
+    example because flights are not judged in full."""
     asked: str | None
-    """Asked time of take-off; null for any."""
+    """Requested time of take-off; null if any departure will do."""
     probability: float
     flights: int
     """Flights of each departure."""

@@ -12,7 +12,7 @@ from itertools import product
 
 import numpy as np
 
-from flight.mission.altitude_frames import misread_altitudes
+from flight.mission.altitude_frames import find_misread_altitudes
 from flight.mission.edits import movable_indices, move_item, set_airspeed, set_altitude, set_loiter_radius
 from flight.mission.items import LANDINGS, OVER_TERRAIN, Command, Frame, Mission
 from flight.mission.route import Route
@@ -33,10 +33,10 @@ _SIDE_DIRECTIONS = {"north": (0.0, 1.0), "east": (1.0, 0.0), "south": (0.0, -1.0
 _TURN_STEPS = 40
 # Distance from a sphere's surface that a step aims at, m, as in the planner; the navigation error may be a third of it.
 _SPHERE_MARGIN_M = 15.0
-# Shares of a change of a leg's rise that are made at its end, in the order in which they are tried; the first leaves it
-# to the leg's place in the route.
+# Tried shares of a change of a leg's rise that are made at the leg's end, in this order.  None: the share depends on
+# the leg's position in the route.
 _END_FRACTIONS = (None, 1.0, 0.0, 0.5, 0.05, 0.1, 0.2, 0.8, 0.9, 0.95)
-# Smallest share of a move of waypoints that is taken to move the nearest point of their legs.
+# Smallest assumed share of the waypoints' move by which the nearest point of their legs moves.
 _MIN_MOVE_SHARE = 0.2
 
 
@@ -57,8 +57,8 @@ def apply_suggestion(
 ) -> Mission:
     """Return the mission with one suggestion of a finding applied.
 
-    If a suggestion can be applied in several ways, the mission with the fewest failed findings is returned, and
-    of these the one with the fewest findings that pass or are absent without the change.
+    If several items can be moved, all choices are tried.  The mission with the fewest failed findings is returned;
+    among equal ones, the mission with the fewest findings that become failed or undecided.
 
     Raises MissionError if no item can be moved for the suggestion, or if it does not change the mission's items.
     """
@@ -66,10 +66,10 @@ def apply_suggestion(
     if not can_apply(suggestion):
         raise MissionError(f"{source}: this suggestion cannot be made by moving items", field="suggestion")
     best_mission, errors = None, []
-    # Away from a missile, try a single waypoint and all waypoints, because each moved waypoint may fail elsewhere; both
-    # in the direction of the nearest point, and each in its own direction, for a path that bends around the missile.
-    # To reduce the rise of one leg, try both of its ends, either of them, and other shares of the two, because the
-    # neighbouring legs may fail.
+    # Away from a missile: move a single waypoint or all of them, because each moved waypoint may fail elsewhere.  Move
+    # them in one direction, or each in its own direction, for a path that bends around the missile.
+    # To reduce the rise of a leg: move both ends, either end, or both by unequal shares, because the neighbouring legs
+    # may fail.
     choices = [_Choice()]
     if any(change.what == "distance" for change in suggestion):
         choices = [_Choice(max_moves, radially) for max_moves, radially in product((1, None), (False, True))]
@@ -100,12 +100,13 @@ def apply_suggestion(
     if errors:
         raise errors[0]
     raise MissionError(
-        f"{source}: the mission has no item at the place of this suggestion: change it by hand", field="suggestion"
+        f"{source}: the mission has no item at the place of this suggestion: change the mission by hand",
+        field="suggestion",
     )
 
 
 def _open_places(verdict: Verdict) -> dict[tuple[str, Place], bool]:
-    """Return rule and place of each failed or undecided finding of a verdict, with True for a failed one."""
+    """Return a mapping from rule and place of each failed or undecided finding to True if it failed."""
     open_findings = (*undecided_findings(verdict.findings), *verdict.failed)
     return {(finding.rule, finding.place): finding.ok is False for finding in open_findings}
 
@@ -166,6 +167,10 @@ class _EditedMission:
     """Mission whose items are moved one by one."""
 
     def __init__(self, context: MissionContext, judged: JudgedMission, choice: _Choice) -> None:
+        """Start with the unchanged mission.
+
+        judged: the mission with its verdict.  choice: choice of the items to move.
+        """
         self.context, self.mission, self.route = context, judged.mission, judged.setup.route
         self.requirements, self.choice = judged.requirements, choice
         self.is_changed = False
@@ -207,7 +212,7 @@ class _EditedMission:
             if offset[:2].any() and index in self.approach_indices and not along_approach:
                 raise MissionError(
                     f"{self.mission.source}: this suggestion moves item {self.mission.items[index].seq} of the landing"
-                    " sequence to a side: change it by hand",
+                    " sequence to a side: change the mission by hand",
                     field="suggestion",
                 )
             position = self.context.item_positions(self.mission)[movable_indices(self.mission).index(index)]
@@ -311,7 +316,7 @@ def _make_turn_gentler(edited: _EditedMission, change: Change, _finding: Finding
 def _change_altitude(edited: _EditedMission, change: Change, finding: Finding) -> None:
     """Raise or lower a waypoint, a leg, or the legs that violate a zone, by a step.
 
-    A waypoint between two legs moves by the larger of their steps: it moves only by what earlier changes lack.
+    A waypoint between two legs moves by the larger of their two steps, because earlier changes are subtracted.
     """
     sign = 1.0 if change.what == "height" else -1.0
     if change.place.kind == "waypoint" and change.place.index is not None:
@@ -334,9 +339,9 @@ def _set_home_altitude(edited: _EditedMission, change: Change, _finding: Finding
 
 
 def _set_altitude_frame(edited: _EditedMission, change: Change, _finding: Finding) -> None:
-    """Change the altitude frame of the items that fit the terrain only in the other frame, keeping their numbers."""
+    """Change the altitude frame of items that fit the terrain only in the other frame; keep their numbers."""
     scenario, mission, frame = edited.requirements.setup.scenario, edited.mission, Frame(int(change.wanted))
-    below_ground, too_high = misread_altitudes(mission, scenario.origin, scenario.terrain)
+    below_ground, too_high = find_misread_altitudes(mission, scenario.origin, scenario.terrain)
     items, readings = list(mission.items), too_high if frame == Frame.GLOBAL else below_ground
     for reading in readings:
         items[reading.item_index] = replace(items[reading.item_index], frame=frame)
@@ -347,8 +352,8 @@ def _set_altitude_frame(edited: _EditedMission, change: Change, _finding: Findin
 def _follow_ground(edited: _EditedMission, change: Change, _finding: Finding) -> None:
     """State the altitude of a leg's end as a height above terrain.
 
-    A start of the leg that is lower than the required height is raised in its own frame, because another leg leads to
-    it.
+    If the start of the leg is below the required height, it is raised in its own altitude frame, because another leg
+    leads to it.
     """
     leg = _changed_leg(change, edited.route)
     terrain, index = edited.context.scenario.terrain, edited.item_index(leg + 1)
@@ -413,7 +418,7 @@ def _move_away_from_missile(edited: _EditedMission, change: Change, finding: Fin
             edited.move_items([waypoint], np.array([*(scale * offsets[waypoint]), 0.0]))
         return
     direction, leg, fraction = _nearest_point(missile, points[:, :2], legs)
-    # Share of a move of these waypoints by which the nearest point moves.
+    # The nearest point moves by this share of the waypoints' move.
     share = (1.0 - fraction) * (leg in waypoints) + fraction * (leg + 1 in waypoints)
     offset = (change.wanted + _SPHERE_MARGIN_M) / max(share, _MIN_MOVE_SHARE) * direction
     edited.move_items(waypoints, np.array([*offset, 0.0]))

@@ -68,9 +68,9 @@ from world.errors import FlightError
 from world.files import temporary_folder
 
 # ----------------------------------------------------------------------
-# Values in a parameter file that differ from the defaults of its autopilot are measured values.
+# Read the values of a parameter file that describe the aircraft: those that differ from the autopilot's defaults.
 
-# Parameters of ArduPlane that are used.  Speeds are equivalent airspeeds, and are used as the airspeeds of the sheet.
+# Parameters of ArduPlane that describe an aircraft.  Their equivalent airspeeds are used as the airspeeds of the sheet.
 _USED_PARAMETERS = (
     *("AIRSPEED_CRUISE", "AIRSPEED_MIN", "AIRSPEED_MAX", "TRIM_THROTTLE"),
     *("TECS_CLMB_MAX", "THR_MAX", "TECS_SINK_MIN", "ROLL_LIMIT_DEG"),
@@ -79,8 +79,8 @@ _USED_PARAMETERS = (
 _PX4_STALL = ("FW_AIRSPD_STALL", 7.0)
 # Ratio of AIRSPEED_MIN to the stall speed.
 _MIN_AIRSPEED_STALL_RATIO = 1.2
-# Values of a data sheet that a parameter states, too.  The autopilot's own limits, which may be lower than what the
-# aircraft can do, stay in its parameters.
+# Value of the data sheet that each parameter corresponds to.  Limits of the autopilot that may be below the aircraft's
+# limits, such as AIRSPEED_MAX, are not used for the sheet.
 _SHEET_FIELDS = {
     "AIRSPEED_CRUISE": "cruise",
     "AIRSPEED_STALL": "stall",
@@ -92,22 +92,23 @@ _SETTINGS = ("AIRSPEED_CRUISE", "ROLL_LIMIT_DEG")
 
 
 @dataclass(frozen=True, slots=True)
-class StatedParameters:
+class AircraftParameters:
     """Parameters of a file that describe the aircraft and differ from their defaults.
 
-    values: by ArduPlane's present name and in its unit; AIRSPEED_STALL only of a file for PX4.
-    texts: name and value as the file states them, by the same names.
+    values: value of each parameter in ArduPlane's unit, by its current ArduPlane name.  AIRSPEED_STALL is only read
+        from PX4 files.
+    texts: name and value as written in the file, by the same names.
     """
 
     values: Mapping[str, float]
     texts: Mapping[str, str]
 
 
-def stated_parameters(file: Path) -> StatedParameters:
-    """Return the non-default parameters of an ArduPlane or PX4 file that describe the aircraft.
+def read_aircraft_parameters(file: Path) -> AircraftParameters:
+    """Read the non-default parameters of an ArduPlane or PX4 file that describe the aircraft.
 
-    Raises ParameterError for a file that cannot be read, a file for another vehicle, and a file whose names neither
-    autopilot knows.
+    Raises ParameterError if the file cannot be read, is for another vehicle, or has only names that neither autopilot
+    knows.
     """
     autopilot = read_origin(file).autopilot or ARDUPILOT
     entries = read_parameters_for(file, autopilot)
@@ -118,11 +119,11 @@ def stated_parameters(file: Path) -> StatedParameters:
         if entry is not None and abs(entry[0] - entry[1]) > 1e-6 * max(1.0, abs(entry[1])):
             values[name], texts[name] = entry[0], entry[2]
     refuse_unknown_parameters(file, autopilot, entries, values)
-    return StatedParameters(values, texts)
+    return AircraftParameters(values, texts)
 
 
 def _arduplane_value(entries: Mapping[str, Entry], name: str) -> tuple[float, float, str] | None:
-    """Return a parameter's value, default and text from an ArduPlane file; None if the file lacks it."""
+    """Return value, default and text ("NAME value") of an ArduPlane parameter; None if not in the file."""
     definition = next((candidate for candidate in DEFINITIONS.values() if candidate.name == name), None)
     if definition is None or name not in _USED_PARAMETERS:
         return None
@@ -135,7 +136,7 @@ def _arduplane_value(entries: Mapping[str, Entry], name: str) -> tuple[float, fl
 
 
 def _px4_value(entries: Mapping[str, Entry], name: str) -> tuple[float, float, str] | None:
-    """Return a parameter's value, default and text from a PX4 file, in ArduPlane's unit; None if it lacks it."""
+    """Return value, default (in ArduPlane's unit) and text of a PX4 parameter; None if not in the file."""
     px4_name, factor = (_PX4_STALL[0], 1.0) if name == "AIRSPEED_STALL" else FROM_ARDUPILOT[name]
     if px4_name not in entries:
         return None
@@ -144,12 +145,12 @@ def _px4_value(entries: Mapping[str, Entry], name: str) -> tuple[float, float, s
     return value / factor, default / factor, f"{px4_name} {value:g}"
 
 
-def overridden_texts(numbers: Mapping[str, float | None], parameters: StatedParameters) -> list[str]:
-    """Return texts on the parameters that the numbers of a data sheet override.
+def overridden_texts(numbers: Mapping[str, float | None], parameters: AircraftParameters) -> list[str]:
+    """Describe the parameters of a file that are not used because the data sheet states their values.
 
     numbers: numbers of the data sheet by keyword, in the units of the options; None or 0 if not stated.
 
-    >>> overridden_texts({"cruise": 18.0}, StatedParameters({"AIRSPEED_CRUISE": 19.0}, {"AIRSPEED_CRUISE": "A 19"}))
+    >>> overridden_texts({"cruise": 18.0}, AircraftParameters({"AIRSPEED_CRUISE": 19.0}, {"AIRSPEED_CRUISE": "A 19"}))
     ['A 19 (cruise 18 m/s)']
     """
     return [
@@ -160,7 +161,7 @@ def overridden_texts(numbers: Mapping[str, float | None], parameters: StatedPara
 
 
 def with_parameters(sheet: DataSheet, parameters: Mapping[str, float]) -> DataSheet:
-    """Fill missing values of a data sheet from parameters, which are keyed by ArduPlane's names.
+    """Fill the missing values of a data sheet from parameters by ArduPlane's names; return the new sheet.
 
     TECS_CLMB_MAX is the climb rate with the throttle at THR_MAX (libraries/AP_TECS/AP_TECS.cpp).
 
@@ -296,15 +297,15 @@ _SPREADS = {
     "roll-damping": (0.20, "roll damping from published aircraft of the class"),
     "aileron-power": (0.20, "ailerons from published aircraft of the class"),
 }
-# Standard deviation of a guessed steepest climb, rad.  Models of published aircraft climb 13.6, 12.9, 16.4 and 7.2
-# degrees at cruise and a real one 8.9 (`examples/real/aircraft.csv`): 95 % of others are within 11.3 degrees of the
-# mean (Student's t).  For three aircraft whose true values are known, a scaled model was wrong by 4.8 degrees on
-# average (docs/measured.md), 0.8 of a deviation.
-GUESSED_CLIMB = math.radians(6.0)
-# Standard deviation of a stated steepest climb, rad: 0.4 m/s at 15 m/s.
-STATED_CLIMB = math.radians(1.5)
+# Standard deviation of a guessed steepest climb angle at cruise speed, rad.  Models of published aircraft climb at
+# 13.6, 12.9, 16.4 and 7.2 degrees, and a real aircraft at 8.9 degrees (`examples/real/aircraft.csv`).  By Student's t
+# distribution, 95 % of other aircraft are within 11.3 degrees of the mean.  The scaled models of three aircraft with
+# known climb angles were wrong by 4.8 degrees on average (docs/measured.md), which is 0.8 of this deviation.
+GUESSED_CLIMB_SD_RAD = math.radians(6.0)
+# Standard deviation of a steepest climb angle that the sheet states, rad: 0.4 m/s at 15 m/s.
+STATED_CLIMB_SD_RAD = math.radians(1.5)
 # Standard deviation of the logarithm of the least drag if the sheet states the power-off sink rate.
-STATED_DRAG = 0.15
+STATED_DRAG_LOG_SD = 0.15
 
 
 def _make_uncertainty(sized: SizedAircraft, aircraft: Aircraft) -> tuple[Uncertainty, Draws]:
@@ -314,19 +315,21 @@ def _make_uncertainty(sized: SizedAircraft, aircraft: Aircraft) -> tuple[Uncerta
     speed and power at cruise.  All factors are independent except the factor on thrust.  An aircraft with more drag has
     a stronger motor, so this factor compensates the effect of the other factors on the climb.  It also varies by the
     uncertainty of the climb itself.
+
+    The effects of a factor have the four elements of `_performance_vector`: [0] is the climb, [3] the power.
     """
     estimated = _performance_vector(aircraft)
     spreads = {name: sd for name, (sd, _) in _SPREADS.items() if name in sized.numbers.factors}
     if sized.sheet.sink:
-        spreads["zero-lift-drag"] = STATED_DRAG
-    climb_sd = GUESSED_CLIMB if "climb" in sized.guessed else STATED_CLIMB
+        spreads["zero-lift-drag"] = STATED_DRAG_LOG_SD
+    climb_sd = GUESSED_CLIMB_SD_RAD if "climb" in sized.guessed else STATED_CLIMB_SD_RAD
     slopes = {name: _effect_of_factor(aircraft, estimated, name, sd) / sd for name, sd in spreads.items()}
     thrust_slopes = slopes.pop("thrust")
     # Change of the logarithm of the thrust per factor that keeps the climb.
     balance = {name: -slope[0] / thrust_slopes[0] for name, slope in slopes.items()}
     effects = {name: spreads[name] * (slope + balance[name] * thrust_slopes) for name, slope in slopes.items()}
     effects["climb"] = climb_sd / thrust_slopes[0] * thrust_slopes
-    # The deviation of the propulsive efficiency is the rest of the calibrated deviation of the power.
+    # The propulsive efficiency gets the part of the calibrated deviation of the power that no other factor explains.
     other_power = math.hypot(*(effect[3] for name, effect in effects.items() if name != "drive-power"))
     calibrated_power = _calibrated_power_sd(sized, math.exp(estimated[3]), spreads["zero-lift-drag"])
     drive_power = math.sqrt(max((0.3 * calibrated_power) ** 2, calibrated_power**2 - other_power**2))
@@ -334,7 +337,7 @@ def _make_uncertainty(sized: SizedAircraft, aircraft: Aircraft) -> tuple[Uncerta
     spreads["drive-power"] *= drive_scale
     effects["drive-power"] *= drive_scale
     total_climb_sd, descent_sd, top_speed_sd, power_sd = np.linalg.norm(list(effects.values()), axis=0).tolist()
-    # The sheet states that the aircraft flies level at cruise speed; this limits the deviation of the top speed.
+    # The aircraft flies level at the cruise speed of the sheet, which limits the deviation of the top speed.
     top_speed_sd = min(top_speed_sd, max(0.0, float(estimated[2]) - aircraft.airspeed) / UNDECIDED_SIGMAS)
     balance_sds = [balance[name] * spreads[name] for name in slopes]
     spreads["thrust"] = math.hypot(climb_sd / thrust_slopes[0], *balance_sds)
@@ -389,7 +392,7 @@ def _calibrated_power_sd(sized: SizedAircraft, power: float, min_drag_sd: float)
 
 
 def _performance_vector(aircraft: Aircraft, properties: tuple[tuple[str, float], ...] = ()) -> Floats:
-    """Return (4,): climb angle (rad), descent angle (rad), top speed (m/s), log of cruise power (W).
+    """Compute climb angle (rad), descent angle (rad), top speed (m/s) and log of cruise power (W), (4,).
 
     The angles are the steepest flight path angles at cruise speed, negative in descent.  The cruise power is the power
     in level flight at cruise speed.  A value is NaN if the aircraft cannot be trimmed there.
@@ -446,9 +449,9 @@ def factor_effect(increased: Floats, decreased: Floats, estimated: Floats) -> Fl
 # Write the folder.
 
 # Minimum airspeed that guidance may use, as a ratio to the stall speed.
-MIN_SPEED = 1.12
+MIN_GUIDANCE_SPEED_RATIO = 1.12
 # Maximum airspeed that guidance may use, as a ratio to the maximum level airspeed.
-MAX_SPEED = 0.95
+MAX_GUIDANCE_SPEED_RATIO = 0.95
 # Maximum pitch angle of a new aircraft, degrees.
 _MAX_PITCH_DEG = 25.0
 
@@ -457,7 +460,8 @@ _MAX_PITCH_DEG = 25.0
 class Performance:
     """Trim points of the model at altitude `AMSL`.
 
-    They are at cruise speed, and in the slowest and fastest level flight.
+    level, climb, idle: level flight, steepest climb at full throttle and descent at idle, all at cruise speed.
+    slowest, fastest: slowest and fastest level flight.
     """
 
     level: Trim
@@ -482,14 +486,14 @@ def make_data_sheet_folder(
     parameters: file of ArduPlane's or PX4's parameters, which replace missing values of the sheet.
     sized: aircraft sized from the sheet as another class of aircraft; None for the default class of the layout.
     overwrite: True replaces the folder of an aircraft.
-    Raises FlightError, in one line with the allowed range, for a sheet outside the range of small aircraft, a folder
-    that exists, and an aircraft that cannot be made to fly; ParameterError for a file that cannot be read; OSError.
+    Raises FlightError for a sheet outside the range of small aircraft, a folder that exists, and an aircraft that
+    cannot fly; ParameterError for a parameter file that cannot be read; OSError.
     """
     target = check_new_folder(folder, overwrite=overwrite)
-    parameter_values = StatedParameters({}, {}) if parameters is None else stated_parameters(parameters)
+    parameter_values = AircraftParameters({}, {}) if parameters is None else read_aircraft_parameters(parameters)
     numbers = {field: getattr(sheet, field) / RANGES[field][4] for field in _SHEET_FIELDS.values()}
     readme_lines = _parameter_lines(parameter_values, overridden_texts(numbers, parameter_values))
-    # What the sheet states applies, in the autopilot's parameters, too.
+    # A value that the sheet states replaces the autopilot's parameter.
     is_overridden = {name: bool(getattr(sheet, _SHEET_FIELDS[name])) for name in _SETTINGS}
     file_parameters = {name: value for name, value in parameter_values.values.items() if not is_overridden.get(name)}
     if sized is None:
@@ -511,14 +515,14 @@ def _check_required_numbers(sheet: DataSheet) -> None:
             raise FlightError.of_argument(name, None, allowed, shown="")
 
 
-def _parameter_lines(stated: StatedParameters, overridden: Sequence[str]) -> list[str]:
+def _parameter_lines(stated: AircraftParameters, overridden: Sequence[str]) -> list[str]:
     """Return lines of ``README.md`` on the values of a parameter file; [] without such values.
 
     overridden: texts on the parameters that the data sheet overrides.
     """
 
     def is_used(text: str) -> bool:
-        """Return True if the data sheet does not override a parameter."""
+        """Return True if the data sheet does not override the parameter with this text."""
         return not any(overridden_text.startswith(f"{text} (") for overridden_text in overridden)
 
     used_texts = list(filter(is_used, stated.texts.values()))
@@ -526,7 +530,9 @@ def _parameter_lines(stated: StatedParameters, overridden: Sequence[str]) -> lis
     if used_texts:
         lines = [f"From the parameter file: {', '.join(used_texts)}.", *_climb_lines(stated)]
     if overridden:
-        lines.append(f"Not used of the parameter file, because the data sheet states it: {', '.join(overridden)}.")
+        lines.append(
+            f"Not used from the parameter file, because the data sheet states these values: {', '.join(overridden)}."
+        )
     return ["", *lines] if lines else []
 
 
@@ -553,13 +559,13 @@ def _file_texts(
     performance = measure_performance(draft_fdm, aircraft)
     draft_fdm.apply_trim(performance.level.vector())
     _check_endurance(aircraft, float(draft_fdm.read().power))
-    # At the stall the propeller carries part of the weight.  If the model could fly slower, the sheet's stall speed
-    # applies.
+    # With the thrust of its propeller, the model may fly slower than the stall speed of the sheet.  The higher of the
+    # two speeds is used.
     stall_speed = max(
         sheet.stall, math.ceil(10.0 * performance.slowest.airspeed * math.sqrt(SHEET_DENSITY / SEA_LEVEL)) / 10.0
     )
-    min_airspeed = min(max(stall_speed, MIN_SPEED * stall_speed), sheet.cruise)
-    max_airspeed = max(sheet.cruise, MAX_SPEED * performance.fastest.airspeed)
+    min_airspeed = min(max(stall_speed, MIN_GUIDANCE_SPEED_RATIO * stall_speed), sheet.cruise)
+    max_airspeed = max(sheet.cruise, MAX_GUIDANCE_SPEED_RATIO * performance.fastest.airspeed)
     metadata = _metadata_text(sized, stall_speed, round(min_airspeed, 1), math.floor(10.0 * max_airspeed) / 10.0)
     (folder / f"{name}.toml").write_text(metadata, encoding="utf-8")
     aircraft = read_aircraft(folder)
@@ -588,8 +594,8 @@ def _check_endurance(aircraft: Aircraft, power: float) -> None:
         return
     volts, watt_hours = aircraft.battery_voltage, aircraft.battery_energy / 3600.0
     allowed = (
-        f"level flight at {aircraft.airspeed:g} m/s draws {power / volts:.0f} A and empties it in"
-        f" {aircraft.battery_energy / power:.0f} s: expected at least {_MIN_ENDURANCE_S:g} s"
+        f"level flight at {aircraft.airspeed:g} m/s draws {power / volts:.0f} A and empties the battery"
+        f" in {aircraft.battery_energy / power:.0f} s; expected at least {_MIN_ENDURANCE_S:g} s"
     )
     raise FlightError.of_argument("battery", watt_hours, allowed, shown=f"{volts:g} V, {watt_hours:.3g} Wh")
 
@@ -602,7 +608,9 @@ def measure_performance(fdm: Simulator, aircraft: Aircraft) -> Performance:
     cruise = aircraft.airspeed
     level = steady_flight(fdm, cruise, AMSL)
     if level is None:
-        raise FlightError.of_argument("cruise", cruise, "no level flight there", shown=f"{cruise:g} m/s")
+        raise FlightError.of_argument(
+            "cruise", cruise, "the model has no level flight at this airspeed", shown=f"{cruise:g} m/s"
+        )
     trims = {
         "climb": full_throttle_climb(fdm, cruise, AMSL, level),
         "idle": idle_descent(fdm, cruise, AMSL, level),
@@ -611,10 +619,16 @@ def measure_performance(fdm: Simulator, aircraft: Aircraft) -> Performance:
     }
     for name, trim in trims.items():
         if trim is None:
-            argument = {"climb": "climb", "idle": "cruise", "slowest": "stall", "fastest": "top"}[name]
+            argument, condition = {
+                "climb": ("climb", "a climb at full throttle"),
+                "idle": ("cruise", "a descent at idle"),
+                "slowest": ("stall", "the slowest level flight"),
+                "fastest": ("top", "the fastest level flight"),
+            }[name]
             option, unit, low, high, _ = RANGES[argument]
             allowed = (
-                f"the model of this sheet has no trim point ({name}): state another value, {low:g}..{high:g} {unit}"
+                f"the model of this data sheet cannot be trimmed for {condition}; state another value,"
+                f" {low:g}..{high:g} {unit}"
             )
             raise FlightError.of_argument(option, None, allowed, shown="")
     return Performance(level, **{name: trim for name, trim in trims.items() if trim is not None})
@@ -629,7 +643,7 @@ def _metadata_text(sized: SizedAircraft, stall: float, min_airspeed: float, max_
         if sheet.burns_fuel
         else f"battery_v = {sheet.volts:.6g}\nbattery_wh = {sheet.energy / 3600.0:.6g}"
     )
-    return f"""# What planner, guidance and verdict need to know of the aircraft; README.md says what was guessed of it.
+    return f"""# Values of the aircraft for planner, guidance and verdict; README.md lists the guessed values.
 
 title = "{numbers.title.replace(chr(34), "'")}, from a data sheet"
 
@@ -703,17 +717,17 @@ def arduplane_parameters_text(
         "PTCH_RATE_I": round(0.4 * pitch_gain, 3),
         "PTCH_RATE_D": 0,
     }
-    replacing = {name: value for name, value in file_parameters.items() if name in values}
+    used_file_parameters = {name: value for name, value in file_parameters.items() if name in values}
     lines = [
         "# ArduPlane's parameters for this aircraft, where they differ from ArduPlane's own defaults.",
         "# Speeds are equivalent airspeeds, m/s; angles in degrees.  A file given with --params comes on top.",
-        *(f"{name} {value:g}" for name, value in (values | replacing).items()),
+        *(f"{name} {value:g}" for name, value in (values | used_file_parameters).items()),
     ]
     return "\n".join(lines) + "\n"
 
 
 def servo_text(aircraft: Aircraft, performance: Performance) -> str:
-    """Return the text of ``ardupilot.toml``: output and pulses of elevator, ailerons, throttle and rudder.
+    """Return the text of ``ardupilot.toml``: servo outputs and pulses of surfaces and throttle.
 
     Elevons and V-tails are mixed within the model.
     """
@@ -770,7 +784,7 @@ _README_ROWS = (
 def _trim_throttle_lines(file_parameters: Mapping[str, float], performance: Performance) -> list[str]:
     """Return a line of ``README.md`` if the file's TRIM_THROTTLE differs from the model's throttle.
 
-    The throttle is that of level flight.
+    Both are the throttle in level flight.
     """
     throttle = 100.0 * performance.level.throttle
     trim_throttle = file_parameters.get("TRIM_THROTTLE")
@@ -782,8 +796,8 @@ def _trim_throttle_lines(file_parameters: Mapping[str, float], performance: Perf
     ]
 
 
-def _climb_lines(stated: StatedParameters) -> list[str]:
-    """Return a line of ``README.md`` on the throttle at the file's climb rate; [] if it is full throttle."""
+def _climb_lines(stated: AircraftParameters) -> list[str]:
+    """Return a line of ``README.md`` if the file's climb rate is not at full throttle; otherwise []."""
     if not {"TECS_CLMB_MAX", "THR_MAX"} <= stated.values.keys():
         return []
     climb_name, throttle_name = (stated.texts[name].split()[0] for name in ("TECS_CLMB_MAX", "THR_MAX"))
@@ -801,7 +815,7 @@ def _performance_lines(aircraft: Aircraft, performance: Performance) -> list[str
         f"full throttle and sinks {sink:.1f} degrees without (at {AMSL:g} m). Its elevator reaches its stop at"
         f" {performance.slowest.airspeed:.1f} m/s.",
         f"Guidance flies at {aircraft.airspeed_min:g} to {aircraft.airspeed_max:g} m/s:"
-        f" up to {100.0 * MAX_SPEED:.0f} % of the fastest level flight.",
+        f" up to {100.0 * MAX_GUIDANCE_SPEED_RATIO:.0f} % of the fastest level flight.",
     ]
 
 
@@ -815,7 +829,8 @@ def _readme_text(
 ) -> str:
     """Return the text of ``README.md``: stated and guessed values, performance, uncertainties and files.
 
-    parameter_lines, throttle_lines: lines on the parameter file, and on its throttle of level flight.
+    parameter_lines: lines on the values of the parameter file.
+    throttle_lines: lines on the parameter file's throttle in level flight.
     """
     sheet, name = sized.sheet, aircraft.name
     propulsion = "burns fuel; its mass stays the same" if sheet.burns_fuel else "is electric"
@@ -841,9 +856,9 @@ def _readme_text(
         "",
         "## Uncertainties",
         "",
-        f"Standard deviations; the steepest climb's is {math.degrees(uncertainty.climb_sd):.1f} degrees, the steepest"
-        f" descent's {math.degrees(uncertainty.descent_sd):.1f} degrees, the fastest level flight's"
-        f" {uncertainty.max_speed_sd:.1f} m/s.",
+        f"The standard deviation of the steepest climb is {math.degrees(uncertainty.climb_sd):.1f} degrees, of the"
+        f" steepest descent {math.degrees(uncertainty.descent_sd):.1f} degrees, and of the fastest level flight"
+        f" {uncertainty.max_speed_sd:.1f} m/s. The model's properties have these standard deviations:",
         "",
         "| property of the model | factor on | deviation | because |",
         "|---|---|---|---|",
@@ -853,7 +868,7 @@ def _readme_text(
         lines.append(f"| `{quantity.name}` | {factor_text} | {100.0 * quantity.sd:.0f} % | {quantity.reason} |")
     lines += [
         "",
-        f"`{DRAWS_FILE}` has {DRAW_COUNT} aircraft drawn from them; a campaign flies one of them in each flight.",
+        f"`{DRAWS_FILE}` has {DRAW_COUNT} aircraft drawn from these uncertainties; a campaign uses one per flight.",
         "",
         "| file | content |",
         "|---|---|",

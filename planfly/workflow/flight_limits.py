@@ -15,7 +15,7 @@ class FlightLimits:
     megabytes: maximum size of the log, 10^6 bytes.
 
     >>> FlightLimits(megabytes=20.0).log_limit_reason(20_000_001)
-    'log limit: 20 MB are written; --max-log raises it'
+    'log limit: the log has reached 20 MB; --max-log raises the limit'
     """
 
     hours: float = MAX_HOURS
@@ -29,15 +29,14 @@ class FlightLimits:
         """Return the reason to end a flight with a log of `size` bytes, or "" if the flight may continue."""
         if size <= 1e6 * self.megabytes:
             return ""
-        return f"log limit: {self.megabytes:g} MB are written; --max-log raises it"
+        return f"log limit: the log has reached {self.megabytes:g} MB; --max-log raises the limit"
 
 
 def predicted_seconds(setup: FlightSetup) -> float:
-    """Return the predicted duration of a flight in still air, s.
+    """Predict the duration of a flight in still air, s.
 
-    This is the path length divided by the mean demanded airspeed.
-
-    The mean of the legs' airspeeds is weighted by time.
+    It is the path length divided by the mean demanded airspeed.  The mean of the legs' airspeeds is weighted by the
+    time on each leg.
 
     >>> from logs.recording.example_log import example_log
     >>> flown = example_log()
@@ -50,10 +49,7 @@ def predicted_seconds(setup: FlightSetup) -> float:
 
 
 def length_and_duration_text(setup: FlightSetup) -> str:
-    """Return the length and the predicted duration of a flight as text.
-
-    An example is "12.3 km, about 500 s in the air".
-    """
+    """Return the length and the predicted duration of a flight, such as "12.3 km, about 500 s in the air"."""
     seconds = predicted_seconds(setup)
     time = f"{seconds:.0f} s" if seconds < 120.0 else f"{seconds / 60.0:.0f} min"
     if seconds >= 2.0 * 3600.0:

@@ -11,7 +11,7 @@ import numpy as np
 
 from aircraft.path_limits import Limits
 from flight.autopilots.autopilot import Autopilot
-from flight.autopilots.catalog import autopilot_of_log
+from flight.autopilots.catalog import autopilot_from_log
 from flight.autopilots.parameter_origin import TITLES
 from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from flight.dynamics.envelope_tables import load_envelope
@@ -80,6 +80,7 @@ class ImportedFlight:
         return self.setup.imported_log is not None and self.setup.imported_log.damage.lossy
 
     def __repr__(self) -> str:
+        """Describe the flight in a line: scenario, end, track and verdict."""
         return f"<ImportedFlight {self.setup.scenario.name}: {self.ended}; {self.track!r}, {self.verdict!r}>"
 
     def _repr_html_(self) -> str:
@@ -105,7 +106,7 @@ def import_flight(path: Path, options: LogOptions) -> ImportedFlight:
     scenario, wind_source = _with_wind_of_log(fences.add_to_scenario(apply_options(scenario, options)), flight, options)
     aircraft_options = (options.get("aircraft"), options.get("scenario"), plan_scenario)
     aircraft_known = any(option is not None for option in aircraft_options)
-    logged_autopilot = autopilot_of_log(flight.raw.program, flight.raw.parameters, flight.raw.source)
+    logged_autopilot = autopilot_from_log(flight.raw.program, flight.raw.parameters, flight.raw.source)
     # A flight by an unknown autopilot is judged with planfly's guidance, which shows what the aircraft can fly.
     autopilot, autopilot_notes = logged_autopilot or (PlanflyGuidance(scenario.flight.steering.guidance), ())
     setup = _flight_setup(scenario, placed, mission, autopilot, flight)
@@ -156,12 +157,14 @@ def _check_plan_autopilot(path: Path, mission: Mission, program: str) -> None:
     )
     if mission.autopilot and flown_autopilot and mission.autopilot != flown_autopilot:
         allowed = f"the log {path} is from {program}; `plan` must name the mission that was flown"
-        message = f"{mission.source}: written for {TITLES[mission.autopilot]}; {allowed}"
+        message = f"{mission.source}: written for {TITLES[mission.autopilot]}, but {allowed}"
         raise MissionError(message, file=mission.source, field="autopilot", value=mission.autopilot, allowed=allowed)
 
 
 def _read_mission(path: Path, flight: LoggedFlight, options: LogOptions) -> tuple[Mission, str, Scenario | None]:
-    """Return the planned mission, a description of its source, and the scenario of its plan.
+    """Read the planned mission.
+
+    Return the mission, a description of its source, and the scenario of its plan.
 
     The scenario is None without a plan.json.
 
@@ -176,11 +179,11 @@ def _read_mission(path: Path, flight: LoggedFlight, options: LogOptions) -> tupl
         mission = mission_of_plan(plan, load_uav(scenario), str(plan_path))
         return mission, f"of {plan_path.name}", scenario
     if flight.mission is None:
-        raise LogError(f"{path}: contains no mission; `plan` names the mission that was planned", file=path)
+        raise LogError(f"{path}: contains no mission; name the planned mission with `plan`", file=path)
     logged = flight.mission
     if logged.missing is not None and len(logged.mission.items) < _MIN_ITEMS:
         problems = [missing_text(logged.missing), *logged.mission.warnings[:1]]
-        problems.append("`plan` names the mission that was planned")
+        problems.append("name the planned mission with `plan`")
         raise LogError(f"{path}: {'; '.join(problems)}", file=path)
     time_text = f", at {logged.time:.1f} s" if logged.time > 0.0 else ""
     return (
@@ -254,12 +257,11 @@ def _flight_setup(
 
 
 def _path_limits(scenario: Scenario, autopilot: Autopilot, flight: LoggedFlight, default_airspeed: float) -> Limits:
-    """Return the limits on path and speed at the cruise airspeed of the autopilot or the scenario.
+    """Return the limits on path and speed at the cruise airspeed of the logged flight.
 
-    If neither states an airspeed, the median airspeed of the log is used.  If the log does not state the autopilot's
-    bank limit, the lower limit of scenario and autopilot applies.
-
-    default_airspeed: airspeed of the aircraft, m/s, used if the log has no airspeed.
+    The cruise airspeed is (in order) the autopilot's parameter, the scenario's airspeed, the median airspeed of the
+    log, or `default_airspeed` (m/s).  The bank limit is the autopilot's parameter; without it, the lower one of the
+    scenario's and the autopilot's usual limit.
     """
     aircraft, _ = find_aircraft_and_energy(scenario)
     envelope = load_envelope(aircraft, motor_braking=scenario.flight.motor_braking)
@@ -284,7 +286,7 @@ def _sha256(path: Path) -> str:
 
 
 def _describe_gaps(flight: LoggedFlight) -> tuple[str, ...]:
-    """Describe what an incomplete log lacks: its start, its end, or positions; empty for a complete log."""
+    """Return notes on the parts that a log lacks: its start, its end, or positions; () for a complete log."""
     notes = []
     if flight.begins_in_flight:
         notes.append(f"the log begins in flight, at {flight.time[0]:.1f} s")
@@ -292,12 +294,14 @@ def _describe_gaps(flight: LoggedFlight) -> tuple[str, ...]:
         notes.append(f"the log ends in flight, at {flight.time[-1]:.1f} s")
     usual_step = float(np.median(np.diff(flight.time)))
     if usual_step > MAX_STEP_S:
-        notes.append(f"the log has a position only every {usual_step:.1f} s: the flight in between is unknown")
+        notes.append(
+            f"the log has a position only every {usual_step:.1f} s; the flight between the positions is unknown"
+        )
     return tuple(notes)
 
 
 def _describe_throttle(flight: LoggedFlight) -> tuple[str, ...]:
-    """Note that the throttle is the same in all rows, as in the log of a glider; empty if it varies."""
+    """Return a note if the throttle is the same in all rows, as in the log of a glider; () if it varies."""
     throttle = flight.raw.series.get("throttle")
     if throttle is None or len(throttle.values) < 2 or np.ptp(throttle.values) > 0.0:
         return ()
@@ -305,19 +309,22 @@ def _describe_throttle(flight: LoggedFlight) -> tuple[str, ...]:
 
 
 def _describe_other_flights(flight: LoggedFlight) -> tuple[str, ...]:
-    """Note the other flights in the log; empty if there are none."""
+    """Return a note on the other flights in the log; () if there are none."""
     if flight.count == 1:
         return ()
     other_flights = ", ".join(
-        f"at {start:.0f} s ({mission_time:.0f} s along its mission)" for start, mission_time in flight.others
+        f"at {start:.0f} s (followed a mission for {mission_time:.0f} s)" for start, mission_time in flight.others
     )
-    return (f"flight {flight.number} of {flight.count} is judged; the others began {other_flights} (--flight N)",)
+    return (
+        f"flight {flight.number} of {flight.count} is judged; the others began {other_flights}. --flight N judges"
+        " another flight",
+    )
 
 
 def _describe_mission_change(flight: LoggedFlight, mission: Mission, options: LogOptions) -> tuple[str, ...]:
-    """Note the difference between the log's mission and the named plan.
+    """Return a note on the differences between the log's mission and the named plan.
 
-    The result is empty if they agree or no plan is named.
+    Return () if they agree, if no plan is named, or if the log contains no mission.
     """
     if options.get("plan") is None or flight.mission is None:
         return ()
@@ -380,11 +387,11 @@ def fly_again(
     advance: Advance,
     max_stretches: int = 9,
 ) -> tuple[Reflight, ...]:
-    """Simulate each sequence of followed legs in the wind of the log.
+    """Simulate each sequence of followed legs in the wind of the log, and compare it with the log.
 
-    Returns the comparisons, longest first.
+    Return the comparisons, the longest sequence first.
 
-    setup: setup of the imported flight, with its source.
+    setup: setup of the imported flight, with `imported_log`.
     aircraft: aircraft of the simulated flight; None for the setup's aircraft.
     turbulence: turbulence of the simulated flight; None for the scenario's turbulence.
     max_stretches: maximum number of sequences; if there are more, the longest are flown.
@@ -420,12 +427,10 @@ class DrawnFlight:
 def fly_draws(
     setup: FlightSetup, track: Track, aircraft: str, draws: Sequence[DrawnFlight], advance: Advance
 ) -> tuple[Reflight, ...]:
-    """Simulate the longest sequence of followed legs once for each draw.
+    """Simulate the longest sequence of followed legs once per draw; return the comparisons with the log.
 
-    Returns the comparisons with the log.
-
-    A draw is a sampled variant of the aircraft in a sampled wind.  A draw is left out if the aircraft cannot start with
-    it, or flies none of the legs.
+    A draw is a sampled variant of the aircraft in a sampled wind.  A draw is left out if its aircraft cannot start or
+    flies none of the legs.
 
     Raises LogError for a flight that followed no part of its mission, or if no draw flies.
     """
@@ -433,7 +438,7 @@ def fly_draws(
     legs = _followed_legs(setup, track)[0]
     flights = []
     for number, draw in enumerate(draws, 1):
-        # A draw may have no steady flight at the start, or leave it within a row.
+        # The aircraft of a draw may have no steady flight at the start, or lose it at once.
         with contextlib.suppress(StartError, LogError):
             flights.append(_refly_followed_legs(setup, legs, aircraft, draw.turbulence, None, draw))
         advance(number, len(draws), f"flight {number} of {len(draws)}")
@@ -445,16 +450,15 @@ def fly_draws(
 
 
 def start_after_takeoff(setup: FlightSetup, track: Track) -> FlightSetup:
-    """Return a setup whose mission begins in flight, at the take-off's altitude.
+    """Replace the take-off of a mission by a waypoint where the flight reached the take-off's altitude.
 
-    It begins where the first segment of the flight reached this altitude.
-
-    The autopilot chooses the course of a take-off itself, and the model's flight starts in the air.  The setup is
-    returned unchanged if the mission has no take-off, or if the segment never reached this altitude.
+    A model's flight starts in the air, and a mission does not state the course of its take-off: the autopilot chooses
+    it.  The setup is returned unchanged if the mission has no take-off, or if the first segment of the flight did not
+    reach this altitude.
     """
     imported_log, route, mission, scenario = setup.imported_log, setup.route, setup.mission, setup.scenario
-    first = next((item for item in mission.items if item.seq == route.items[0]), None)
-    if imported_log is None or not imported_log.stretches or first is None or first.command not in TAKEOFFS:
+    first_item = next((item for item in mission.items if item.seq == route.items[0]), None)
+    if imported_log is None or not imported_log.stretches or first_item is None or first_item.command not in TAKEOFFS:
         return setup
     stretch, *later_stretches = imported_log.stretches
     is_inside = (track.time >= stretch.start) & (track.time <= stretch.end)
@@ -463,10 +467,15 @@ def start_after_takeoff(setup: FlightSetup, track: Track) -> FlightSetup:
         return setup
     east, north, up = track.position[rows[0]].tolist()
     lat_deg, lon_deg = to_geo(scenario.origin, east, north)
-    start = replace(
-        first, command=Command.NAV_WAYPOINT, frame=Frame.GLOBAL, lat_deg=float(lat_deg), lon_deg=float(lon_deg), alt=up
+    start_item = replace(
+        first_item,
+        command=Command.NAV_WAYPOINT,
+        frame=Frame.GLOBAL,
+        lat_deg=float(lat_deg),
+        lon_deg=float(lon_deg),
+        alt=up,
     )
-    items = tuple(start if item.seq == first.seq else item for item in mission.items)
+    items = tuple(start_item if item.seq == first_item.seq else item for item in mission.items)
     mission = replace(mission, items=items)
     placed = place_stops(mission, scenario.origin, scenario.terrain, vertical_legs=True)
     return replace(
@@ -545,5 +554,7 @@ def _followed_legs(setup: FlightSetup, track: Track) -> list[FlownLegs]:
     stretch_legs = [legs for stretch in stretches if (legs := flown_legs(setup, track, stretch)) is not None]
     if not stretch_legs:
         name = "the log" if imported_log is None else imported_log.file
-        raise LogError(f"{name}: no leg of its mission was flown, so there is nothing to fly again", file=name)
+        raise LogError(
+            f"{name}: the flight followed no leg of its mission, so there is nothing to fly again", file=name
+        )
     return sorted(stretch_legs, key=lambda legs: legs.first - legs.last)

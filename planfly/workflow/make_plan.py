@@ -59,10 +59,10 @@ def make_plan(
     def complete_plan(plan: Plan, search: Search) -> Plan:
         """Make a plan safe in gusts and in local wind, by other searches if necessary."""
 
-        def search_for(other_airframe: Uav) -> Plan:
+        def search_for(other_uav: Uav) -> Plan:
             """Search for a plan with another UAV, and make it safe in gusts."""
-            other_plan = search(plan.scenario, other_airframe.limits.with_margin())
-            return _complete_in_gusts(other_plan, other_airframe, search)
+            other_plan = search(plan.scenario, other_uav.limits.with_margin())
+            return _complete_in_gusts(other_plan, other_uav, search)
 
         return ensure_local_wind(_complete_in_gusts(plan, uav, search), uav, search_for)
 
@@ -81,9 +81,9 @@ def make_plan(
         )
         return _add_ground_phases(new_plan, uav, old_plan, continues=continues)
 
-    def search(world: Scenario, search_limits: Limits) -> Plan:
+    def search(searched_scenario: Scenario, search_limits: Limits) -> Plan:
         """Plan a path within limits by the chosen algorithm."""
-        return plan_path(world, search_limits, seed=seed, algorithm=algorithm, progress=advance, stop=stop)
+        return plan_path(searched_scenario, search_limits, seed=seed, algorithm=algorithm, progress=advance, stop=stop)
 
     searches = SharedBudget(search)
     plan = searches.with_total_evaluations(complete_plan(searches(scenario, limits), searches))
@@ -95,7 +95,9 @@ def _complete_in_gusts(plan: Plan, uav: Uav, search: Search) -> Plan:
 
     def limit_orbits(candidate: Plan, search_limits: Limits) -> Plan:
         """Return a plan whose waypoints are few enough to avoid orbits in gusts."""
-        return limit_waypoint_orbits(candidate, uav, lambda world: search(world, search_limits), search_limits)
+        return limit_waypoint_orbits(
+            candidate, uav, lambda other_scenario: search(other_scenario, search_limits), search_limits
+        )
 
     def search_within(search_limits: Limits) -> Plan:
         """Plan a path within limits, with few enough waypoints to avoid orbits in gusts."""
@@ -105,10 +107,7 @@ def _complete_in_gusts(plan: Plan, uav: Uav, search: Search) -> Plan:
 
 
 def make_given_plan(scenario: Scenario, uav: Uav, seed: int, waypoints: Floats) -> Plan:
-    """Return the plan of given waypoints (w, 3), m, without a search.
-
-    It is certified by all checks of `make_plan`.
-    """
+    """Make a plan from given waypoints (w, 3), m, and certify it by all checks of `make_plan`."""
     return finish_plan(
         certify_waypoints(scenario, uav.limits.with_margin(), waypoints, seed=seed), uav, keeps_waypoints=True
     )
@@ -117,17 +116,18 @@ def make_given_plan(scenario: Scenario, uav: Uav, seed: int, waypoints: Floats) 
 def finish_plan(plan: Plan, uav: Uav, *, continues: bool = False, keeps_waypoints: bool = False) -> Plan:
     """Complete a plan without another search, by the steps that `make_plan` takes after its search.
 
-    keeps_waypoints: see `limit_waypoint_orbits`.
+    continues: True if the mission continues beyond the destination of the plan.
+    keeps_waypoints: True to keep the waypoints of the plan even if gusts make orbits at them too likely.
     """
     limited_plan = limit_waypoint_orbits(plan, uav, keeps_waypoints=keeps_waypoints)
     return _add_ground_phases(ensure_altitude_margin(limited_plan, uav), uav, continues=continues)
 
 
 def _add_ground_phases(plan: Plan, uav: Uav, old_plan: Plan | None = None, *, continues: bool) -> Plan:
-    """Return a plan with departure and approach.
+    """Add departure and approach to a plan, and complete its certificate.
 
-    The certificate of the plan also names the hazards near its final loiter, and slopes and turns that cannot be flown
-    in the local wind.
+    The certificate then names the hazards near the final loiter, and the slopes and turns that cannot be flown in the
+    local wind.
 
     old_plan: the plan being flown, or None.
     continues: True if the mission continues beyond the destination, so that there is no final loiter.
@@ -139,6 +139,7 @@ def _add_ground_phases(plan: Plan, uav: Uav, old_plan: Plan | None = None, *, co
     loiter_hazards = end_loiter_hazards(route_requirements(setup))
     if loiter_hazards is None or not loiter_hazards[1]:
         return plan
-    loiter_text = f"{uav.autopilot.title} circles about the destination, up to {loiter_hazards[0]:.0f} m from it"
-    problems = (*plan.certificate.problems, f"{loiter_text}: {', '.join(loiter_hazards[1])}")
+    max_distance, hazard_texts = loiter_hazards
+    loiter_text = f"{uav.autopilot.title} circles around the destination, up to {max_distance:.0f} m from it"
+    problems = (*plan.certificate.problems, f"{loiter_text}: {', '.join(hazard_texts)}")
     return replace(plan, certificate=replace(plan.certificate, problems=problems))

@@ -117,7 +117,9 @@ class MissionContext:
     def with_updated_radii(self, mission: Mission, index: int) -> Mission:
         """Adapt the acceptance radii near a moved item to the new turns, and return the mission.
 
-        A mission that planfly did not plan keeps its radii. index: index of the moved item.
+        A mission that planfly did not plan keeps its radii.
+
+        index: index of the moved item in the mission.
         """
         if not self.planned:
             return mission
@@ -129,7 +131,8 @@ class MissionContext:
         radii = acceptance_radii(self.scenario, points, uav.airspeed, uav.max_bank, uav.limits.tracking)
         items = list(mission.items)
         for k, radius in zip(nearby, radii.tolist(), strict=True):
-            # The turn at an end of the chain is not known, unless it is an end of the mission, which has no turn.
+            # The turn at the first and last nearby item is unknown, except at an end of the mission, where there is no
+            # turn.
             has_known_turn = k not in (nearby[0], nearby[-1]) or k in (item_indices[0], item_indices[-1])
             if has_known_turn and items[k].command == Command.NAV_WAYPOINT:
                 params = items[k].params

@@ -291,7 +291,7 @@ def with_landing_parameters(autopilot: Autopilot, mission: Mission) -> Autopilot
     """
     if all(item.command != Command.DO_LAND_START for item in mission.items):
         return autopilot
-    values = autopilot.returns.parameters_of(RtlSettings(lands=True))
+    values = autopilot.returns.make_parameters(RtlSettings(lands=True))
     return autopilot.with_parameters("assumed", **values) if values else autopilot
 
 

@@ -81,7 +81,7 @@ PREDICT_FILES = ("predict.html", "predict.png")
 def check_output_file(path: Path, overwrite: bool, source: Path | None = None) -> None:
     """Raise PlanflyError if an output file cannot or must not be written.
 
-    These are the input file, a folder, a file in a missing folder, and an existing file without `overwrite`.
+    The path must not be the input file, a folder, or a file in a missing folder; without `overwrite` it must not exist.
 
     source: the input file, or None.
     """
@@ -98,12 +98,12 @@ def check_output_file(path: Path, overwrite: bool, source: Path | None = None) -
 def check_output_folder(folder: Path, overwrite: bool) -> None:
     """Raise PlanflyError if an output folder cannot or must not be written.
 
-    These are a file, a path below a file, a folder that cannot be made, and a non-empty folder without `overwrite`.
+    The path must not be a file or below a file, and the folder must be writable; without `overwrite` it must be empty.
     """
     existing = next(path for path in (folder.absolute(), *folder.absolute().parents) if path.exists())
     if not existing.is_dir():
-        where = folder if existing == folder.absolute() else existing
-        raise PlanflyError(f"{where}: is a file; expected a folder", file=where)
+        file_path = folder if existing == folder.absolute() else existing
+        raise PlanflyError(f"{file_path}: is a file; expected a folder", file=file_path)
     if not os.access(existing, os.W_OK | os.X_OK):
         raise PlanflyError(f"{folder}: cannot be written: {existing} is not writable", file=folder)
     if not overwrite and folder.is_dir() and any(folder.iterdir()):
@@ -116,7 +116,7 @@ def prepare_folder(folder: Path, files: tuple[str, ...] = RUN_FILES) -> None:
     rounds = sorted(folder.glob("round-[0-9]*")) if files is RUN_FILES else []
     if files is RUN_FILES:
         (folder / "rounds.json").unlink(missing_ok=True)
-    # Pictures that `planfly report --pictures` drew of an earlier run are old, too.
+    # The pictures that `planfly report --pictures` drew from an earlier run are old results, too.
     pictures = [f"{name}.png" for name in REPORT_FIGURES] if files is RUN_FILES else []
     for directory in (folder, *rounds):
         for name in (*files, *pictures):
@@ -174,9 +174,10 @@ def expand_path_pattern(target: str | Path, name: str, seed: int) -> Path:
 def file_target(
     target: str | Path, name: str, seed: int, *, suffix: str, overwrite: bool, source: Path | None = None
 ) -> Path:
-    """Return the path of the output file, with placeholders replaced, after `check_output_file`.
+    """Replace the placeholders in the path of an output file; check the path, and return it.
 
-    A path with placeholders in a missing folder is not checked; the caller makes the folder.
+    `check_output_file` checks it.  A path with placeholders in a missing folder is not checked, because the caller
+    makes the folder.
     suffix: suffix that the file must have, because its format does not depend on its name.
     """
     path = expand_path_pattern(target, name, seed)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from aircraft.catalog import Aircraft, find_logged_aircraft
-from flight.autopilots.catalog import program_class_for
+from flight.autopilots.catalog import find_program_class
 from flight.autopilots.program import ProgramAutopilot
 from flight.dynamics.fdm import Variation
 from flight.mission.items import Mission
@@ -194,7 +194,7 @@ def fly_and_judge(
         return _judge_unflown(requirements, log, reason, reference)
     try:
         if autopilot is not None:
-            return _fly_with_program(task, setup, program_class_for(autopilot).with_model(setup.autopilot, autopilot))
+            return _fly_with_program(task, setup, find_program_class(autopilot).with_model(setup.autopilot, autopilot))
         off_nominal_flight = off_nominal or OffNominal(Variation())
         flight = Flight(setup, aircraft, off_nominal_flight.variation, start_offset=off_nominal_flight.start_offset)
         return _record_and_judge(task, requirements, flight)
@@ -231,7 +231,7 @@ def _fly_with_program(task: _FlightTask, setup: FlightSetup, program: ProgramAut
             raise
         if task.log is not None:
             program_log = task.log.with_suffix(program.log_suffix)
-            flight.keep_log(program_log)
+            flight.save_log(program_log)
             judged_flight = replace(judged_flight, autopilot_log=program_log if judged_flight.log else None)
     return judged_flight
 
@@ -242,7 +242,7 @@ def autopilot_log_path(log: Path, program: Path) -> Path:
     >>> autopilot_log_path(Path("runs/flight.mcap"), Path("arduplane")).name
     'flight.BIN'
     """
-    return log.with_suffix(program_class_for(program).log_suffix)
+    return log.with_suffix(find_program_class(program).log_suffix)
 
 
 def _record_and_judge(task: _FlightTask, requirements: RouteRequirements, flight: RunningFlight) -> FlownMission:

@@ -76,13 +76,13 @@ def find_passing_parameter(
     ):
         current = values[candidate.name]
 
-        def with_value(value: float, candidate: Candidate = candidate) -> bool:
+        def passes_with_value(value: float, candidate: Candidate = candidate) -> bool:
             """Return True if the flight passes with this value of the candidate's parameters."""
             return passes(autopilot.with_parameters(**dict.fromkeys((candidate.name, *candidate.others), value)))
 
         # Do not suggest values below the documented range.
         start = max(current, candidate.least - candidate.step)
-        passing_value = _nearest_passing_value(start, candidate.step, candidate.far, with_value)
+        passing_value = _nearest_passing_value(start, candidate.step, candidate.far, passes_with_value)
         if passing_value is not None:
             deviation = _deviation_at_failure(failed_finding, findings)
             return DecidingParameter(
@@ -138,7 +138,7 @@ def judge_airframe_flight(
 
     The flight has the same true airspeeds as a flight by ArduPlane.  ArduPlane treats airspeeds as equivalent
     airspeeds, which are higher true airspeeds at a higher altitude.
-    should_abort: see `explain_verdict`.
+    should_abort: called throughout the flight; once it returns True, the flight is aborted with TrialAborted.
     """
     airframe_route = true_airspeed_route(setup)
     trial = Trial(
@@ -160,8 +160,10 @@ def find_deciding_parameter(
     """Find an autopilot parameter that makes a failed flight pass at another value, or return None.
 
     verdict: verdict on the flight with the setup's own parameters.
-    should_abort: see `explain_verdict`.  This takes up to about twenty flights with the simulated autopilot.  For
-    the flight of an autopilot program, the result is None unless the simulated autopilot fails, too.
+    should_abort: called throughout the flights; once it returns True, they are aborted with TrialAborted.
+
+    This takes up to about twenty flights with the simulated autopilot.  For the flight of an autopilot program, the
+    result is None unless the simulated autopilot fails, too.
     """
     if setup.autopilot.parameters is None or verdict.flies:
         return None
@@ -173,7 +175,7 @@ def find_deciding_parameter(
         if simulated_verdict.flies:
             return None
         findings = simulated_verdict.findings
-    # Keep the width of the corridor for every radius that is tried.
+    # A tried acceptance radius would also change the width of the corridor: keep the width of the failed flight.
     scenario = setup.scenario
     limits = scenario.limits.model_copy(update={"corridor_m": setup.corridor})
     spec = scenario.spec.model_copy(update={"limits": limits})
@@ -187,11 +189,11 @@ def find_deciding_parameter(
     return find_passing_parameter(setup.autopilot, findings, passes)
 
 
-# Cross-track error of a simulated autopilot against the real one, as a fraction of the distance from the legs.  Nine in
-# ten corners that ArduPlane kept are within this error.
+# Cross-track error of the simulated autopilot compared with the real one, as a fraction of the distance from the legs.
+# Nine in ten corners that ArduPlane flew within the corridor are within this error.
 CROSS_TRACK_ERROR_FRACTION = 0.1
-# Altitude error of a simulated autopilot against the real one, m.  The minimum clearances of 20 ArduPlane climbs are
-# within this error.
+# Altitude error of the simulated autopilot compared with the real one, m.  The minimum clearances of 20 ArduPlane
+# climbs are within this error.
 ALTITUDE_ERROR_M = 1.2
 
 
@@ -200,7 +202,7 @@ def passes_with_margin(trial_findings: Sequence[Finding], failed_findings: Seque
 
     trial_findings: findings of a flight with another parameter value.
     failed_findings: findings of the flight that failed.
-    A margin is required in the lateral distance from the legs and in the height above ground.
+    Margins are required for the lateral distance from the legs and for the height above ground.
     """
     failed_keys = {(finding.rule, finding.place) for finding in failed_findings if finding.ok is False}
     for finding in trial_findings:
@@ -233,17 +235,16 @@ def explain_verdict(
     The reference flights do not change the verdict's answer.
 
     requirements: the route requirements of the flown setup.
-    is_requested: True if the reference flight is flown however long it is.  A flight of planfly's own guidance has no
-    reference flight, but its suggestions are tried.  A flight that is too long for
-    `planfly.workflow.trial_flight.max_explaining_flights`, or has more than `MAX_TRIED_LEGS` legs, has none either
-    unless it is requested.
+    is_requested: True to fly the reference flight regardless of its length.  Otherwise there is none for a flight that
+        is too long for `planfly.workflow.trial_flight.max_explaining_flights`, or has more than `MAX_TRIED_LEGS` legs.
+        A flight by planfly's own guidance never has a reference flight, but its suggestions are tried.
     should_abort: called throughout the reference flights; once it returns True, they are aborted, and the verdict
     contains the results up to that moment.
     """
     setup = requirements.setup
     reference = ReferenceFlights(tried=() if verdict.failed else None)
     with suppress(TrialAborted):
-        # planfly's guidance does not return by itself, so that its flight does not explain such a return.
+        # If only the autopilot's return fails, a flight with planfly's guidance explains nothing: it never returns.
         is_only_return = bool(verdict.failed) and all(finding.rule == "return" for finding in verdict.failed)
         is_affordable = is_requested or (max_explaining_flights(setup) > 1 and requirements.legs <= MAX_TRIED_LEGS)
         if setup.autopilot.answer_name != "airframe" and not is_only_return and is_affordable:

@@ -2,8 +2,8 @@
 
 A suggestion is applied to the mission, judged by geometry, and flown if the verdict is on a flight that reached the
 place of the finding.  It passes if its finding is then ok, and every finding that passed before still passes.  A step
-that is too small, such as a height, is enlarged by the missing part.  A suggestion that passed states the moves of the
-items, and the findings that remain open on a part of the mission that was not flown before.
+that is too small, such as a change of height, is enlarged by the missing part.  A suggestion that passed states the
+moves of the items, and the findings that fail or are undecided on a part of the mission that was not flown before.
 """
 
 import math
@@ -26,7 +26,6 @@ from logs.verdict.places import (
     Suggestion,
     TriedSuggestions,
 )
-from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.rules.registry import with_passing_suggestions
 from logs.verdict.tolerances import HEIGHT_ERROR_LIMIT_M
 from logs.verdict.trials import first_that_passes
@@ -59,7 +58,9 @@ _GROWTH_M = 2.0
 
 
 def finding_key(finding: Finding) -> tuple[str, str, int | None, str]:
-    """Return what identifies a finding before and after a change: its rule, and the kind, index and name of its place.
+    """Return a key that identifies a finding before and after a change of the mission.
+
+    The key is the rule, and the kind, index and name of the place.
 
     Item numbers are not part of the key, because a change may shift them.
     """
@@ -80,10 +81,10 @@ def _is_undecided(finding: Finding) -> bool:
 
 
 def _newly_open_findings(old_verdict: Verdict, new_verdict: Verdict) -> list[tuple[Finding | None, Finding]]:
-    """Return the findings that fail or are undecided only after a change, each with the finding before.
+    """Return the findings that fail or are undecided only after a change, each with the old finding.
 
-    A finding that passed before is included if it is not judged after the change.  The finding before is None if there
-    was none.
+    The old finding is None if there was none.  A finding that passed before and is not judged after the change is
+    included.
     """
     old_findings = _worst_findings(old_verdict)
     pairs = []
@@ -94,7 +95,7 @@ def _newly_open_findings(old_verdict: Verdict, new_verdict: Verdict) -> list[tup
         elif _is_undecided(finding):
             is_new = old is None or not _is_undecided(old)
         else:
-            # That PX4 would reject a mission decides nothing for another autopilot.
+            # The rule "mission" is skipped: a rejection by PX4 does not matter for another autopilot.
             is_judged_rule = finding.rule != "mission"
             is_new = is_judged_rule and finding.ok is None and old is not None and old.ok is True
         if is_new:
@@ -103,7 +104,7 @@ def _newly_open_findings(old_verdict: Verdict, new_verdict: Verdict) -> list[tup
 
 
 def _was_unreached(old_verdict: Verdict, old_finding: Finding | None) -> bool:
-    """Return True if a finding was not, or only partly, judged because the flight ended early."""
+    """Return True if a finding could not be fully judged before a change, because the flight ended early."""
     has_ended_early = old_verdict.level == "flown" and not old_verdict.complete
     return has_ended_early and (old_finding is None or old_finding.ok is None or old_finding.place == FLIGHT)
 
@@ -123,8 +124,8 @@ def worsened_findings(old_verdict: Verdict, new_verdict: Verdict) -> list[Findin
 def remaining_findings(old_verdict: Verdict, new_verdict: Verdict) -> tuple[RemainingFinding, ...]:
     """Return the findings of a changed mission that the verdict before the change does not name.
 
-    They fail or are undecided after the change.  Before, they either were not judged because the flight ended early, or
-    failed and are only undecided after the change.
+    They fail or are undecided after the change.  Before it, they were not judged because the flight ended early, or
+    they failed and are now only undecided.
     """
     added_keys = set(map(finding_key, worsened_findings(old_verdict, new_verdict)))
     return tuple(
@@ -141,9 +142,9 @@ def is_improved(old_verdict: Verdict, new_verdict: Verdict, finding: Finding) ->
 
 
 def is_passed(old_verdict: Verdict, new_verdict: Verdict, finding: Finding) -> bool:
-    """Return True if a finding passes or disappears by a change, and no passed finding becomes open.
+    """Return True if a change makes a finding pass or disappear, and makes no other finding worse.
 
-    A slope passes only if the flown altitude is nearer to the leg than before.
+    A slope passes only if the altitude error on its leg becomes clearly smaller.
     """
     new_finding = _worst_findings(new_verdict).get(finding_key(finding))
     if new_finding is not None and (new_finding.ok is not True or _keeps_height_error(finding, new_finding)):
@@ -158,11 +159,6 @@ def _keeps_height_error(old_finding: Finding, new_finding: Finding) -> bool:
         for finding in (old_finding, new_finding)
     )
     return new_error > max(HEIGHT_ERROR_LIMIT_M, MAX_HEIGHT_ERROR_SHARE * old_error)
-
-
-def _finding_text(finding: Finding) -> str:
-    """Return place, rule and reason of a finding in a line."""
-    return f"{finding.where}: {RULE_WORDS[finding.rule].word}: {finding.brief or finding.reason}"
 
 
 @dataclass(frozen=True)
@@ -254,6 +250,7 @@ class SuggestionTrials:
     _trials: dict[object, Trial] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        """Prepare the trial of the unchanged mission, and count the flights that are allowed."""
         self._current_trial = Trial(self.judged.setup, self.context.uav.aircraft)
         # One flight less: the reference flight with planfly's guidance.
         self._flights_left = min(MAX_TRIAL_FLIGHTS, max_explaining_flights(self.judged.setup) - 1)
@@ -293,7 +290,10 @@ class SuggestionTrials:
         ]
 
     def try_suggestion(self, finding: Finding, number: int) -> PassedTrial | None:
-        """Return a passing trial of a suggestion, enlarged if necessary, or None."""
+        """Try a suggestion of a finding, enlarged if necessary; return the passed trial, or None.
+
+        number: index of the suggestion among those of the finding.
+        """
         candidates = islice(self._growing_suggestions(finding, finding.suggestions[number]), _MAX_STEPS)
         passed_candidate = first_that_passes(candidates, lambda candidate: self._passes_trial(finding, candidate[1]))
         if passed_candidate is None:
@@ -337,16 +337,16 @@ class SuggestionTrials:
         return is_beyond_end and finding_key(finding) in map(finding_key, self._current_trial.geometry_verdict.failed)
 
     def _compared_verdicts(self, trial: Trial, finding: Finding) -> tuple[Verdict, Verdict]:
-        """Return the verdicts before and after a trial's change, on flights or by geometry."""
+        """Return the verdicts before and after a trial's change: both on flights, or both by geometry."""
         if self._is_tried_by_flight(finding):
             return self.judged.verdict, trial.flight_verdict
         return self._current_trial.geometry_verdict, trial.geometry_verdict
 
     def _growing_suggestions(self, finding: Finding, suggestion: Suggestion) -> Iterator[tuple[Suggestion, Trial]]:
-        """Yield a suggestion and then larger suggestions, each with its trial.
+        """Yield a suggestion and then larger and larger suggestions, each with its trial.
 
-        Each suggestion is applied to the unchanged mission in one step, as a user would apply it. The last is the one
-        that cannot be enlarged, or whose enlargement cannot be applied. Raises TrialAborted.
+        Each suggestion is applied to the unchanged mission in one step, as a user would apply it. The series ends when
+        a suggestion cannot be enlarged or applied. Raises TrialAborted.
         """
         while True:
             if self.should_abort():
@@ -368,7 +368,7 @@ class SuggestionTrials:
             suggestion = larger_suggestion
 
     def _with_present_lengths(self, suggestion: Suggestion) -> Suggestion:
-        """Return a suggestion that states present leg lengths as they are in the unchanged mission."""
+        """Return a suggestion whose current leg lengths are those of the unchanged mission."""
         runs = self.judged.requirements.runs
         return tuple(
             replace(change, current=float(runs[change.place.index]))
@@ -378,7 +378,10 @@ class SuggestionTrials:
         )
 
     def _changed_flight(self, finding: Finding, suggestion: Suggestion) -> tuple[Mission, FlightSetup]:
-        """Apply a suggestion to mission and setup; a shorter duration is tried as a larger battery."""
+        """Apply a suggestion, and return the changed mission and setup.
+
+        A shorter duration is tried as a larger battery.
+        """
         setup = replace(self.judged.setup, autopilot=self.judged.setup.autopilot.model)
         match suggestion:
             case (Change(what="battery" | "tank") as change,):

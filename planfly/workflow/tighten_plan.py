@@ -1,4 +1,4 @@
-"""Tighten the limits of a scenario by the failures of a flight, for the next round of planning.
+"""Tighten the limits of a scenario after the failures of a flight, for the next round of planning.
 
 The tightened limits apply to planning only.  Each round is judged against the original scenario.
 """
@@ -71,7 +71,7 @@ def tightening_text(change: Tightening) -> str:
         case "max_bank_deg":
             return f"flight.max_bank_deg (of the plan): {change.current:g} to {change.wanted:g}"
         case "kill_radius_m":
-            return f"kill radius of {change.name}: {change.current:g} to {change.wanted:g}"
+            return f"kill radius of {change.name}: {change.current:g} to {change.wanted:g} m"
         case "min_clearance_m" | "max_height_m":
             return f"limits.{change.what}: {change.current:g} to {change.wanted:g}"
         case "zone_margin_m":
@@ -140,7 +140,7 @@ def _tighten_slopes(spec: Spec, failed_findings: list[Finding]) -> list[Tighteni
 def _tighten_turns(spec: Spec, scenario: Scenario, failed_findings: list[Finding]) -> list[Tightening]:
     """Tighten the turns in `spec` if turns or corners failed.
 
-    They get the limit of the aircraft; if they already have it, the bank limit is lowered.
+    The limit of the scenario is replaced by the limit of the aircraft; if it already is, the bank limit is lowered.
     """
     if not any(finding.rule in ("turn", "waypoint", "corridor") for finding in failed_findings):
         return []
@@ -148,7 +148,7 @@ def _tighten_turns(spec: Spec, scenario: Scenario, failed_findings: list[Finding
     if current != "aircraft":
         _limits_table(spec)["max_turn_deg"] = "aircraft"
         return [Tightening("max_turn_deg", current, "aircraft")]
-    # Plan with larger arcs; the flight keeps its maximum bank.
+    # A lower bank limit makes the planned arcs larger; the flight keeps its maximum bank.
     bank = math.degrees(load_uav(scenario).max_bank)
     tightened = round(TIGHTENING_FACTOR * bank, 2)
     if tightened < MIN_BANK_DEG:
@@ -158,7 +158,9 @@ def _tighten_turns(spec: Spec, scenario: Scenario, failed_findings: list[Finding
 
 
 def _raise_clearance(spec: Spec, scenario: Scenario, failed_findings: list[Finding]) -> list[Tightening]:
-    """Raise the minimum clearance in `spec` by the largest shortfall of the flight; return this change in a list.
+    """Raise the minimum clearance in `spec` by the largest shortfall of the flight.
+
+    Return this change in a list.
 
     Return [] without a failed finding on the clearance; then `spec` is not changed.
     """
@@ -231,9 +233,9 @@ FlyRound = Callable[[Scenario], tuple[Verdict, bool]]
 def refine(
     scenario: Scenario, max_rounds: int, fly_round: FlyRound, keep_results: Callable[[int], None]
 ) -> tuple[Verdict, Rounds]:
-    """Plan and fly in rounds with tightened limits, until a round is flyable.
+    """Plan and fly in rounds until a round is flyable.
 
-    Each round is tightened by the failures of the round before.
+    Each round tightens the limits that the last flight violated.
 
     max_rounds: maximum number of rounds after the first.
     fly_round: function that plans in a scenario and flies; it returns the verdict, and True if the plan was flown.
@@ -266,11 +268,11 @@ def refine(
 def _next_step_remark(verdict: Verdict, was_flown: bool, is_last: bool, changes: list[Tightening]) -> str:
     """Return the remark on the step after a round: `NEXT_ROUND_REMARK` or the reason to end."""
     if verdict.flyable:
-        return "done: it flies"
+        return "done: the plan is flyable"
     if verdict.undecided:
-        return "ended: nothing failed; the aircraft is not known well enough to judge the rest"
+        return "ended: no rule failed, but the aircraft is not known well enough to judge all findings"
     if not was_flown:
-        return "ended: within these limits no feasible plan was found"
+        return "ended: no feasible plan was found within the tightened limits"
     if not changes:
-        return "ended: nothing is left to tighten; the planner finds no path that meets the failed rules"
+        return "ended: no limit can be tightened further, and the planner finds no path that meets the failed rules"
     return "ended: no rounds left" if is_last else NEXT_ROUND_REMARK

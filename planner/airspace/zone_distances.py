@@ -55,8 +55,10 @@ def zone_penetration(
 ) -> float:
     """Return the depth of the leg a-b inside zones with their margins, integrated along the leg, m x km.
 
-    sample_spacing: spacing of terrain samples (m), for levels above ground.
-    lateral_error, error_below, error_above: tracking error, m.
+    heights, to_pixel: ground heights, m, and the map from positions to their pixels.
+    sample_spacing: spacing of the ground samples for zone levels that are stated above ground, m.
+    a, b: ends of the leg, (3,) m.
+    lateral_error, error_below, error_above: tracking error to the side, below and above the leg, m.
     """
     line = segment_between(a[0], a[1], b[0], b[1])
     total, required, records = 0.0, zones.required, zones.records
@@ -104,12 +106,12 @@ def zone_penetration(
 def penetration_depth(
     records: ZoneRecords, z: int, line: MapSegment, required_distance: float
 ) -> tuple[float, float, float]:
-    """Return the depth of a line in exclusion z and its margin, and the part of the line next to the zone.
+    """Return the depth of a line in exclusion z with its margin, and the part abreast of the zone.
 
     required_distance: required distance from the zone, m.
 
     The depth is the distance by which the line would have to be shifted to be `required_distance` away from the zone,
-    m; 0 if it is far enough away. The part of the line is given by two fractions of its length.
+    m; 0 if it is far enough away. The part is given by the fractions of the line's length at its start and end.
     """
     view = view_shape(records, z, line, required_distance)
     if not view.inside and view.distance >= required_distance:
@@ -126,7 +128,7 @@ def penetration_depth(
 
 @inner
 def _inclusion_excess(records: ZoneRecords, z: int, line: MapSegment, required_distance: float) -> float:
-    """Return how far a line is outside inclusion z, or too near to its edge, integrated, m x km.
+    """Return how much a line is outside inclusion z or too close to its edge, integrated, m x km.
 
     required_distance: required distance from the edge, on the inside, m.
     """
@@ -172,6 +174,7 @@ def _sampled_altitude_band(
 ) -> AltitudeBand:
     """Return the range of altitudes of a part of the line a-b, and the range of its heights above ground.
 
+    heights, to_pixel: ground heights, m, and the map from positions to their pixels.
     sample_spacing: spacing of the ground samples, m.
     first_fraction, last_fraction: limits of the part, as fractions of the line.
 
@@ -241,7 +244,7 @@ def measure_zone_margin(
 ) -> None:
     """Fill the `ZONE_MARGIN` record for a straight piece a-b of a path.
 
-    depths: heights of the ground with the opposite sign.
+    heights, depths, to_pixel: ground heights, m, the same with the opposite sign, and the map from positions to pixels.
     lateral_error: (2,) lateral tracking error at a and b, m.
     error_below, error_above: vertical tracking error, m.
     """
@@ -344,8 +347,9 @@ def _exact_altitude_band(
     error_below: float,
     error_above: float,
 ) -> AltitudeBand:
-    """Return the ranges of altitudes and of exact heights above ground of the line a-b.
+    """Return the range of altitudes of the line a-b, and the exact range of its heights above ground.
 
+    heights, depths, to_pixel: ground heights, m, the same with the opposite sign, and the map from positions to pixels.
     lateral_error: (2,) width of the ground strip on each side of the line that is included, at a and at b, m.
     """
     band = altitude_band(a[2], b[2], error_below, error_above)

@@ -53,9 +53,9 @@ class ZoneMargins(NamedTuple):
 
 
 def add_margins(zones: Sequence[Zone], ends: Floats, terrain: Terrain | None, margins: ZoneMargins) -> ZonesWithMargins:
-    """Return zones with margins; the margin of a zone is smaller if a fixed end violates it.
+    """Return zones with their required margins, reduced where a fixed end of the path violates a margin.
 
-    ends: (k, 3) m.
+    ends: fixed ends of the path, (k, 3) m.
 
     The margin is 0 for an exclusion that contains an end, and for an inclusion that does not.
 
@@ -89,7 +89,8 @@ def _reduce_margins(
     """Reduce the margins that a fixed end violates to a fraction of the end's distance from the zone.
 
     ends: (k, 3) m.
-    ground_heights: (k,) ground heights at the ends, m.
+    ground_heights: (k,) ground heights at the ends, m; NaN if unknown.
+    required: `REQUIRED_MARGINS` records (z,), which are changed.
     """
     for z in range(required.shape[0]):
         zone, margin = records.zones[z], required[z]
@@ -100,7 +101,7 @@ def _reduce_margins(
                 margin.horizontal = min(margin.horizontal, max(0.0, -fraction * horizontal_distance))
                 margin.vertical = min(margin.vertical, max(0.0, -fraction * vertical_distance))
             elif horizontal_distance < margin.horizontal and not vertical_distance >= margin.vertical:
-                # Reduce the margin of which the larger part is available.
+                # Reduce the margin of which the end keeps the larger fraction.
                 if horizontal_distance * margin.vertical >= vertical_distance * margin.horizontal or math.isnan(
                     vertical_distance
                 ):
@@ -111,7 +112,7 @@ def _reduce_margins(
 
 @inner
 def first_exclusion_near(zones: ZonesWithMargins, west: float) -> int:
-    """Return the index of the first exclusion that may extend east of a position `west`, m.
+    """Return the index of the first exclusion that may extend east of the coordinate `west`, m.
 
     `west` is the western edge of the area that is searched for exclusions.
     """
@@ -135,8 +136,8 @@ class PlannerAirspace(NamedTuple):
     zones: exclusions and inclusions with their margins.
     max_height: maximum height above ground, inf for none.
     buffer: margin below the maximum height; start_buffer, destination_buffer: margin at the ends.
-    depths: negated heights of the ground, so that staying below the maximum height is a clearance problem as above the
-    ground.
+    depths: heights of the ground with the opposite sign. With them, staying below the maximum height is computed like
+    staying above the ground.
     """
 
     zones: ZonesWithMargins
@@ -218,7 +219,7 @@ class ShapeView(NamedTuple):
 
 @inlined
 def segment_between(ax: float, ay: float, bx: float, by: float) -> MapSegment:
-    """Return the line from a to b; a line without length gets the course north."""
+    """Return the line from (ax, ay) to (bx, by), m; a line without length gets the course north."""
     dx, dy = bx - ax, by - ay
     horizontal_length = math.sqrt(dx * dx + dy * dy)
     if horizontal_length < 1e-9:

@@ -43,7 +43,10 @@ _MAX_PIECES = math.ceil(math.pi / ARC_STEP) + 2
 
 @compiled
 def airspace_pieces(data: ProblemArrays, waypoints: Floats) -> Records:
-    """Return `AIRSPACE_PIECE` records of a path (w, 3): first its legs, then its corners."""
+    """Measure the distance to zones and the height above ground of each piece of a path (w, 3).
+
+    Return `AIRSPACE_PIECE` records, first of its legs, then of its corners.
+    """
     pieces = (
         tracked_pieces(data, waypoints) if data.tracking.has_error else _pieces_without_tracking_error(data, waypoints)
     )
@@ -74,7 +77,10 @@ def airspace_pieces(data: ProblemArrays, waypoints: Floats) -> Records:
 
 @inner
 def _pieces_without_tracking_error(data: ProblemArrays, waypoints: Floats) -> Records:
-    """Return `TRACKED_PIECE` records of a path without tracking error: its legs, then chords of its arcs."""
+    """Cut a path (w, 3) without tracking error into its legs and the chords of its arcs.
+
+    Return `TRACKED_PIECE` records, first of the legs.
+    """
     leg_count, radii = waypoints.shape[0] - 1, fly_by_radii(data, waypoints)
     pieces = np.zeros(leg_count + leg_count * _MAX_PIECES, dtype=TRACKED_PIECE)
     for i in range(leg_count):
@@ -107,16 +113,22 @@ def _pieces_without_tracking_error(data: ProblemArrays, waypoints: Floats) -> Re
 
 @inner
 def _max_height_above_ground(data: ProblemArrays, piece: Record) -> float:
-    """Return the maximum height above ground along a piece and beside it, m; NaN off the terrain."""
+    """Return the maximum height above ground that a flight may have along a piece, m; NaN off the terrain.
+
+    The flight may be above the piece and to either side of it, by the tracking error.
+    """
     dx, dy = piece.end[0] - piece.begin[0], piece.end[1] - piece.begin[1]
     horizontal_length, max_height = max(1e-9, math.hypot(dx, dy)), -math.inf
-    a, b = np.empty(3), np.empty(3)
+    offset_start, offset_end = np.empty(3), np.empty(3)
     for side in (0.0, -1.0, 1.0):
-        for end, point, lateral in ((a, piece.begin, piece.lateral_begin), (b, piece.end, piece.lateral_end)):
+        for end, point, lateral in (
+            (offset_start, piece.begin, piece.lateral_begin),
+            (offset_end, piece.end, piece.lateral_end),
+        ):
             end[0] = point[0] + side * lateral * dy / horizontal_length
             end[1] = point[1] - side * lateral * dx / horizontal_length
             end[2] = -(point[2] + piece.above)
-        negated_height, _ = segment_clearance(data.airspace.depths, data.to_pixel, a, b)
+        negated_height, _ = segment_clearance(data.airspace.depths, data.to_pixel, offset_start, offset_end)
         max_height = (
             math.nan if math.isnan(negated_height) or math.isnan(max_height) else max(max_height, -negated_height)
         )
@@ -125,7 +137,7 @@ def _max_height_above_ground(data: ProblemArrays, piece: Record) -> float:
 
 # --- Violations for the search ---
 
-# Where a leg is cut because its height lags, in lag lengths.
+# Distances from the start of a leg, in lag lengths, at which the leg is cut to follow the decay of its altitude lag.
 _LAG_CUTS = (0.0, 1.0, 2.5)
 # Lines offset from a leg by more than this (m) are tested separately.
 _MIN_OFFSET_M = 0.5
@@ -144,16 +156,14 @@ def add_airspace_violations(
     """Add a path's violations of zones and of the maximum height to a `VIOLATIONS` record, m x km.
 
     path: (w, 3) m.
-    legs: measurements of the path's legs.
-    corners: corners of the path as planned.
-    flown_corners: corners of the path as flown.
-    lags: altitude lags on the legs.
+    legs, lags: `LEG` and `HEIGHT_LAG` records of the legs.
+    corners, flown_corners: `CORNER` and `FLOWN_CORNER` records of the corners, as planned and as flown.
 
     Zone penetration is added to the field `bounds`, and height above the maximum height to the field `terrain`.
     """
     has_zones, has_max_height = data.airspace.zones.required.shape[0] > 0, data.airspace.max_height < math.inf
     required = required_headroom(data)
-    a, b = np.empty(3), np.empty(3)
+    begin, end = np.empty(3), np.empty(3)
     last_leg, across = legs.shape[0] - 1, float(data.tracking.across)
     for i in range(last_leg + 1):
         offset_before, offset_after = float(flown_corners[i].fly_by_offset), float(flown_corners[i + 1].fly_by_offset)
@@ -171,8 +181,8 @@ def add_airspace_violations(
                 (last_fraction, 1.0, 0.0),
             ):
                 if end_fraction > fraction:
-                    _cut_segment(path[i], path[i + 1], fraction, end_fraction, a, b)
-                    violations.bounds += _leg_zone_penetration(data, a, b, lateral, below, above)
+                    _cut_segment(path[i], path[i + 1], fraction, end_fraction, begin, end)
+                    violations.bounds += _leg_zone_penetration(data, begin, end, lateral, below, above)
         else:
             max_offset = 0.0
         for corner_offset, length, fraction in (
@@ -182,15 +192,14 @@ def add_airspace_violations(
             if corner_offset <= 0.0:
                 continue
             corner_fraction = min(1.0, length / max(legs[i].run, 1e-6))
-            _cut_segment(
-                path[i], path[i + 1], max(0.0, fraction - corner_fraction), min(1.0, fraction + corner_fraction), a, b
-            )
+            cut_begin, cut_end = max(0.0, fraction - corner_fraction), min(1.0, fraction + corner_fraction)
+            _cut_segment(path[i], path[i + 1], cut_begin, cut_end, begin, end)
             if has_zones and max_offset > 0.0:
-                violations.bounds += _leg_zone_penetration(data, a, b, across + corner_offset, below, above)
+                violations.bounds += _leg_zone_penetration(data, begin, end, across + corner_offset, below, above)
             if has_max_height:
                 extra_height = max(0.0, -lag_at(lags[i], fraction), -lag_at(lags[i], abs(fraction - corner_fraction)))
                 violations.terrain += _swath_excess_height(
-                    data, required, a, b, across + corner_offset, extra_height, math.inf
+                    data, required, begin, end, across + corner_offset, extra_height, math.inf
                 )
 
 
@@ -265,7 +274,8 @@ def _swath_excess_height(
 
     The excess is the largest of three lines: the line itself, and one line at the distance `lateral` (m) on each side.
 
-    If the excess exceeds `max_excess`, the result is a lower bound that exceeds `max_excess`, too.
+    required: the maximum height, expressed as a clearance by `required_headroom`.
+    max_excess: value beyond which the computation stops; the result is then a lower bound above it.
     """
     horizontal_length = max(1e-9, math.hypot(end[0] - start[0], end[1] - start[1]))
     east, north = lateral * (end[1] - start[1]) / horizontal_length, -lateral * (end[0] - start[0]) / horizontal_length
@@ -323,14 +333,14 @@ def _count_pieces(data: ProblemArrays, paths: Floats) -> Ints:
     """Implement `airspace_counts` for contiguous paths (n, w, 3)."""
     path_count, waypoints, _ = paths.shape
     counts = np.zeros(path_count, np.int64)
-    a, b = np.empty(3), np.empty(3)
+    piece_start, piece_end = np.empty(3), np.empty(3)
     for k in range(path_count):
         for i in range(waypoints - 1):
             for piece in range(POINTS_PER_LEG):
                 for axis in range(3):
                     step = paths[k, i + 1, axis] - paths[k, i, axis]
-                    a[axis] = paths[k, i, axis] + step * piece / POINTS_PER_LEG
-                    b[axis] = paths[k, i, axis] + step * (piece + 1) / POINTS_PER_LEG
-                if airspace_excess(data, a, b, 0.0, 0.0, math.inf) > 0.0:
+                    piece_start[axis] = paths[k, i, axis] + step * piece / POINTS_PER_LEG
+                    piece_end[axis] = paths[k, i, axis] + step * (piece + 1) / POINTS_PER_LEG
+                if airspace_excess(data, piece_start, piece_end, 0.0, 0.0, math.inf) > 0.0:
                     counts[k] += 1
     return counts

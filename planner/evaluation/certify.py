@@ -42,7 +42,7 @@ def certify(problem: Problem, waypoints: Floats) -> Certificate:
     measured along the same lines.
     """
     data = problem.certified
-    # A copy: compiled code has one type for arrays that are locked, as a plan's, and one for others.
+    # Copy the array: a plan's waypoints are read-only, for which the kernels would be compiled again.
     waypoints = np.array(waypoints, dtype=np.float64)
     problems: list[str] = []
     turn = _turn_margin(data, waypoints, problems)
@@ -105,9 +105,11 @@ _MAX_NAMED_PLACES = 6
 
 
 def _summarise_faults(faults: list[_Fault]) -> list[str]:
-    """Return a line about the faults of one kind: the worst fault, and the places of the others.
+    """Describe the faults of one kind in a line: the worst fault, and the places of the others.
 
-    Without faults the result is [].
+    Return [] without faults.
+
+    faults: margin, place and description of each fault.
     """
     if not faults:
         return []
@@ -165,8 +167,8 @@ def _leg_length_margin(data: ProblemArrays, waypoints: Floats, problems: list[st
         min_margin = min(min_margin, margin)
         if margin < -_EPSILON:
             description = (
-                f"{length:.0f} m long, but its turns need {turns_length:.0f} m, and the flight then needs"
-                f" {settling_and_roll:.0f} m to settle, with a plan's margins for the autopilot's turns"
+                f"{length:.0f} m long, but its turns need {turns_length:.0f} m and settling another"
+                f" {settling_and_roll:.0f} m, including a plan's margins for the autopilot's turns"
             )
             faults.append((margin, f"leg {i}", description))
     problems += _summarise_faults(faults)
@@ -229,7 +231,7 @@ def _slope_fault_text(data: ProblemArrays, slope: float, climb: float, dive: flo
     verb, limit, stated, rate = (
         ("climbs", climb, data.max_climb, "climb") if slope > 0 else ("sinks", dive, data.max_dive, "sink")
     )
-    margins = f", with a plan's margins for gusts and the autopilot's {rate} rate" if math.isnan(stated) else ""
+    margins = f", including a plan's margins for gusts and the autopilot's {rate} rate" if math.isnan(stated) else ""
     return (
         f"{verb} {math.degrees(abs(slope)):.1f}°{place_text}; at most {math.degrees(limit):.1f}° are allowed{margins}"
     )
@@ -289,7 +291,11 @@ def _bounds_margin(data: ProblemArrays, waypoints: Floats, problems: list[str]) 
     margins = distances.min(axis=1)
     problems += _summarise_faults(
         [
-            (float(margins[i]), f"waypoint {i}", f"{-margins[i]:.1f} m outside the area, floor or ceiling")
+            (
+                float(margins[i]),
+                f"waypoint {i}",
+                f"{-margins[i]:.1f} m beyond the edge of the area, the floor or the ceiling",
+            )
             for i in np.nonzero(margins < -_EPSILON)[0]
         ]
     )
@@ -326,13 +332,13 @@ def _airspace_margins(problem: Problem, waypoints: Floats, problems: list[str]) 
                 if z == zone
             ]
         )
-    required_text = f"{space.max_height:g} m allowed, {space.buffer:.1f} m of margin required"
+    required_text = f"at most {space.max_height:g} m minus a margin of {space.buffer:.1f} m are allowed"
     problems += _summarise_faults(
         [
             (
                 piece_headroom,
                 name,
-                f"{space.max_height - piece_headroom:.1f} m above ground at its highest, {required_text}",
+                f"{space.max_height - piece_headroom:.1f} m above ground at its highest point; {required_text}",
             )
             for name, piece_headroom in height_faults.items()
         ]
@@ -341,14 +347,15 @@ def _airspace_margins(problem: Problem, waypoints: Floats, problems: list[str]) 
 
 
 def _zone_fault_text(problem: Problem, distance: float, z: int) -> str:
-    """Return the message about a piece of the path at a distance (m) from zone z.
+    """Describe a piece of the path that is in a zone or too close to it.
 
-    Zone z is numbered as in the kernels.
+    distance: distance from the zone, m; negative if the zone is violated.
+    z: index of the zone among the zones of the kernels.
     """
     required = problem.certified.airspace.zones.required[z]
     zone = problem.scenario.zones[int(required["number"])]
     if distance < 0.0:
         return f"{-distance:.1f} m {'inside' if zone.kind == 'exclusion' else 'outside'} {zone.name}"
     relation = "from" if zone.kind == "exclusion" else "inside the edge of"
-    required_text = f"{required['horizontal']:g} m horizontally or {required['vertical']:g} m vertically required"
-    return f"{distance:.1f} m {relation} {zone.name}, {required_text}"
+    required_text = f"{required['horizontal']:g} m horizontally or {required['vertical']:g} m vertically are required"
+    return f"{distance:.1f} m {relation} {zone.name}; {required_text}"

@@ -56,7 +56,10 @@ END_DISTANCE_M = 100.0
 
 @inner
 def tracked_pieces(data: ProblemArrays, waypoints: Floats) -> Records:
-    """Return `TRACKED_PIECE` records of a path (w, 3): first its legs, then its corners."""
+    """Cut a path (w, 3) into straight pieces with bounds on the tracking error of the flight.
+
+    Return `TRACKED_PIECE` records, first of its legs, then of its corners.
+    """
     count = waypoints.shape[0]
     legs, corners = np.zeros(count - 1, dtype=LEG), np.zeros(count, dtype=CORNER)
     lags, wind, across = np.zeros(count - 1, dtype=HEIGHT_LAG), downwind_vector(data.aircraft), data.tracking.across
@@ -202,7 +205,7 @@ def _segment_distance(threats: Records, start: Floats, end: Floats, min_distance
 
 @compiled
 def with_end_course_points(data: ProblemArrays, path: Floats) -> Floats:
-    """Return a path with one more point at each end, for measuring the turns from and to the end courses.
+    """Add a point at each end of a path (w, 3), to measure the turns from and to the end courses.
 
     One distant point lies before the start, the other after the destination, both on the prescribed courses. Without a
     prescribed course the point extends the leg, so that there is no turn.
@@ -227,7 +230,7 @@ def with_end_course_points(data: ProblemArrays, path: Floats) -> Floats:
 
 @compiled
 def turn_and_roll_lengths(data: ProblemArrays, waypoints: Floats) -> tuple[Floats, Floats]:  # pragma: no cover
-    """Return the length that each leg needs for its turns and for the roll between them, m, (w - 1,)."""
+    """Return the lengths that each leg needs for its turns and for the roll between them, (w - 1,) m each."""
     count = waypoints.shape[0]
     legs, corners = np.zeros(count - 1, dtype=LEG), np.zeros(count, dtype=CORNER)
     turns, rolls = np.zeros(count - 1), np.zeros(count - 1)
@@ -267,7 +270,10 @@ def leg_slope_limits(data: ProblemArrays, waypoints: Floats) -> tuple[Floats, Fl
 
 @compiled
 def heights_above_ground(data: ProblemArrays, waypoints: Floats) -> Records:
-    """Return `CERTIFIED_PIECE` records of a path (w, 3): first its legs, then its arcs or corners."""
+    """Measure the smallest height above ground and the required buffer of each piece of a path (w, 3).
+
+    Return `CERTIFIED_PIECE` records, first of its legs, then of its arcs or corners.
+    """
     if data.tracking.has_error:
         return _tracked_heights(data, tracked_pieces(data, waypoints))
     leg_count = waypoints.shape[0] - 1
@@ -286,9 +292,10 @@ def heights_above_ground(data: ProblemArrays, waypoints: Floats) -> Records:
 
 @inner
 def _tracked_heights(data: ProblemArrays, pieces: Records) -> Records:
-    """Return `CERTIFIED_PIECE` records with the minimum heights along pieces and beside them.
+    """Measure the minimum heights above ground along pieces and to either side of them.
 
-    The height is NaN over unknown ground.
+    Return `CERTIFIED_PIECE` records. The height includes the tracking error below the piece, and is NaN over unknown
+    ground.
 
     pieces: `TRACKED_PIECE` records.
     """
@@ -299,12 +306,12 @@ def _tracked_heights(data: ProblemArrays, pieces: Records) -> Records:
         horizontal_length = max(1e-9, math.hypot(dx, dy))
         min_height = math.inf
         for side in (0.0, -1.0, 1.0):
-            a, b = piece.begin.copy(), piece.end.copy()
-            for end, lateral in ((a, piece.lateral_begin), (b, piece.lateral_end)):
+            offset_start, offset_end = piece.begin.copy(), piece.end.copy()
+            for end, lateral in ((offset_start, piece.lateral_begin), (offset_end, piece.lateral_end)):
                 end[0] += side * lateral * dy / horizontal_length
                 end[1] -= side * lateral * dx / horizontal_length
                 end[2] -= piece.below
-            height, _ = segment_clearance(data.heights, data.to_pixel, a, b)
+            height, _ = segment_clearance(data.heights, data.to_pixel, offset_start, offset_end)
             min_height = math.nan if math.isnan(height) or math.isnan(min_height) else min(min_height, height)
         out[k].of_arc, out[k].number, out[k].height = piece.of_corner, piece.number, min_height
         ends = data.start_buffer, data.destination_buffer
@@ -328,10 +335,10 @@ def _measure_piece(data: ProblemArrays, start: Floats, end: Floats, of_arc: bool
 def required_buffer(
     data: ProblemArrays, buffer: float, end_buffers: tuple[float, float], a: Floats, b: Floats
 ) -> float:
-    """Return the buffer required on a piece a-b, m, which grows with the distance from a fixed end.
+    """Return the height required on a piece a-b in addition to the clearance, m.
 
-    buffer: buffer away from the ends, m.
-    end_buffers: buffers at the start and the destination, m.
+    buffer: additional height away from the ends, m.
+    end_buffers: additional heights at the start and the destination, m.
 
     The buffer grows half as fast as in a search. The difference allows for the ground between the samples of the
     search.

@@ -45,7 +45,7 @@ SETTLING_LENGTH_M = 20.0
 
 @inlined
 def measure_legs(path: Floats, legs: Records) -> None:
-    """Fill `LEG` records (w - 1,) of a path (w, 3)."""
+    """Measure the legs of a path (w, 3), and fill its `LEG` records (w - 1,)."""
     for i in range(legs.shape[0]):
         dx, dy = path[i + 1, 0] - path[i, 0], path[i + 1, 1] - path[i, 1]
         dz = path[i + 1, 2] - path[i, 2]
@@ -58,7 +58,10 @@ def measure_legs(path: Floats, legs: Records) -> None:
 
 @inner
 def measure_corners(data: ProblemArrays, wind: Wind, path: Floats, legs: Records, corners: Records) -> None:
-    """Fill `CORNER` records (w,) of a path (w, 3) whose legs are already measured."""
+    """Measure the turns of a path (w, 3), and fill its `CORNER` records (w,).
+
+    legs: filled `LEG` records of the path.
+    """
     aircraft, tracking = data.aircraft, data.tracking
     leg_count: int = legs.shape[0]
     for i in range(1, leg_count):
@@ -87,8 +90,9 @@ def measure_corner(
     amsl: float,
     corner: Record,
 ) -> None:
-    """Fill the `CORNER` record of a turn between the unit courses u and v.
+    """Measure the turn between the unit courses u and v, and fill its `CORNER` record.
 
+    amsl: altitude of the turn, m.
     All values are 0 if `is_turning` is False.
     """
     tangent, radius, excursion = 0.0, 0.0, 0.0
@@ -184,7 +188,9 @@ def half_blend_length(aircraft: PerformanceTable, amsl: float) -> float:
 def fly_by_vertices(
     aircraft: PerformanceTable, previous: Floats, waypoint: Floats, next_waypoint: Floats, radius: float
 ) -> Floats:
-    """Return vertices (k, 3) of the flown path past `waypoint`; see `blended_vertices`.
+    """Return vertices (k, 3) of a path past `waypoint` that is nowhere higher than the flown path.
+
+    `blended_vertices` describes the vertices.
 
     The length of the blend is computed at the altitude of the waypoint.
     """

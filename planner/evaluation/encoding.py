@@ -186,7 +186,7 @@ class Encoding:
 
     >>> space = Space(np.zeros(3), np.array([3000.0, 4000.0, 0.0]), np.array([[0, 3000], [0, 4000]]), (0.0, 500.0))
     >>> encoding = rotated_encoding(space, 4)
-    >>> encoding.lower[0::3].tolist(), encoding.upper[0::3].tolist()  # along, of each waypoint its own interval
+    >>> encoding.lower[0::3].tolist(), encoding.upper[0::3].tolist()  # interval of each waypoint along the axis
     ([0.0, 2500.0], [2500.0, 5000.0])
     >>> encoding.decode(np.array([[1000.0, 0.0, 100.0, 4000.0, 0.0, 100.0]])).round(6).tolist()
     [[[0.0, 0.0, 0.0], [600.0, 800.0, 100.0], [2400.0, 3200.0, 100.0], [3000.0, 4000.0, 0.0]]]
@@ -232,7 +232,7 @@ def _add_ends(space: Space, inner_waypoints: Floats) -> Floats:
 
 
 def rotated_encoding(space: Space, waypoints: int) -> Encoding:
-    """Make the rotated encoding, in which inner waypoint i lies in the i-th interval of the axis (section III).
+    """Make the rotated encoding: inner waypoint i lies in interval i of the axis (section III).
 
     waypoints: number w of waypoints, including both ends.
 
@@ -276,7 +276,7 @@ def route_encoding(space: Space, route: Floats) -> Encoding:
 def require_frames(encoding: Encoding) -> WaypointFrames:
     """Return the frames of an encoding's waypoints. Raises ValueError for an encoding without frames."""
     if encoding.frames is None:
-        raise ValueError(f"{encoding.name}: an encoding without frames along a route")
+        raise ValueError(f"the encoding {encoding.name} has no frames along a route")
     return encoding.frames
 
 

@@ -103,7 +103,10 @@ def score_path(
     violations: Record,
     objectives: Record,
 ) -> None:
-    """Evaluate a path (w, 3): fill a `VIOLATIONS` record of zeros and an `OBJECTIVES` record."""
+    """Score a path (w, 3): add to a `VIOLATIONS` record of zeros, and fill an `OBJECTIVES` record.
+
+    scratch: working memory for a path of w waypoints.
+    """
     score_legs(data, limits, scratch, path, violations, objectives)
     score_ground(data, limits, scratch, path, violations)
     score_missiles(data, limits, scratch, path, violations, objectives)
@@ -149,7 +152,7 @@ def score_legs(
 def score_ground(
     data: ProblemArrays, limits: PrecomputedLimits, scratch: PathScratch, path: Floats, violations: Record
 ) -> None:
-    """Add the violations of the clearance along the legs: the second part of `score_path`."""
+    """Add the violations of the clearance above ground along the legs: the second part of `score_path`."""
     legs, terrain_legs = scratch.legs, scratch.terrain_legs
     sample_terrain(
         data.heights,
@@ -176,7 +179,7 @@ def score_missiles(
     violations: Record,
     objectives: Record,
 ) -> None:
-    """Set the exposure to missiles, and add the clearance violations of corners: the third part of `score_path`."""
+    """Set the exposure to missiles, and add the clearance violations of corners, as part of `score_path`."""
     # Take arrays out of the data once, because passing the data on costs more than evaluating a leg.
     heights, to_pixel, missiles = data.heights, data.to_pixel, data.missiles
     slope_bounds, aircraft, required, margin = data.slope_bounds, data.aircraft, limits.required, data.kill_margin
@@ -240,10 +243,10 @@ def graded_scores(data: ProblemArrays, paths: Floats) -> tuple[Floats, Floats]:
     """Return the graded violations (n, 4) and objectives (n, 4) of paths (n, w, 3).
 
     The legs and the flown corners are scored along their whole length. The columns of the violations are those of
-    `planner.plan.Violation`, in rad and 100 m of leg; m per m; m x km; m. The columns of the objectives are those of
-    `planner.plan.Objective`. The kill exposure is the mean density along the path times the paper's number of points,
-    which makes it comparable with the paper's sum. Detection and height stay 0, because they would only decide between
-    paths of exactly the same length.
+    `planner.plan.Violation`: turns (rad, plus missing leg lengths in units of 100 m), slopes (m per m), terrain (m x
+    km) and bounds (m). The columns of the objectives are those of `planner.plan.Objective`. The kill exposure is the
+    mean density along the path times the paper's number of points, which makes it comparable with the paper's sum.
+    Detection and height stay 0, because they would only decide between paths of exactly the same length.
     """
     violations, objectives = np.zeros(len(paths), dtype=VIOLATIONS), np.zeros(len(paths), dtype=OBJECTIVES)
     # A plan's own path is read-only, which would compile another kernel.
@@ -290,7 +293,7 @@ def _measure_arcs(
     flown: Records,
     extents: Floats,
 ) -> None:
-    """Fill `FLOWN_CORNER` records (w,) and extents (w,) for a path's corners without tracking error.
+    """Fill `FLOWN_CORNER` records (w,) and extents (w,) for corners that are flown without tracking error.
 
     The flight deviates from the legs downwards by the blend of slopes, and sideways by at most R(1/cos(theta/2) - 1)
     plus the sagitta of a chord. It does so within the tangent and half the arc, or within the blend.
@@ -328,7 +331,7 @@ def _max_lag_near(lag: Record, leg: Record, corner: Record) -> tuple[float, floa
 
 @inlined
 def _measure_tracked_corners(corners: Records, flown: Records, extents: Floats) -> None:
-    """Fill `FLOWN_CORNER` records (w,) and extents (w,) for a path's corners with tracking error."""
+    """Fill `FLOWN_CORNER` records (w,) and extents (w,) for corners that are flown with tracking error."""
     for i in range(1, corners.shape[0] - 1):
         excursion = corners[i].excursion
         flown[i].radius, flown[i].blend_deviation, flown[i].fly_by_offset = 0.0, 0.0, excursion
@@ -345,7 +348,7 @@ def _clearance_deficit(
     extra_height: float,
     vertices: Floats,
 ) -> float:
-    """Return the clearance deficit along a flown turn `vertices` (k, 3), integrated, m x km.
+    """Return the missing clearance along the vertices (k, 3) of a flown turn, integrated, m x km.
 
     extra_height: height that is required in addition to the clearance, m.
     """

@@ -27,7 +27,6 @@ PATHS_PER_BLOCK = 128
 def _block_fields(kind: type[np.generic], *names: str) -> list[tuple[str, type[np.generic], tuple[int]]]:
     """Return the definitions of record fields that have one value for each path of a block.
 
-    names: names of the fields.
     kind: type of the values.
     names: names of the fields.
     """
@@ -104,7 +103,7 @@ def interpolate_legs(start: Record, step: Record, fraction: float, size: int, ou
 
 @inlined
 def load_waypoints(to_pixel: PolyMapRecord, paths: Floats, first_path: int, i: int, size: int, block: Record) -> None:
-    """Fill waypoint i of each path of a block, and its raster pixel, as `polymap` computes it.
+    """Copy waypoint i of each path into a block, and compute its raster pixel as `polymap` does.
 
     first_path: number of the first path of the block.
     size: number of paths in the block.
@@ -135,7 +134,7 @@ def _evaluate_polynomials(
 ) -> None:
     """Fill `out` with the sum of coefficients[i, j] x^i y^j for each path, by Horner's method.
 
-    terms: upper limit of i + j, which stays below it.
+    terms: i + j is less than this number.
     inner: scratch memory.
     """
     for b in range(size):
@@ -208,7 +207,7 @@ def precompute_limits(data: ProblemArrays) -> PrecomputedLimits:
 
 @inlined
 def _min_slope_limit(data: ProblemArrays, air_angles: Floats) -> float:
-    """Return the slope that the aircraft can fly on every course between floor and ceiling, rad.
+    """Return the steepest slope that the aircraft can fly on every course between floor and ceiling, rad.
 
     air_angles: (h,) flight-path angles relative to the air at the table's heights.
 
@@ -333,7 +332,7 @@ def add_leg_violations(
 
     If `legs_hold_turns` is set, a leg that is too short for the turns at its ends adds to the turn violations.
     """
-    # The order of these lines fixes the order of summation, and so the last digit.
+    # Another order of these lines would change the order of summation, and with it the last digits.
     _add_turn_violations(data, limits, legs, by_amount, violations)
     _add_bounds_violations(data, path, corners, by_amount, violations)
     if data.legs_hold_turns:
@@ -384,7 +383,7 @@ def _add_bounds_violations(
 ) -> None:
     """Add the waypoints that are off the map, below the floor or above the ceiling (eq. 7).
 
-    The tracking error at a waypoint counts for the map's edges.
+    The excursion of the flight at a corner reduces the distance to the map's edges.
     """
     west = data.west
     east = data.east

@@ -107,7 +107,9 @@ def _are_limits_fixed(data: ProblemArrays, limits: PrecomputedLimits) -> bool:
 def _score_block(
     data: ProblemArrays, limits: PrecomputedLimits, paths: Floats, first_path: int, size: int, block: Record
 ) -> None:
-    """Fill the sums of a block of `size` paths, which begins with `first_path`.
+    """Score a block of `size` paths side by side, beginning with path number `first_path`.
+
+    Fill the sums of the block.
 
     Each waypoint is mapped to the raster once. Between waypoints a leg is assumed to be straight in pixels.
     """
@@ -133,7 +135,7 @@ def _score_block(
 
 @inlined
 def _find_ground(heights: Heights, size: int, block: Record) -> None:
-    """Set the ground height at the points, as `pixel_height` computes it."""
+    """Interpolate the ground height at one point of each path of a block, as `pixel_height` does."""
     rows, columns = heights.shape
     flat = heights.reshape(heights.size)
     last_column, last_row = columns - 2.0, rows - 2.0
@@ -177,7 +179,7 @@ def _find_ground(heights: Heights, size: int, block: Record) -> None:
 
 @inlined
 def _add_terrain(required: RequiredClearance, size: int, adds_height: bool, block: Record) -> None:
-    """Add the terrain violations and the heights above ground of the points (eq. 5, 11)."""
+    """Count the points that are too low, and add the heights above ground if `adds_height` (eq. 5, 11)."""
     east, north, up = block.point.east, block.point.north, block.point.up
     ground = block.ground
     required_height = block.need
@@ -199,7 +201,7 @@ def _add_terrain(required: RequiredClearance, size: int, adds_height: bool, bloc
 
 @inlined
 def _find_nearby_units(threat_cells: ThreatCells, size: int, block: Record) -> None:
-    """Find the list of units that may reach each point: set the list's first entry and its length."""
+    """Find the list of threats that may reach each point; store the first entry and the length of each list."""
     # A cell is not bounded in height; it stores the heights that its units reach.
     west, south, per_metre = threat_cells.west, threat_cells.south, 1.0 / threat_cells.side
     columns, rows, cells = threat_cells.columns, threat_cells.rows, threat_cells.cells
@@ -223,10 +225,10 @@ def _find_nearby_units(threat_cells: ThreatCells, size: int, block: Record) -> N
 
 @inlined
 def _add_exposures(spheres: Records, units: Int32s, size: int, block: Record) -> None:
-    """Add the kill and detection exposure of the points to the units near them (eq. 9, 10).
+    """Add the kill and detection exposure of the points to nearby threats (eq. 9, 10).
 
-    Round k treats the k-th unit of every list that has one. Within a round no branch depends on the contents of a list,
-    because the processor could not predict it.
+    Round k treats the k-th threat of every list that has one. Within a round no branch depends on the contents of a
+    list, because the processor could not predict it.
     """
     east, north, up = block.point.east, block.point.north, block.point.up
     kill, detection = block.sums.kill, block.sums.detection
@@ -261,7 +263,7 @@ def _add_exposures(spheres: Records, units: Int32s, size: int, block: Record) ->
 
 @inlined
 def _add_leg(limits: PrecomputedLimits, size: int, is_first: bool, block: Record) -> None:
-    """Add the length of a leg; count its slope, and the turn into it, if they exceed their limits (eq. 1-4, 8)."""
+    """Add the length of a leg, and count its slope and the turn into it if too large (eq. 1-4, 8)."""
     climb, dive, cos_max_turn = limits.climb_slope, limits.dive_slope, limits.cos_max_turn
     east = block.step.east
     north = block.step.north

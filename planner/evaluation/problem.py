@@ -195,15 +195,16 @@ class RequiredClearance(NamedTuple):
 
 @inner
 def required_clearance(data: ProblemArrays) -> RequiredClearance:
-    """Return the clearance that a problem requires."""
+    """Return the height above ground that a problem requires at each point of a path."""
     return _make_required_clearance(data, data.clearance, data.buffer, data.start_buffer, data.destination_buffer)
 
 
 @inner
 def required_headroom(data: ProblemArrays) -> RequiredClearance:
-    """Return the maximum height above ground as a required clearance, for negated heights.
+    """Express the maximum height above ground as a required clearance.
 
-    It applies if the heights of the path and the ground are both negated.
+    It applies to a path and a ground whose heights have the opposite sign: being below the maximum height is then being
+    above the clearance.
     """
     space = data.airspace
     return _make_required_clearance(data, -space.max_height, space.buffer, space.start_buffer, space.destination_buffer)
@@ -276,7 +277,7 @@ SEARCH_ZONE_MARGIN_M = 15.0
 CERTIFIED_ZONE_MARGIN_M = 10.0
 # Largest margin of a search on either side of a band, as a fraction of the band between the certificate's limits.
 BAND_FRACTION = 0.25
-# Fraction of the buffer available at a fixed end that the certificate requires.
+# Fraction of the height available above the clearance at a fixed end that the certificate requires as a buffer.
 CERTIFIED_END_FRACTION = 0.75
 # Additional buffer per attempt after the first, m, because the samples of the previous search missed ground.
 ATTEMPT_BUFFER_M = 5.0
@@ -314,17 +315,19 @@ def make_problem(scenario: Scenario, limits: Limits, attempt: int = 0) -> Proble
     terrain = scenario.terrain
     if terrain is None:
         raise ScenarioError(
-            f"{scenario.name}: terrain: none given; a path is planned over terrain", file=scenario.name, field="terrain"
+            f"{scenario.name}: terrain: missing; a path can only be planned over terrain",
+            file=scenario.name,
+            field="terrain",
         )
     for field in ("max_turn", "max_climb", "max_dive"):
         value = getattr(limits, field)
         if value is not None and value <= ANGLE_MARGIN_RAD:
-            allowed = 'a plan keeps 0.5 inside it; allowed: above 0.5, or "aircraft"'
+            allowed = 'a plan keeps a margin of 0.5 to this limit; allowed: above 0.5, or "aircraft"'
             raise ScenarioError.at(
                 scenario.name,
                 f"limits.{field}_deg",
                 math.degrees(value),
-                f"{allowed}",
+                allowed,
                 shown=f"{math.degrees(value):g}",
             )
     certified = _certified_arrays(scenario, limits, terrain)
@@ -409,7 +412,7 @@ def _search_airspace(
 
 
 def _zone_margins(scenario: Scenario, horizontal: float, vertical: float, end_fraction: float) -> ZoneMargins:
-    """Return the margins to zones (m), which the scenario's `zone_margin_m` may change.
+    """Return the required margins to zones (m), changed by the scenario's `zone_margin_m` if it is stated.
 
     `zone_margin_m` changes the horizontal margin by its difference from `CERTIFIED_ZONE_MARGIN_M`. An increase also
     applies to the vertical margin, a reduction does not.
@@ -420,7 +423,7 @@ def _zone_margins(scenario: Scenario, horizontal: float, vertical: float, end_fr
 
 
 def _max_buffer(certified: ProblemArrays, certified_margin: float) -> float:
-    """Return the largest possible margin of a search to a limit of the height above ground, m.
+    """Return the largest margin that a search may keep to a limit of the height above ground, m.
 
     certified_margin: margin of the certificate to the same limit, m.
 
@@ -432,19 +435,20 @@ def _max_buffer(certified: ProblemArrays, certified_margin: float) -> float:
 
 
 def _reduced_performance(scenario: Scenario, limits: Limits) -> PerformanceTable:
-    """Return the aircraft's performance, reduced for turbulence and limited to the autopilot's vertical rates."""
+    """Return the aircraft's performance, reduced for turbulence and by the autopilot's vertical rates."""
     slope_fraction, tracking = SLOPE_FRACTION_BY_TURBULENCE[scenario.wind.turbulence], limits.tracking
     if tracking is None:
         return derate(limits.performance(), slope_fraction, slope_fraction, limits.reserve_climb, limits.reserve_sink)
     climb_fraction, sink_fraction = (
-        min(slope_fraction, own_fraction) for own_fraction in (tracking.own_climb_share, tracking.own_sink_share)
+        min(slope_fraction, autopilot_fraction)
+        for autopilot_fraction in (tracking.own_climb_share, tracking.own_sink_share)
     )
     table = derate(limits.performance(), climb_fraction, sink_fraction, limits.reserve_climb, limits.reserve_sink)
     return limit_rates(table, tracking.climb_rate, tracking.sink_rate)
 
 
 def _buffer_growth(scenario: Scenario, limits: Limits, aircraft: PerformanceTable) -> float:
-    """Return the growth of the buffer with the distance from an end, m per m.
+    """Return the growth of the buffer (height above the clearance) with the distance from an end, m per m.
 
     The aircraft can follow this growth. Without reserves above or below the path it is `BUFFER_GROWTH_RATIO`, which is
     also the maximum.
@@ -471,9 +475,9 @@ def _none_to_nan(value: float | None) -> float:
 
 
 def _end_buffer(terrain: Terrain, limits: Limits, point: Floats, buffer: float, fraction: float = 1.0) -> float:
-    """Return the buffer of the clearance at a fixed end, m.
+    """Return the buffer (height required above the clearance) at a fixed end, m.
 
-    It is the full buffer. If the end is too low for the full buffer, it is a fraction of the available height.
+    It is the full buffer, or a fraction of the available height if the end is too low for the full buffer.
     """
     height_above_ground = float(point[2] - terrain.height(point[0], point[1]))
     available_height = height_above_ground - limits.min_clearance - 0.01
@@ -495,7 +499,7 @@ def _make_slope_bounds(terrain: Terrain) -> SlopeBounds:
 def _fill_unknown_ground(data: ProblemArrays, terrain: Terrain) -> ProblemArrays:
     """Return the arrays with unknown ground replaced by ground up to the ceiling, which a search avoids.
 
-    The certificate reads the terrain without this ground.
+    The certificate uses the original terrain, with its unknown ground.
     """
     is_unknown = np.isnan(terrain.heights)
     if not is_unknown.any():
@@ -529,8 +533,8 @@ def _shrink_area(data: ProblemArrays, lateral: float, height: float) -> ProblemA
 def _make_space(scenario: Scenario, data: ProblemArrays) -> Space:
     """Return the search space, whose lowest altitude is the lowest altitude that the ground allows."""
     lowest_end = min(scenario.start[2], scenario.destination[2])
-    min_height = min(max(data.floor, float(np.nanmin(data.heights)) + data.clearance), lowest_end)
-    max_height = max(data.ceiling, min_height + 1.0)
-    height_range = (float(min_height), float(max_height))
+    min_altitude = min(max(data.floor, float(np.nanmin(data.heights)) + data.clearance), lowest_end)
+    max_altitude = max(data.ceiling, min_altitude + 1.0)
+    altitude_range = (float(min_altitude), float(max_altitude))
     bounds = np.array([[data.west, data.east], [data.south, data.north]])
-    return Space(scenario.start, scenario.destination, bounds, height_range, scenario.planner.across_m)
+    return Space(scenario.start, scenario.destination, bounds, altitude_range, scenario.planner.across_m)

@@ -25,9 +25,11 @@ from world.terrain import TILE_PIXELS, pixel_height
 # carried into the next leg. A leg whose change of height is below a step is demanded at its final height from its
 # beginning. ArduPlane's TECS behaves like this (ardupilot.org, Plane, TECS_HDEM_TCONST; ALT_SLOPE_MIN).
 
-# Distance of the aircraft below a leg at the fraction f, m: steady + slant (1 - f) + rest E(f x decay), where E is the
-# decay; and the largest and smallest of it, 0 included.
-HEIGHT_LAG = np.dtype([(name, np.float64) for name in ("steady", "slant", "rest", "decay", "max_below", "min_below")])
+# Distance of the aircraft below a leg at the fraction f of the leg, m: steady + slant (1 - f) + transient E(f x decay),
+# where E(x) is about exp(-x).  max_below and min_below are its largest and smallest value on the leg, or 0.
+HEIGHT_LAG = np.dtype(
+    [(name, np.float64) for name in ("steady", "slant", "transient", "decay", "max_below", "min_below")]
+)
 
 
 @inlined
@@ -67,9 +69,9 @@ def set_lag(
     lag.steady, lag.slant = length * altitude_change / max(horizontal_length, 1e-6), 0.0
     if abs(altitude_change) < tracking.step:
         lag.steady, lag.slant = 0.0, -altitude_change
-    lag.rest = below - lag.steady - lag.slant
+    lag.transient = below - lag.steady - lag.slant
     lag.decay = horizontal_length / length
-    end_below: float = lag.steady + lag.rest * _remaining_fraction(lag.decay)
+    end_below: float = lag.steady + lag.transient * _remaining_fraction(lag.decay)
     lag.max_below, lag.min_below = max(0.0, below, end_below, lag.slant), min(0.0, below, end_below, lag.slant)
     return end_below
 
@@ -78,7 +80,9 @@ def set_lag(
 def compute_height_lags(
     tracking: Record, aircraft: PerformanceTable, wind: Wind, path: np.ndarray, legs: Records, lags: Records
 ) -> None:
-    """Compute how far the altitude of the aircraft lags on each leg of a path (w, 3), without a lag at its start.
+    """Compute the altitude lag of the aircraft on each leg of a path (w, 3).
+
+    There is no lag at the start of the path.
 
     lags: `HEIGHT_LAG` records to fill, (w - 1,).
     """
@@ -92,7 +96,7 @@ def compute_height_lags(
 @inlined
 def lag_at(lag: Record, fraction: float) -> float:
     """Return the distance of the aircraft below a leg at a fraction of the leg, m; negative above the leg."""
-    return lag.steady + lag.slant * (1.0 - fraction) + lag.rest * _remaining_fraction(fraction * lag.decay)
+    return lag.steady + lag.slant * (1.0 - fraction) + lag.transient * _remaining_fraction(fraction * lag.decay)
 
 
 # --- Terrain samples ---
@@ -115,7 +119,7 @@ TERRAIN_LEG = np.dtype(
         # Fractions of the leg: spacing of samples near the ground; the next sample; the limits up to which and from
         # which a sample counts as near the beginning and near the end.
         ("min_step", np.float64),
-        ("share", np.float64),
+        ("next_fraction", np.float64),
         ("beginning", np.float64),
         ("ending", np.float64),
         # Sum of depths below the required clearance, m x km; and smallest heights above it near both ends, m.
@@ -141,16 +145,19 @@ def _take_sample(
     altitude_change: float,
     min_step: float,
 ) -> tuple[float, float]:
-    """Return the height above the required clearance at a point of a line, m, and the step to the next point.
+    """Sample the ground at a point of a line.
 
-    tiles, tile_side: see `SlopeBounds`.
-    growth: see `RequiredClearance`.
+    Return the height above the required clearance and the next step.
+
+    tiles, tile_side: bounds on the slope of the ground, as in `SlopeBounds`.
+    growth: slope of the required height, as in `RequiredClearance`.
+    column, row, up: raster position and altitude of the point.
     required_height: required clearance, m.
     max_further_height: largest height that is required in addition elsewhere on the line, m.
     horizontal_length, altitude_change: horizontal length and altitude change of the whole line, m.
     min_step: minimum spacing of samples, as a fraction of the line.
 
-    The step leads to the next point that has to be sampled. It is a fraction of the line.
+    The height is in m. The step is the fraction of the line to the next point that has to be sampled.
     """
     ground = pixel_height(heights, column, row)
     excess_height = up - ground - required_height if ground == ground else -UNKNOWN_GROUND_DEPTH_M
@@ -235,7 +242,7 @@ def _start_sampling(
         leg = terrain_legs[i]
         leg.column, leg.row = column, row
         leg.column_step, leg.row_step = end_column - column, end_row - row
-        leg.min_step, leg.share = min_step, 0.0
+        leg.min_step, leg.next_fraction = min_step, 0.0
         # A sample represents the steps before and after it.
         per_metre = 1.0 / max(horizontal_length, 1e-9)
         leg.beginning = extents[i] * per_metre + min_step
@@ -277,7 +284,7 @@ def sample_terrain(
         for entry in range(count):
             k = np.uintp(unfinished[entry])
             leg = terrain_legs[k]
-            fraction, min_step = leg.share, leg.min_step
+            fraction, min_step = leg.next_fraction, leg.min_step
             up, altitude_change = path[k, 2], path[k + np.uintp(1), 2] - path[k, 2]
             if not required.same_everywhere:
                 dx, dy = path[k + np.uintp(1), 0] - path[k, 0], path[k + np.uintp(1), 1] - path[k, 1]
@@ -311,7 +318,7 @@ def sample_terrain(
             leg.height_at_end = gap_at_end if gap_at_end < leg.height_at_end else leg.height_at_end
             unfinished[remaining_count] = np.int64(k)
             remaining_count += 1 if fraction < 1.0 else 0
-            leg.share = fraction + next_step if fraction + next_step < 1.0 else 1.0
+            leg.next_fraction = fraction + next_step if fraction + next_step < 1.0 else 1.0
         count = remaining_count
     for i in range(legs.shape[0]):
         terrain_legs[i].depth *= max(legs[i].run, 1.0) * terrain_legs[i].min_step / 1000.0

@@ -104,9 +104,9 @@ def _fill_cells(first: Int32s, units: Int32s, min_altitudes: Int32s, max_altitud
 def _list_units(
     position: Floats, radius: Floats, west: float, south: float, cell_size: float, columns: int, rows: int
 ) -> tuple[Int32s, Int32s]:
-    """Return the index of each cell's first entry in a list of units, and the list.
+    """List the units that reach each cell; return each cell's first entry in the list, and the list.
 
-    The list contains the units of one cell after another.
+    The list contains the units of one cell after another; the last cell lists all units.
     """
     count = columns * rows
     first = np.zeros(count + 2, dtype=np.int32)
@@ -183,7 +183,7 @@ class MissileIndex(NamedTuple):
 
 
 def make_missile_index(threats: Records, side: float | None = None) -> MissileIndex:
-    """Return the index of missiles.
+    """Make the spatial index of missiles.
 
     threats: records with the fields east, north, up, kill_radius and kill_scale, m; threats without a kill radius are
         ignored.
@@ -308,9 +308,9 @@ def _clip_fractions(start_fraction: float, end_fraction: float) -> tuple[float, 
 
 @inlined
 def _shift_towards_missile(start_height: float, altitude_change: float, below: float, above: float) -> float:
-    """Return the height of a segment's start above a missile, reduced by the tracking error, m.
+    """Shift a segment towards a missile by up to the tracking error; return the new height of its start, m.
 
-    The segment is shifted towards the missile by up to the tracking error.
+    Heights are measured from the missile.
 
     start_height: height of the segment's start above the missile, m.
     altitude_change: altitude change of the segment up to its closest point, m.
@@ -338,7 +338,7 @@ def _closest2(
     """Return the squared distance from a point to the part of a segment between two fractions, m^2.
 
     closest_fraction: fraction of the infinite line that is closest to the point.
-    dot, start2, length2: see `window_exposure`; the point is the centre.
+    dot, start2, length2: products of the segment and the vector from the point, as in `window_exposure`.
     """
     fraction = closest_fraction if closest_fraction < end_fraction else end_fraction
     fraction = fraction if fraction > begin_fraction else begin_fraction
@@ -349,7 +349,11 @@ def _closest2(
 def _sphere_density(
     dot: float, start2: float, length2: float, radius: float, scale: float
 ) -> float:  # pragma: no cover
-    """Return the mean kill density of a segment that enters a sphere; see `window_exposure`."""
+    """Return the mean kill density over a segment that enters a sphere.
+
+    dot, start2, length2: as in `window_exposure`; the point is the centre of the sphere.
+    radius, scale: of the sphere, m.
+    """
     if length2 < 1e-12:
         return window_exposure(0.0, 1.0, length2, dot, start2, scale)
     mid_fraction = -dot / length2

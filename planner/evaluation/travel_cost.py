@@ -138,12 +138,12 @@ def make_travel_cost(
 
 
 def make_time_cost(table: PerformanceTable, winds: WindGrid = NO_WINDS) -> TravelCost:
-    """Return the cost of a path's time, in m of level flight in still air."""
+    """Make the cost function of a path's time, in m of level flight in still air."""
     return LENGTH_COST._replace(length=0.0, time=float(table.airspeed), winds=winds)
 
 
 def make_energy_cost(envelope: Envelope, table: PerformanceTable, winds: WindGrid = NO_WINDS) -> TravelCost | None:
-    """Return the cost of a path's energy, in m of level flight in still air; None if power is unknown.
+    """Make the cost function of a path's energy, in m of level flight in still air; None if power is unknown.
 
     The power is that of `Envelope.power`: a parabola through idle at the steepest descent, level flight, and full
     throttle. At a height at which level flight is impossible, the power at the nearest height with level flight
@@ -161,10 +161,10 @@ def make_energy_cost(envelope: Envelope, table: PerformanceTable, winds: WindGri
 
 
 def _power_parabola(envelope: Envelope, airspeed: float, amsl: float) -> tuple[float, float, float, float, float]:
-    """Return the parabola of power over the sine of the climb angle, and the limits of this sine.
+    """Fit a parabola to the power over the sine of the climb angle.
 
-    The result has the fields level, linear, square, min_sine and max_sine of `TravelCost`. All are NaN if the power is
-    unknown.
+    Return its coefficients and the limits of the sine: level, linear, square, min_sine and max_sine, as in
+    `TravelCost`. All are NaN if the power is unknown.
     """
     climb, descent = envelope.air_angles(airspeed, amsl)
     min_sine, max_sine = -math.sin(descent), math.sin(climb)
@@ -248,10 +248,10 @@ def _interpolate_wind(winds: WindGrid, x: float, y: float, z: float) -> tuple[fl
     k = min(velocities.shape[2] - 2, int(place_z))
     east, north = 0.0, 0.0
     for corner in range(8):
-        a, b, c = corner & 1, corner >> 1 & 1, corner >> 2
-        weight = abs(1 - a - place_x + i) * abs(1 - b - place_y + j) * abs(1 - c - place_z + k)
-        east += weight * velocities[i + a, j + b, k + c, 0]
-        north += weight * velocities[i + a, j + b, k + c, 1]
+        di, dj, dk = corner & 1, corner >> 1 & 1, corner >> 2
+        weight = abs(1 - di - place_x + i) * abs(1 - dj - place_y + j) * abs(1 - dk - place_z + k)
+        east += weight * velocities[i + di, j + dj, k + dk, 0]
+        north += weight * velocities[i + di, j + dj, k + dk, 1]
     return east, north
 
 
@@ -295,7 +295,11 @@ def _time_energy_cost(
     y: float,
     amsl: float,
 ) -> tuple[float, bool]:
-    """Return the cost of time and energy of a leg in the wind of one place; and True if it can be flown."""
+    """Return the cost of a leg's time and energy in the wind of one place, and True if the leg can be flown.
+
+    leg: vector of the leg, m.
+    x, y, amsl: place at which the wind is taken, m.
+    """
     dx, dy, dz = leg
     conditions = _conditions_at(travel, table, x, y, amsl)
     time = leg_time(dx, dy, dz, conditions.wind_east, conditions.wind_north, conditions.airspeed)
@@ -352,9 +356,11 @@ class LegModel(NamedTuple):
 
 @inner
 def model_leg(travel: TravelCost, table: PerformanceTable, start: Floats, finish: Floats, model: LegModel) -> float:
-    """Return the cost of a leg, which is always finite; fill its derivatives with respect to the leg's ends.
+    """Return the cost of a leg, which is always finite.
 
-    The curvature (second derivative) is filled, too. It is the sum of the curvatures of the length, of the time at each
+    Fill its first and second derivatives by the leg's ends.
+
+    The curvature (second derivative) is the sum of the curvatures of the length, of the time at each
     height, and of the power, which are all convex. The coupling of height and course is omitted, so the matrix has no
     negative eigenvalue.
     """

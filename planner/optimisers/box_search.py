@@ -29,6 +29,7 @@ class BoxSearch(ABC):
         *,
         initial: Floats | None = None,
     ) -> None:
+        """Draw or clip the first samples; the class documents the arguments."""
         self.lower, self.upper = lower, upper
         self._rank = rank
         self._rng = rng

@@ -31,8 +31,9 @@ class Emna(Umda):
     """
 
     def _sample(self, count: int) -> Floats:
-        """Draw samples of the maximum-likelihood Gaussian (1/N).
+        """Draw samples (count, d) from the Gaussian that is fitted to the selected samples.
 
+        The fit is by maximum likelihood (divisor N).
         Samples outside the box are drawn again, and finally clipped to the box.
         """
         mean = self.samples.mean(axis=0)

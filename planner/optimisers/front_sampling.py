@@ -92,6 +92,7 @@ class FrontSampling:
         population: int,
         rng: np.random.Generator,
     ) -> None:
+        """Start with an empty archive; the class documents the arguments."""
         self._lower, self._upper, self._directions = lower, upper, directions
         self.reference, self._axes = reference, axes
         self._size, self._population, self._rng = size, population, rng
@@ -112,11 +113,11 @@ class FrontSampling:
         return np.clip(samples, self._lower, self._upper)
 
     def _draw_near_displacements(self, mean_rows: Ints) -> Floats:
-        """Draw displacements (n, d) with the covariance of the solutions that are nearest to each mean.
+        """Draw displacements (n, d) from a Gaussian fitted to the solutions nearest to each mean.
 
         mean_rows: (n,) rows of the means in the archive.
 
-        Distances are relative to the box.
+        Distances between solutions are measured relative to the size of the box.
         """
         neighbour_count = min(NEIGHBOUR_COUNT, len(self.vectors) - 1)
         displacements = np.zeros((len(mean_rows), self._lower.size))
@@ -134,7 +135,10 @@ class FrontSampling:
         return displacements
 
     def _draw_block_displacements(self, mean_rows: Ints) -> Floats:
-        """Draw displacements (n, d) that move a block of points towards its position in another solution."""
+        """Draw displacements (n, d), each of which moves a block of neighbouring points towards another solution.
+
+        mean_rows: (n,) rows of the means in the archive.
+        """
         rng, count, point_count = self._rng, len(mean_rows), self._lower.size // self._axes
         other_rows = rng.integers(len(self.vectors), size=count)
         block_lengths = rng.integers(1, point_count + 1, size=count)
@@ -150,7 +154,7 @@ class FrontSampling:
         return np.asarray(fractions * is_moving_variable * (self.vectors[other_rows] - self.vectors[mean_rows]))
 
     def _draw_noise(self, scales: Floats) -> Floats:
-        """Draw noise (n, d) along a few directions for each sample.
+        """Draw random displacements (n, d) along a few of the given directions for each sample.
 
         scales: (n, 1) scale of each sample; a random factor multiplies it.
         """
@@ -188,9 +192,10 @@ class FrontSampling:
             )
 
     def _archive_rows(self, values: Floats) -> Ints:
-        """Return the numbers of the distinct non-dominated rows of objectives (n, m).
+        """Return the row numbers of the objectives (n, m) that the archive keeps.
 
-        If there are more than the archive can hold, return those that cover most of the hypervolume.
+        These are the distinct, non-dominated rows. If there are more than the archive can hold, keep those that cover
+        most of the hypervolume.
         """
         level = Level(tuple(range(values.shape[1])), (NO_GOAL,) * values.shape[1])
         front = np.flatnonzero(ranks(values, (level,)) == 0)

@@ -25,7 +25,7 @@ def hypervolume(points: Floats, reference: Floats) -> float:
 
     It is computed by slices of the last objective.
 
-    >>> hypervolume(np.array([[1.0, 3.0], [2.0, 1.0]]), np.array([4.0, 4.0]))  # 3 x 1 and 2 x 2 of it below
+    >>> hypervolume(np.array([[1.0, 3.0], [2.0, 1.0]]), np.array([4.0, 4.0]))  # areas 1 x 3 + 2 x 2
     7.0
     """
     points_below = points[(points < reference).all(axis=1)]
@@ -47,12 +47,14 @@ def _non_dominated(points: Floats) -> Floats:
     """Return the distinct non-dominated points (n, m)."""
     points = np.unique(points, axis=0)
     is_below = np.asarray((points[:, None, :] <= points[None, :, :]).all(axis=2))
-    # Each point is at or below itself.
+    # A distinct point is non-dominated if no point but itself is at or below it in all objectives.
     return np.asarray(points[is_below.sum(axis=0) == 1])
 
 
 def covering_order(points: Floats, reference: Floats, count: int, rng: np.random.Generator | None = None) -> Ints:
-    """Return the row numbers of up to `count` of the points (n, m), in the order of a greedy choice.
+    """Choose up to `count` points (n, m) that cover most hypervolume.
+
+    Return their row numbers in order of choice.
 
     reference: (m,) upper limit; a point that is not below it in every objective is left out.
     rng: random generator of the probes; None for the same probes in every call.
@@ -99,9 +101,12 @@ def _mark_covered_probes(points: Floats, probes: Floats) -> Marks:
 
 @compiled
 def _choose_rows_greedily(marks: Marks, first_rows: Ints, count: int) -> Ints:
-    """Return `count` rows of marks (n, p): `first_rows`, then repeatedly the row with most new probes.
+    """Choose `count` points that together cover many probes.
 
-    Of equal rows, the first is chosen. The gain of a row can only decrease when other rows are chosen. Its last count
+    Return the numbers of their rows in marks (n, p).
+
+    `first_rows` are chosen first, then repeatedly the row that covers most probes not yet covered. Of equal rows, the
+    first is chosen. The gain of a row can only decrease when other rows are chosen. Its last count
     is therefore an upper bound, and only few rows have to be counted again (Minoux, Optimization Techniques, Lecture
     Notes in Control and Information Sciences 7, 1978).
     """

@@ -11,7 +11,7 @@ from world.kernels import compiled, inner
 
 @compiled
 def covariance(rows: Floats, first_column: int, second_column: int, size: int) -> Floats:
-    """Return the covariance of two groups of columns, (size, size).
+    """Return the covariance matrix (size, size) between two groups of columns.
 
     rows: (n, d) samples minus their mean.
     first_column, second_column: index of the first column of each group.
@@ -28,7 +28,7 @@ def covariance(rows: Floats, first_column: int, second_column: int, size: int) -
 
 @compiled
 def cholesky(matrix: Floats, ridge: float) -> Floats:
-    """Return the lower Cholesky factor of a covariance (d, d), regularised on its diagonal.
+    """Return the lower Cholesky factor (d, d) of a covariance matrix (d, d) with a regularised diagonal.
 
     ridge: value added to each variance, as a fraction of the mean variance.
     """
@@ -85,8 +85,8 @@ def _add_multiple(values: Floats, factor: float, out: Floats) -> None:
 def band_cholesky(matrix: Floats, out: Floats) -> None:
     """Fill `out` with the lower Cholesky factor of a positive definite band matrix.
 
-    Both are stored as (d, b); entry [i, k] belongs to row i and column i - k. A pivot is at least 1e-12 times the
-    diagonal entry.
+    Both are stored as (d, b), with the b diagonals as columns; entry [i, k] belongs to row i and column i - k. A pivot
+    is at least 1e-12 times the diagonal entry.
     """
     size, width = matrix.shape
     for i in range(size):
@@ -99,9 +99,9 @@ def band_cholesky(matrix: Floats, out: Floats) -> None:
 
 @inner
 def solve_band(factor: Floats, right_side: Floats, out: Floats) -> None:
-    """Fill `out` (d,) with the solution of a linear system.
+    """Solve a linear system with a positive definite band matrix; write the solution to `out` (d,).
 
-    factor: factor of the band matrix, as `band_cholesky` computes it.
+    factor: (d, b) Cholesky factor of the band matrix, as `band_cholesky` computes it.
     right_side: (d,).
     """
     size, width = factor.shape

@@ -19,9 +19,6 @@ VARIANCE_RIDGE = 1e-6
 class MarkovChain(Umda):
     """Estimation of distribution like `planner.optimisers.umda.Umda`, with a Markov chain over groups.
 
-    The arguments are the same as for `Umda`; `basis` and `floor` are unused. The number of variables is a multiple of
-    `GROUP`; each group of consecutive variables depends on the previous group only.
-
     >>> def rank(scores):
     ...     return np.argsort(np.argsort(scores[:, 0]))
     >>> search = MarkovChain(np.full(6, -2.0), np.full(6, 6.0), rank, 400, np.random.default_rng(1))
@@ -32,7 +29,7 @@ class MarkovChain(Umda):
     True
 
     The arguments are the same as for `Umda`; `basis` and `floor` are unused. The number of variables is a multiple of
-    `GROUP`; each group of consecutive variables depends on the previous one.
+    `GROUP`; each group of consecutive variables depends on the previous group only.
     """
 
     GROUP = 3
@@ -44,9 +41,15 @@ class MarkovChain(Umda):
         """
         mean = self.samples.mean(axis=0)
         width = self.upper - self.lower
-        slope, spread = fit_chain(np.ascontiguousarray((self.samples - mean) / width), self.GROUP, VARIANCE_RIDGE)
+        regressions, residual_factors = fit_chain(
+            np.ascontiguousarray((self.samples - mean) / width), self.GROUP, VARIANCE_RIDGE
+        )
         return self._redraw(
-            lambda rows: mean + width * draw_chain(self._rng.normal(size=(rows, mean.size)), slope, spread), count
+            lambda sample_count: (
+                mean
+                + width * draw_chain(self._rng.normal(size=(sample_count, mean.size)), regressions, residual_factors)
+            ),
+            count,
         )
 
 
@@ -56,18 +59,19 @@ def fit_chain(rows: Floats, size: int, ridge: float) -> tuple[Floats, Floats]:
 
     rows: (n, d) samples minus their mean.
     size: number of variables of a group.
-    ridge: see `cholesky`.
+    ridge: value added to each variance, as a fraction of the mean variance of the group.
 
-    Returns the regression matrices and the Cholesky factors of the residuals' covariances, (g, size, size) each.
+    Returns, for each of the g groups, its regression matrix and the Cholesky factor of its residuals' covariance,
+    (g, size, size) each.
     """
     group_count = rows.shape[1] // size
-    slope, spread = np.zeros((group_count, size, size)), np.zeros((group_count, size, size))
-    copy_into(spread[0].ravel(), cholesky(covariance(rows, 0, 0, size), ridge).ravel())
+    regressions, residual_factors = np.zeros((group_count, size, size)), np.zeros((group_count, size, size))
+    copy_into(residual_factors[0].ravel(), cholesky(covariance(rows, 0, 0, size), ridge).ravel())
     for g in range(1, group_count):
         previous_column, column = (g - 1) * size, g * size
         factor = cholesky(covariance(rows, previous_column, previous_column, size), ridge)
         cross = covariance(rows, column, previous_column, size)
-        # slope = cross (L L^T)^-1, by forward and back substitution for each row.
+        # regressions = cross (L L^T)^-1, by forward and back substitution for each row.
         for i in range(size):
             for j in range(size):
                 for k in range(j):
@@ -77,29 +81,29 @@ def fit_chain(rows: Floats, size: int, ridge: float) -> tuple[Floats, Floats]:
                 for k in range(j + 1, size):
                     cross[i, j] -= factor[k, j] * cross[i, k]
                 cross[i, j] /= factor[j, j]
-        copy_into(slope[g].ravel(), cross.ravel())
+        copy_into(regressions[g].ravel(), cross.ravel())
         residuals = rows[:, column : column + size].copy()
         for n in range(rows.shape[0]):
             for i in range(size):
                 for k in range(size):
                     residuals[n, i] -= cross[i, k] * rows[n, previous_column + k]
-        copy_into(spread[g].ravel(), cholesky(covariance(residuals, 0, 0, size), ridge).ravel())
-    return slope, spread
+        copy_into(residual_factors[g].ravel(), cholesky(covariance(residuals, 0, 0, size), ridge).ravel())
+    return regressions, residual_factors
 
 
 @compiled
-def draw_chain(normals: Floats, slope: Floats, spread: Floats) -> Floats:
-    """Return samples of the chain, (n, d), made of independent standard normal numbers (n, d).
+def draw_chain(normals: Floats, regressions: Floats, residual_factors: Floats) -> Floats:
+    """Turn independent standard normal numbers (n, d) into samples (n, d) of the chain.
 
-    slope, spread: results of `fit_chain`.
+    regressions, residual_factors: results of `fit_chain`.
     """
-    group_count, size, _ = slope.shape
+    group_count, size, _ = regressions.shape
     out = np.zeros(normals.shape)
     for n in range(normals.shape[0]):
         for g in range(group_count):
             for i in range(size):
                 for k in range(size):
-                    out[n, g * size + i] += spread[g, i, k] * normals[n, g * size + k]
+                    out[n, g * size + i] += residual_factors[g, i, k] * normals[n, g * size + k]
                     if g > 0:
-                        out[n, g * size + i] += slope[g, i, k] * out[n, (g - 1) * size + k]
+                        out[n, g * size + i] += regressions[g, i, k] * out[n, (g - 1) * size + k]
     return out

@@ -53,6 +53,7 @@ class Gaussian:
     """
 
     def __init__(self, mean: Floats, deviation: float, population: int, scale: Floats | None = None) -> None:
+        """Set the learning rates of CMA-ES for this population and number of variables."""
         size = mean.size
         self.mean, self.deviation, self.population = mean.copy(), deviation, population
         weights = np.log(population / 2.0 + 0.5) - np.log(np.arange(1, population // 2 + 1))
@@ -91,8 +92,9 @@ class Gaussian:
         return reflect_into_box(self.mean + self.deviation * multiply_by_lower(self._draws, self._factor))
 
     def update(self, points: Floats, scores: Floats, rank: Callable[[Floats], Ints], noise: Floats) -> None:
-        """Update the Gaussian with the scores (n, c) of its last generation (n, d).
+        """Update the Gaussian with its last generation of points (n, d) and their scores (n, c).
 
+        rank: function that ranks scores, as for `BoxSearch`.
         noise: (n,) random numbers that break ties.
         """
         self.evaluations += len(points)
@@ -179,6 +181,7 @@ class Multistart(BoxSearch):
         *,
         initial: Floats | None = None,
     ) -> None:
+        """Start the first search if there are no first samples; the class documents the arguments."""
         super().__init__(lower, upper, rank, population, rng, initial=initial)
         self._population = population
         self._centre, self._scale = np.full(lower.size, 0.5), None
@@ -211,7 +214,7 @@ class Multistart(BoxSearch):
         self._draw_generation(self._search)
 
     def _store_generation(self, points: Floats, scores: Floats) -> None:
-        """Store a generation, best first, behind the best sample of all."""
+        """Set `samples` and `scores`: the best sample of all generations, then this sorted generation."""
         if len(self.scores) and self._rank(np.stack([self.scores[0], scores[0]]))[0] == 0:
             points, scores = np.concatenate([self.samples[:1], points]), np.concatenate([self.scores[:1], scores])
         self.samples, self.scores = points, scores
@@ -235,7 +238,7 @@ class Multistart(BoxSearch):
         return next_search
 
     def _may_continue(self, search: Gaussian) -> bool:
-        """Return True if a search may get another slice of evaluations at once.
+        """Return True if a search may continue at once with another slice of evaluations.
 
         It must be in the better half of the searches that have reached the same width, by their results at that width.
         The best search of all has to wait for its turn, so that half of the evaluations go to other searches.
@@ -262,7 +265,10 @@ class Multistart(BoxSearch):
         return 2 * int((ranks[1:] < ranks[0]).sum()) <= len(equally_narrow_scores)
 
     def _choose_search(self) -> Gaussian:
-        """Return the best waiting search, or a new search if new searches have had fewer evaluations."""
+        """Choose the search for the next slice, so that new and continued searches share the evaluations equally.
+
+        This is the best waiting search, or a new search.
+        """
         waiting_searches = [search for search in self._searches if search.curve and not search.is_done]
         self._is_continued = bool(waiting_searches) and self._spent_evaluations[True] <= self._spent_evaluations[False]
         if self._is_continued:
@@ -289,6 +295,6 @@ class Multistart(BoxSearch):
 
 
 def reflect_into_box(points: Floats) -> Floats:
-    """Return points (n, d) or (d,) reflected into the unit box at its sides."""
+    """Reflect points (n, d) or (d,) at the sides of the unit box until they are inside."""
     folded_points = np.mod(points, 2.0)
     return np.where(folded_points > 1.0, 2.0 - folded_points, folded_points)

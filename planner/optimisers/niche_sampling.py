@@ -34,10 +34,11 @@ class NicheSampling:
 
     >>> lower, upper = np.full((3, 2), -2.0), np.full((3, 2), 6.0)
     >>> search = NicheSampling(lower, upper, lambda rows, groups: rows[:, 0] > -1.0, np.random.default_rng(1))
-    >>> rows = search.first(40)
+    >>> rows = search.draw_first(40)
     >>> for generation in range(12):
     ...     costs = (rows**2).sum(axis=2)
-    ...     rows = search.next(rows, costs, 40, 0.6**generation * np.ones(2), 1e9, rows[range(3), costs.argmin(axis=1)])
+    ...     elite = rows[range(3), costs.argmin(axis=1)]
+    ...     rows = search.draw_next(rows, costs, 40, 0.6**generation * np.ones(2), 1e9, elite)
     >>> bool(np.abs(rows[:, 0]).max() < 0.25)  # the best of each group so far comes first
     True
     """
@@ -49,11 +50,12 @@ class NicheSampling:
         allowed: Callable[[Floats, Ints], Flags],
         rng: np.random.Generator,
     ) -> None:
+        """Store the boxes, the test for feasible samples, and the random generator."""
         self._lower, self._upper = lower, upper
         self._allowed = allowed
         self._rng = rng
 
-    def first(self, count: int, extension: Floats | float = 0.0) -> Floats:
+    def draw_first(self, count: int, extension: Floats | float = 0.0) -> Floats:
         """Draw samples (g, count, d), uniform in the boxes.
 
         extension: (d,) fraction of the box by which samples may exceed its upper bound before they are clipped. It is
@@ -72,10 +74,10 @@ class NicheSampling:
 
         return self._draw_feasible(size, draw, MAX_FIRST_REDRAWS)
 
-    def next(
+    def draw_next(
         self, rows: Floats, costs: Floats, count: int, deviation: Floats, max_cost: float, elite: Floats
     ) -> Floats:
-        """Return samples (g, count, d): the elite, the best sample of each niche, and new samples around them.
+        """Return the next samples (g, count, d): the elite, the best of each niche, and new ones around them.
 
         rows: (g, n, d) samples.
         costs: (g, n) costs of the samples.
@@ -86,19 +88,19 @@ class NicheSampling:
         selected, counts = _select(
             rows, costs, elite, CLEARING_RADIUS_RATIO * deviation, max_cost, max(1, int(MAX_SELECTED_FRACTION * count))
         )
-        groups, parents = len(rows), selected.shape[1]
+        group_count, parent_count = len(rows), selected.shape[1]
 
         def draw(group_numbers: Ints) -> Floats:
             """Return one sample near a random selected sample for each group number, (n, d)."""
-            parent = np.floor(self._rng.random(group_numbers.size) * counts[group_numbers]).astype(np.int64)
-            samples = selected[group_numbers, parent] + deviation * self._rng.standard_normal(
+            parent_rows = np.floor(self._rng.random(group_numbers.size) * counts[group_numbers]).astype(np.int64)
+            samples = selected[group_numbers, parent_rows] + deviation * self._rng.standard_normal(
                 (group_numbers.size, rows.shape[2])
             )
             return np.clip(samples, self._lower[group_numbers], self._upper[group_numbers])
 
-        out = self._draw_feasible((groups, count, rows.shape[2]), draw, MAX_REDRAWS)
-        is_selected = np.arange(parents) < counts[:, None]
-        out[:, :parents][is_selected] = selected[is_selected]
+        out = self._draw_feasible((group_count, count, rows.shape[2]), draw, MAX_REDRAWS)
+        is_selected = np.arange(parent_count) < counts[:, None]
+        out[:, :parent_count][is_selected] = selected[is_selected]
         return out
 
     def _draw_feasible(self, size: tuple[int, int, int], draw: Callable[[Ints], Floats], max_redraws: int) -> Floats:
@@ -123,7 +125,7 @@ class NicheSampling:
 def _select(
     rows: Floats, costs: Floats, elite: Floats, clearing_radius: Floats, max_cost: float, max_count: int
 ) -> tuple[Floats, Ints]:
-    """Select the elite of each group, and then its best samples that are distinct from all selected ones.
+    """Select each group's elite, then its best samples that are distinct from all samples selected before.
 
     Returns the selected samples, (g, max_count, d), padded with zeros, and the number of samples of each group, (g,).
 
@@ -134,9 +136,9 @@ def _select(
     max_cost: maximum cost of a selected sample. It applies only after the first `MIN_SELECTED_COUNT` selections.
     max_count: maximum number of selected samples of a group. Both counts include the elite.
     """
-    groups, _, size = rows.shape
-    selected, counts = np.zeros((groups, max_count, size)), np.ones(groups, dtype=np.int64)
-    for g in range(groups):
+    group_count, _, size = rows.shape
+    selected, counts = np.zeros((group_count, max_count, size)), np.ones(group_count, dtype=np.int64)
+    for g in range(group_count):
         copy_into(selected[g, 0], elite[g])
         for k in np.argsort(costs[g], kind="mergesort"):
             selected_count = counts[g]

@@ -58,7 +58,7 @@ POPULATION_GROWTH = 2
 
 
 class PartialResampling(BoxSearch):
-    """Resampling of parts: replace samples by better ones that differ from them in some variables.
+    """Search that redraws part of the variables of each sample, and keeps the new sample if it is better.
 
     >>> def rank(scores):
     ...     return np.argsort(np.argsort(scores[:, 0]))
@@ -86,6 +86,7 @@ class PartialResampling(BoxSearch):
         *,
         initial: Floats | None = None,
     ) -> None:
+        """Start with a small population of samples; the class documents the arguments."""
         super().__init__(lower, upper, rank, population, rng, initial=initial)
         self._max_count = population
         self._count = min(population, max(MIN_POPULATION, FIRST_POPULATION_PER_VARIABLE * lower.size))
@@ -96,7 +97,7 @@ class PartialResampling(BoxSearch):
             self._pending_samples = self._pending_samples[: self._count]
 
     def _start(self) -> None:
-        """Forget the population and the adapted parameters."""
+        """Discard the population, and reset the adapted parameters to their first values."""
         self._points: Floats = np.empty((0, self.lower.size))
         self._point_scores: Floats = np.empty((0, 0))
         self._redrawn_fraction, self._width = FIRST_REDRAWN_FRACTION, FIRST_WIDTH
@@ -158,17 +159,17 @@ class PartialResampling(BoxSearch):
         count = len(self._points)
         ranks = self._rank(np.concatenate([self._point_scores, scores]))
         gains = ranks[:count] - ranks[count:]
-        better = gains > 0
+        is_better = gains > 0
         # The population is sorted, so that the best parent is the first.
         self._stalled_generations = 0 if ranks[count:].min() < ranks[0] else self._stalled_generations + 1
-        if better.any():
-            weights = gains[better] / gains[better].sum()
-            fractions = self._fractions[better]
-            follow = float((weights * fractions**2).sum() / (weights * fractions).sum())
-            self._redrawn_fraction += LEARNING_RATE * (follow - self._redrawn_fraction)
-            log_ratio = float((weights * np.log(self._widths[better] / self._width)).sum())
+        if is_better.any():
+            weights = gains[is_better] / gains[is_better].sum()
+            fractions = self._fractions[is_better]
+            weighted_fraction = float((weights * fractions**2).sum() / (weights * fractions).sum())
+            self._redrawn_fraction += LEARNING_RATE * (weighted_fraction - self._redrawn_fraction)
+            log_ratio = float((weights * np.log(self._widths[is_better] / self._width)).sum())
             self._width *= math.exp(LEARNING_RATE * log_ratio)
-        self._points[better], self._point_scores[better] = self._pending_samples[better], scores[better]
+        self._points[is_better], self._point_scores[is_better] = self._pending_samples[is_better], scores[is_better]
 
     def _store(self, points: Floats, scores: Floats) -> None:
         """Store the best sample of all starts, and behind it a generation (n, d) with scores (n, c), best first."""

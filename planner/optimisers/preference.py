@@ -34,11 +34,11 @@ class Level:
     def __post_init__(self) -> None:
         """Raise ValueError if the goals do not match the columns."""
         if len(self.columns) != len(self.goals) or not self.columns:
-            raise ValueError(f"{len(self.columns)} columns and {len(self.goals)} goals: give one goal a column")
+            raise ValueError(f"{len(self.columns)} columns but {len(self.goals)} goals: give one goal per column")
 
 
 def ranks(scores: Floats, levels: Sequence[Level]) -> Ints:
-    """Return the rank of each row of scores (n, c): the number of rows that are preferred to it, (n,).
+    """Rank each row of scores (n, c) by the number of rows that are preferred to it, (n,).
 
     Every component is first raised to its goal, so that no row is below a goal. The rule "u dominates v on U, or is
     equal there and v violates a goal outside U" then becomes Pareto dominance on the level, because a component outside
@@ -146,11 +146,14 @@ def _merge_sort(table: Floats, first_row: int, width: int, order: Ints, scratch:
 
 
 @inner
-def _precedes(table: Floats, first_row: int, width: int, a: int, b: int) -> bool:
-    """Return True if candidate a precedes candidate b in lexicographic order."""
+def _precedes(table: Floats, first_row: int, width: int, candidate: int, other: int) -> bool:
+    """Return True if a candidate precedes the other candidate in lexicographic order.
+
+    table: (c, n) scores, one column per candidate. Its rows from first_row to first_row + width - 1 are compared.
+    """
     for c in range(first_row, first_row + width):
-        if table[c, a] != table[c, b]:
-            return bool(table[c, a] < table[c, b])
+        if table[c, candidate] != table[c, other]:
+            return bool(table[c, candidate] < table[c, other])
     return False
 
 
@@ -215,9 +218,11 @@ def _count_marks(marks: Ints) -> int:
 
 @inner
 def _dense_ranks(rows: Floats, begin: int, end: int) -> tuple[Ints, int]:
-    """Return the dense ranks of a group's candidates by the second row, from 1, and the number of ranks.
+    """Rank the candidates begin to end - 1 by the second row of scores.
 
-    Equal values have the same rank.
+    Return their ranks and the number of ranks.
+
+    Ranks start at 1 and have no gaps; equal values have the same rank.
     """
     count = end - begin
     order, dense_ranks = np.empty(count, dtype=np.int64), np.empty(count, dtype=np.int64)
@@ -236,7 +241,8 @@ def _dense_ranks(rows: Floats, begin: int, end: int) -> tuple[Ints, int]:
 def _add_dominator_counts_by_tree(rows: Floats, begin: int, end: int, order: Ints, candidate_ranks: Ints) -> None:
     """Add the number of dominators of each candidate of a group to `candidate_ranks`, in O(n log n).
 
-    Uses a Fenwick tree over the second of two rows of scores; it is faster for many candidates.
+    The arguments are those of `_add_dominator_counts`, with two rows of scores. A Fenwick tree over the second row
+    counts the dominators; it is faster than a scan if there are many candidates.
     """
     dense_ranks, rank_count = _dense_ranks(rows, begin, end)
     tree = np.zeros(rank_count + 1, dtype=np.int64)

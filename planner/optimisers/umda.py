@@ -49,6 +49,7 @@ class Umda(BoxSearch):
         basis: Floats | None = None,
         floor: Floats | None = None,
     ) -> None:
+        """Draw or clip the first samples; the class documents the arguments."""
         super().__init__(lower, upper, rank, population, rng, initial=initial)
         self._basis = basis
         self._floor = floor
@@ -76,9 +77,9 @@ class Umda(BoxSearch):
         )
 
     def _redraw(self, draw: Callable[[int], Floats], count: int) -> Floats:
-        """Draw samples, redraw those outside the box, and finally clip them.
+        """Draw `count` samples, redraw those outside the box, and finally clip them.
 
-        draw: function that returns a number of samples.
+        draw: function that draws the given number of samples.
         """
         samples = draw(count)
         outside_rows = np.flatnonzero(((samples < self.lower) | (samples > self.upper)).any(axis=1))
@@ -91,7 +92,10 @@ class Umda(BoxSearch):
         return np.clip(samples, self.lower, self.upper)
 
     def _redraw_each(self, samples: Floats, mean: Floats, deviation: Floats) -> Floats:
-        """Redraw the values outside the box from independent Gaussians, and finally clip them."""
+        """Redraw the values of samples (n, d) outside the box from independent Gaussians, and finally clip them.
+
+        mean, deviation: (d,) parameters of the Gaussians.
+        """
         rows, columns = np.nonzero((samples < self.lower) | (samples > self.upper))
         for _ in range(MAX_REDRAWS):
             if rows.size == 0:
@@ -104,5 +108,5 @@ class Umda(BoxSearch):
 
 
 def _project(rows: Floats, basis: Floats) -> Floats:
-    """Multiply rows (n, d) by a basis (d, k), after copying arrays that are not contiguous."""
+    """Project rows (n, d) onto the columns of a basis (d, k), after making both arrays contiguous."""
     return multiply_by_sparse(np.ascontiguousarray(rows), np.ascontiguousarray(basis))

@@ -28,7 +28,7 @@ class Algorithm:
     seeded: starts from grid routes, improved by a pattern search.
     final_shortening: finally shortens the best path; among zones, or if that fails, moves all its waypoints at once.
     optimiser: name of an optimiser in `planner.optimisers`; "waypoints" is
-    `planner.search.generations.waypoint_generations`.
+    `planner.search.generations.run_waypoint_generations`.
     """
 
     name: str
@@ -165,8 +165,8 @@ def find_algorithm(name: str | None, source: str) -> Algorithm:
 
 
 def limits_for(algorithm: Algorithm, limits: "Limits") -> "Limits":
-    """Return the limits of the path with which an algorithm plans.
+    """Return the limits within which an algorithm plans.
 
-    An algorithm that counts violations, as the paper does, ignores the tracking error.
+    An algorithm that counts violations, as in the paper, ignores the tracking error of the autopilot.
     """
     return limits if algorithm.graded else replace(limits, tracking=None)

@@ -30,8 +30,8 @@ from world.scenario import Scenario
 
 # Number of cells along the map's longer side.
 CELL_COUNT = 150
-# Number of heights from the lowest to the highest allowed.
-HEIGHT_COUNT = 5
+# Number of levels of cells, from the lowest to the highest allowed altitude.
+LEVEL_COUNT = 5
 # State of an open cell; the state of a cell closed by a zone is the index of the zone.
 _OPEN_CELL = -1
 # State of a cell closed by the ground.
@@ -49,13 +49,15 @@ class SeparatingZones(NamedTuple):
     cell_side: float
 
 
-def separating_zones(scenario: Scenario) -> SeparatingZones | None:
-    """Return the zones that separate start and destination; None if the ground does, or if nothing does.
+def find_separating_zones(scenario: Scenario) -> SeparatingZones | None:
+    """Find the zones that separate start and destination on a grid of cells.
+
+    Return None if nothing separates them, or if the ground alone does.
 
     A gap narrower than a cell is treated as closed. Missiles and the aircraft's climb are ignored.
 
     >>> from world.scenario import load_scenario
-    >>> separating_zones(load_scenario("tight")) is None
+    >>> find_separating_zones(load_scenario("tight")) is None
     True
     """
     terrain = scenario.terrain
@@ -64,18 +66,19 @@ def separating_zones(scenario: Scenario) -> SeparatingZones | None:
     cell_side = float(np.ptp(scenario.bounds, axis=1).max()) / CELL_COUNT
     east, north = (np.arange(lower + 0.5 * cell_side, upper, cell_side) for lower, upper in scenario.bounds)
     ground_altitudes = terrain.height(east[None, :], north[:, None])
-    min_heights = np.maximum(ground_altitudes + scenario.limits.min_clearance_m, scenario.floor)
-    max_heights = np.full(ground_altitudes.shape, scenario.ceiling)
+    min_altitudes = np.maximum(ground_altitudes + scenario.limits.min_clearance_m, scenario.floor)
+    max_altitudes = np.full(ground_altitudes.shape, scenario.ceiling)
     if scenario.limits.max_height_m is not None:
-        max_heights = np.minimum(max_heights, ground_altitudes + scenario.limits.max_height_m)
-    cells = np.full((HEIGHT_COUNT, *ground_altitudes.shape), _OPEN_CELL, dtype=np.int64)
-    cells[:, ~(min_heights <= max_heights)] = _GROUND_CELL
+        max_altitudes = np.minimum(max_altitudes, ground_altitudes + scenario.limits.max_height_m)
+    cells = np.full((LEVEL_COUNT, *ground_altitudes.shape), _OPEN_CELL, dtype=np.int64)
+    cells[:, ~(min_altitudes <= max_altitudes)] = _GROUND_CELL
     ends = [
-        _end_cell(scenario, end, cell_side, min_heights, max_heights) for end in (scenario.start, scenario.destination)
+        _end_cell(scenario, end, cell_side, min_altitudes, max_altitudes)
+        for end in (scenario.start, scenario.destination)
     ]
     if not _are_connected(cells, ends):
         return None
-    _close_cells(zone_records(scenario.zones), east, north, ground_altitudes, min_heights, max_heights, cells)
+    _close_cells(zone_records(scenario.zones), east, north, ground_altitudes, min_altitudes, max_altitudes, cells)
     for end in ends:
         cells[end] = _OPEN_CELL
     if _are_connected(cells, ends):
@@ -87,18 +90,18 @@ def separating_zones(scenario: Scenario) -> SeparatingZones | None:
 
 
 def _end_cell(
-    scenario: Scenario, end: Floats, cell_side: float, min_heights: Floats, max_heights: Floats
+    scenario: Scenario, end: Floats, cell_side: float, min_altitudes: Floats, max_altitudes: Floats
 ) -> tuple[int, int, int]:
-    """Return the indices of the cell of a fixed end: height, row and column."""
+    """Return level, row and column of the cell that contains a fixed end of the path."""
     cell = ((end[:2] - scenario.bounds[:, 0]) / cell_side).astype(np.int64)
     column, row = (
         int(np.clip(index, 0, size - 1))
-        for index, size in zip(cell, (min_heights.shape[1], min_heights.shape[0]), strict=True)
+        for index, size in zip(cell, (min_altitudes.shape[1], min_altitudes.shape[0]), strict=True)
     )
-    fraction = (end[2] - min_heights[row, column]) / max(
-        float(max_heights[row, column] - min_heights[row, column]), 1e-6
+    fraction = (end[2] - min_altitudes[row, column]) / max(
+        float(max_altitudes[row, column] - min_altitudes[row, column]), 1e-6
     )
-    return int(np.clip(round(fraction * (HEIGHT_COUNT - 1)), 0, HEIGHT_COUNT - 1)), row, column
+    return int(np.clip(round(fraction * (LEVEL_COUNT - 1)), 0, LEVEL_COUNT - 1)), row, column
 
 
 def _are_connected(cells: Ints, ends: list[tuple[int, int, int]]) -> bool:
@@ -134,14 +137,16 @@ def _close_cells(
     records: ZoneRecords,
     east: Floats,
     north: Floats,
-    ground: Floats,
-    min_heights: Floats,
-    max_heights: Floats,
+    ground_altitudes: Floats,
+    min_altitudes: Floats,
+    max_altitudes: Floats,
     cells: Ints,
 ) -> None:
     """Set each open cell that a zone blocks to the index of the first such zone.
 
-    cells: (heights, rows, columns), changed in place.
+    east, north: (columns,) and (rows,) centres of the cells, m.
+    ground_altitudes, min_altitudes, max_altitudes: (rows, columns) ground, and lowest and highest allowed altitude, m.
+    cells: (levels, rows, columns) states of the cells, changed in place.
     """
     for z in range(records.zones.shape[0]):
         zone = records.zones[z]
@@ -152,8 +157,10 @@ def _close_cells(
                 if zone.exclusion and not is_inside:
                     continue
                 for k in range(cells.shape[0]):
-                    altitude = min_heights[i, j] + (max_heights[i, j] - min_heights[i, j]) * k / (cells.shape[0] - 1)
-                    is_within = is_inside and not height_outside_band(zone, altitude, ground[i, j]) > 0.0
+                    altitude = min_altitudes[i, j] + (max_altitudes[i, j] - min_altitudes[i, j]) * k / (
+                        cells.shape[0] - 1
+                    )
+                    is_within = is_inside and not height_outside_band(zone, altitude, ground_altitudes[i, j]) > 0.0
                     if cells[k, i, j] == _OPEN_CELL and is_within == zone.exclusion:
                         cells[k, i, j] = z
 
@@ -161,16 +168,17 @@ def _close_cells(
 # --- Bands of heights closed by the required margins ---
 
 
-def closed_bands(problem: Problem) -> list[str]:
-    """Return a line about each altitude band that the required margins leave empty.
+def describe_closed_bands(problem: Problem) -> list[str]:
+    """Describe each altitude band that is closed by the margins that a plan requires, one line per band.
 
-    One band lies between the clearance and the maximum height above ground. Each inclusion has a band, too.
+    The bands are those between the clearance and the maximum height above ground, and between the limits of each
+    inclusion.
 
     >>> from planfly.workflow.uav import load_uav
     >>> from planner.evaluation.problem import make_problem
     >>> from world.scenario import load_scenario
     >>> scenario = load_scenario("tight")
-    >>> closed_bands(make_problem(scenario, load_uav(scenario).limits))
+    >>> describe_closed_bands(make_problem(scenario, load_uav(scenario).limits))
     []
     """
     data, lines = problem.certified, []
@@ -192,8 +200,8 @@ def closed_bands(problem: Problem) -> list[str]:
         name, bottom_height = max(bottoms.items(), key=lambda entry: entry[1], default=("", -math.inf))
         if bottom_height > ceiling.height - margin:
             lines.append(
-                f"{zone.name} is {bottom_height + margin - ceiling.height:.1f} m too low for a plan's margins above"
-                f" {name} and below its ceiling at {ceiling.height:g} m"
+                f"{zone.name} is {bottom_height + margin - ceiling.height:.1f} m too low: a plan needs margins above"
+                f" {name} and below the zone's ceiling at {ceiling.height:g} m"
             )
     return lines
 
@@ -232,7 +240,7 @@ ZONE_SAMPLE_SPACING_M = 20.0
 
 
 def explain_failure(plan: Plan, limits: Limits | None = None) -> list[str]:
-    """Return lines that explain why a plan is infeasible, and which routes the search cannot find.
+    """Explain in lines of text why a plan is infeasible, and which routes its search could not find.
 
     limits: limits of the path. If given, the margins that a plan requires are also checked, and the result is empty if
         the path keeps all of them.
@@ -256,29 +264,34 @@ def explain_failure(plan: Plan, limits: Limits | None = None) -> list[str]:
         problem = make_problem(scenario, limits if algorithm is None else limits_for(algorithm, limits))
         certificate = certify(problem, plan.waypoints)
         if certificate.ok and certificate.kill_distance > 0.0 and not any(plan.violations):
-            # The search has found a path; the fault concerns the autopilot, and the certificate states it.
+            # The path itself is safe: the problem concerns the autopilot, and the plan's certificate states it.
             return []
-        lines += closed_bands(problem) or ([] if lines else _describe_margin_walls(problem))
+        lines += describe_closed_bands(problem) or ([] if lines else _describe_margin_walls(problem))
         lines += _describe_proven_closure(problem)
-    barrier = separating_zones(scenario)
+    barrier = find_separating_zones(scenario)
     if barrier is not None:
         names = ", ".join(barrier.zones[:MAX_NAMES]) + (" and more" if len(barrier.zones) > MAX_NAMES else "")
-        lines.append(f"zones block every route (gaps narrower than {barrier.cell_side:.0f} m count as closed): {names}")
+        lines.append(
+            f"zones block every route: {names} (gaps narrower than {barrier.cell_side:.0f} m are treated as closed)"
+        )
     has_no_explanation, violated_names = not lines, violated_zones(scenario, plan.waypoints)
     if violated_names:
         lines.append(f"the best path violates: {', '.join(violated_names[:MAX_NAMES])}")
     elif not lines:
         failed_constraints = [violation.name.lower() for violation in Violation if plan.violations[violation]]
         if failed_constraints:
-            lines.append(f"no obstacle blocks every route; the best path fails by: {', '.join(failed_constraints)}")
+            lines.append(f"no obstacle blocks every route; the best path violates: {', '.join(failed_constraints)}")
     if algorithm is not None and algorithm.encoding == "rotated" and algorithm.seeded:
-        lines.append("routes that turn back or circle to climb were searched too, on a coarse lattice")
+        lines.append("the search also tried routes that turn back or circle to climb, on a coarse lattice")
         if has_no_explanation and algorithm.optimiser == "waypoints" and scenario.planner.budget is None:
-            lines.append("it is not proven that no path exists; --budget 1000000 searches for longer")
+            lines.append(
+                f"it is not proven that no path exists: [planner] waypoints = {2 * len(plan.waypoints)} allows more"
+                " turns, and --budget 1000000 searches for longer"
+            )
     elif algorithm is not None and algorithm.encoding == "rotated":
         lines.append(
-            "paths in the rotated frame always advance along the line to the destination; "
-            "a route that must turn back was not searched"
+            "this algorithm searches only paths that always advance along the straight line to the destination; "
+            "it searched no route that turns back"
         )
     return lines
 
@@ -296,8 +309,8 @@ def _describe_walls(scenario: Scenario) -> list[str]:
         if not (gaps > 0.0).any():
             lines.append(
                 f"{distance:.0f} m from the start, terrain blocks the whole width of the map: over its lowest point"
-                f" there the clearance requires {np.nanmin(min_altitudes):.0f} m AMSL, and the ceiling is"
-                f" {scenario.ceiling:.0f} m"
+                f" the clearance requires {np.nanmin(min_altitudes):.0f} m AMSL, but the ceiling is at"
+                f" {scenario.ceiling:.0f} m AMSL"
             )
             break
         if not _has_gap(scenario, points[gaps > 0.0], min_altitudes[gaps > 0.0]):
@@ -308,10 +321,7 @@ def _describe_walls(scenario: Scenario) -> list[str]:
 
 
 def _map_crossings(scenario: Scenario) -> Iterator[tuple[float, np.ndarray]]:
-    """Yield lines across the map between start and destination.
-
-    Each has its distance from the start, m, and its points, (n, 2).
-    """
+    """Yield lines across the map: distance of the line from the start (m), and its points (n, 2), m."""
     frame = rotated_frame(scenario.start, scenario.destination)
     half_width = float(np.hypot(*np.diff(scenario.bounds, axis=1)[:, 0]))
     across = np.linspace(-half_width, half_width, POINTS_ACROSS)
@@ -339,13 +349,13 @@ def _describe_margin_walls(problem: Problem) -> list[str]:
             return [
                 f"{distance:.0f} m from the start, the ground is too high across the whole map: over its lowest point"
                 f" the clearance and a margin of {margin:.1f} m require {min_altitude + margin:.0f} m AMSL, but"
-                f" {name} allows {ceiling:.0f} m"
+                f" {name} allows {ceiling:.0f} m AMSL"
             ]
     return []
 
 
 def _has_gap(scenario: Scenario, points: np.ndarray, min_altitudes: np.ndarray) -> bool:
-    """Return True if some altitude above some of the points (n, 2) is free of kill spheres.
+    """Return True if there is an altitude outside all kill spheres above at least one of the points (n, 2).
 
     min_altitudes: lowest allowed altitude at each point, m, (n,).
     """
@@ -383,9 +393,27 @@ def _describe_proven_closure(problem: Problem) -> list[str]:
     others = f" and {len(missiles) - MAX_NAMED_MISSILES} more" if len(missiles) > MAX_NAMED_MISSILES else ""
     return [
         f"no path exists: {', '.join(names)}{others} block every path between ground, {ceiling} and the edges of the"
-        " map;"
-        " without any one of them a path may exist"
+        " map; without any one of these missiles a path may exist"
     ]
+
+
+def nearest_missile_text(plan: Plan) -> str:
+    """Return a line that names the missile that a plan's legs approach most closely, and the leg.
+
+    The certificate's distance is smaller than the leg's, because the flight may deviate from its legs.
+    """
+    threats, waypoints = plan.scenario.threats, plan.waypoints
+    starts, legs = waypoints[:-1, None], np.diff(waypoints, axis=0)[:, None]
+    squared_lengths = np.maximum((legs**2).sum(axis=2), 1e-9)
+    fractions = np.clip(((threats.position - starts) * legs).sum(axis=2) / squared_lengths, 0.0, 1.0)
+    closest_points = starts + fractions[..., None] * legs
+    distances = np.sqrt(((threats.position - closest_points) ** 2).sum(axis=2)) - threats.kill_radius
+    distances[:, threats.kill_radius <= 0.0] = math.inf
+    leg, missile = np.unravel_index(int(np.argmin(distances)), distances.shape)
+    return (
+        f"leg {leg} passes {distances[leg, missile]:.1f} m outside the kill radius of {threats.names[missile]};"
+        f" with its tracking error the flight may come {-plan.certificate.kill_distance:.1f} m inside it"
+    )
 
 
 def violated_zones(scenario: Scenario, path: np.ndarray) -> list[str]:

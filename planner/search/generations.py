@@ -1,8 +1,8 @@
 """Run generations of two kinds of evolutionary search, over whole paths and over single waypoints.
 
-`path_generations` runs an optimiser on vectors of whole paths, ranked by the preference between their scores.
+`run_path_generations` runs an optimiser on vectors of whole paths, ranked by the preference between their scores.
 
-`waypoint_generations` is a factorised distribution algorithm (Mühlenbein and Mahnig, "FDA - a scalable evolutionary
+`run_waypoint_generations` is a factorised distribution algorithm (Mühlenbein and Mahnig, "FDA - a scalable evolutionary
 algorithm for the optimization of additively decomposed functions", Evolutionary Computation 7, 1999) over the paper's
 subspaces: "to find one optimal waypoint in each subspace, so that the line segments from itself to its two adjacent
 waypoints satisfy all the constraints and objectives" (Yang, Tang and Lozano, CEC 2014, section I).
@@ -43,7 +43,7 @@ UNSAFE_SEARCH_FRACTION = 0.3
 SAFE_SEARCH_FRACTION = 0.1
 
 
-def path_generations(search: Search, population: int, generations: int, starts: Floats) -> Floats:
+def run_path_generations(search: Search, population: int, generations: int, starts: Floats) -> Floats:
     """Run an optimiser on whole paths; return the best vector (d,) of the last generation.
 
     starts: vectors (s, d) around which the first population is sampled.
@@ -85,7 +85,7 @@ def _preference_levels(search: Search) -> tuple[Level, ...]:
 
 
 def _best_row(scores: Floats) -> Floats:
-    """Return the best row (8,) of scores (n, 8) in the order of the archive."""
+    """Return the row (8,) of scores (n, 8) that the archive would place first."""
     return np.asarray(scores[best_first(scores)[0]])
 
 
@@ -117,9 +117,9 @@ def _is_stagnant(best_scores: list[Floats]) -> bool:
 
 # Maximum number of generations; the last ones move waypoints by decimetres.
 MAX_GENERATIONS = 10
-# Maximum number of generations with seeds, whose best path is finally shortened anyway.
+# Maximum number of generations of a seeded search: fewer, because the best path is shortened afterwards.
 SEEDED_GENERATIONS = 6
-# Population with seeds, as a fraction of the usual population.
+# Population of a seeded search, as a fraction of the usual population.
 SEEDED_POPULATION_FRACTION = 0.4
 # Population of later generations, as a fraction of the first.
 LATER_POPULATION_FRACTION = 0.2
@@ -130,9 +130,10 @@ MAX_LEGS = 6_000_000
 # Maximum number of legs that all attempts of a search evaluate if the scenario states no budget, relative to the legs
 # between all candidates of the first attempt.
 MAX_LEG_RATIO = 2.0
-# Remaining legs that another attempt requires, relative to the same number.
+# Remaining legs that another attempt requires, relative to the legs between all candidates of the first attempt.
 RETRY_LEG_FRACTION = 0.75
-# Fraction of the remaining legs that one generation without a short path may take, as hardly any leg can be skipped.
+# Fraction of the remaining legs that one generation without a bound on the cost may evaluate: without a bound, hardly
+# any leg can be skipped.
 UNBOUNDED_LEG_FRACTION = 0.5
 # Initial sampling deviation around a selected waypoint along, as a fraction of the interval.
 FIRST_DEVIATION_ALONG_FRACTION = 0.4
@@ -147,9 +148,9 @@ DEVIATION_FACTOR = 0.5
 ABOVE_CEILING_FRACTION = 0.3
 # Maximum excess of a path through a selected waypoint over the best path in the first generation, as a fraction.
 FIRST_EXCESS_FRACTION = 0.1
-# The same in the last generation.
+# Maximum excess in the last generation, as a fraction.
 LAST_EXCESS_FRACTION = 0.003
-# The same in the first generation with seeds, whose best path is closer to the optimum.
+# Maximum excess in the first generation of a seeded search, whose best path is closer to the optimum.
 SEEDED_EXCESS_FRACTION = 0.05
 # Bounds on the first path's cost relative to the straight line, tried in this order: lower bounds are faster.
 FIRST_COST_RATIO_BOUNDS = (1.15, 1.3, 1.6, 2.5, math.inf)
@@ -161,8 +162,8 @@ INTERVAL_STEP = 3
 REPAIR_EVALUATIONS = 100
 
 
-def waypoint_generations(search: Search, population: int, generations: int) -> None:
-    """Run the factorised distribution algorithm; insert the paths that it finds into the archive.
+def run_waypoint_generations(search: Search, population: int, generations: int) -> None:
+    """Run the factorised distribution algorithm, and insert the paths that it finds into the archive.
 
     population: number of candidates per interval in the first generation.
     generations: number of generations, at most `MAX_GENERATIONS`, or `SEEDED_GENERATIONS` with seeds.
@@ -179,7 +180,7 @@ def waypoint_generations(search: Search, population: int, generations: int) -> N
     deviation = np.array(
         [FIRST_DEVIATION_ALONG_FRACTION * interval, FIRST_DEVIATION_ACROSS_FRACTION * interval, FIRST_DEVIATION_UP_M]
     )
-    rows = sampling.first(first_count, np.array([0.0, 0.0, ABOVE_CEILING_FRACTION]))
+    rows = sampling.draw_first(first_count, np.array([0.0, 0.0, ABOVE_CEILING_FRACTION]))
     if not len(search.archive.vectors):
         # The archive must contain a path whenever the search is stopped.
         search.evaluate(_as_vectors(rows[:, :1]))
@@ -201,12 +202,15 @@ def waypoint_generations(search: Search, population: int, generations: int) -> N
         if generation < generation_count - 1:
             cost = chains.cost[1:-1]
             elite = search.archive.vectors[0].reshape(inner_count, 3)
-            rows = sampling.next(rows, cost, later_count, deviation, float(cost.min()) * (1.0 + slack), elite)
+            rows = sampling.draw_next(rows, cost, later_count, deviation, float(cost.min()) * (1.0 + slack), elite)
             deviation = DEVIATION_FACTOR * deviation
 
 
 def _first_candidate_count(search: Search, population: int) -> int:
-    """Return the number of candidates per interval in the first generation, for a requested population."""
+    """Return the number of candidates per interval in the first generation, limited by memory.
+
+    population: requested number of candidates.
+    """
     max_count = int(math.sqrt(MAX_LEGS / (search.encoding.waypoints - 1)))
     return max(2, min(int(population * (SEEDED_POPULATION_FRACTION if search.algorithm.seeded else 1.0)), max_count))
 
@@ -222,7 +226,10 @@ def _limit_generations(search: Search, generations: int) -> int:
 
 
 def count_remaining_legs(search: Search) -> int:
-    """Return the number of legs that the search may still evaluate."""
+    """Return the number of legs that the search may still evaluate.
+
+    It is not limited (`ALL_LEGS`) if the scenario states a budget of evaluations.
+    """
     settings = search.problem.scenario.planner
     if settings.budget is not None:
         return ALL_LEGS
@@ -251,12 +258,12 @@ def _as_vectors(rows: Floats) -> Floats:
 
 
 def _join_candidates(search: Search, paths: Floats, slack: float) -> WaypointChains:
-    """Find the best paths through the waypoints of some paths (k, w, 3), up to a limit of the cost.
+    """Join the waypoints of different paths (k, w, 3) to the best path through each waypoint.
 
-    slack: fraction by which the limit exceeds the cost of the best known path.
+    slack: fraction by which the first bound exceeds the cost of the best safe path.
 
-    Without a limit almost every leg would be evaluated. If few legs may still be evaluated, only the first candidates
-    are joined.
+    Larger bounds follow until a path is found: without a bound almost every leg would be evaluated. If few legs may
+    still be evaluated, only the first candidates are joined.
     """
     data, space = search.problem.search, search.problem.space
     straight_length = math.dist(space.start, space.destination)

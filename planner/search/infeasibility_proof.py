@@ -26,7 +26,7 @@ COLUMN_COUNT = 500
 MIN_SIDE_M = 10.0
 # Maximum number of closed altitude ranges of a column; further ranges stay open.
 MAX_ALTITUDE_RANGES = 6
-# Added to the altitude of the highest level flight, m: more than the error of its interpolation.
+# Added to the altitude of the highest level flight, m; it exceeds the error of the interpolation.
 LEVEL_FLIGHT_ROUNDING_M = 1e-6
 
 
@@ -69,8 +69,8 @@ def is_closed(data: ProblemArrays, missiles: Flags | None = None, margin: float 
 def highest_level_flight(data: ProblemArrays) -> float:
     """Return the highest altitude at which the aircraft can fly level, m; no waypoint may be above it.
 
-    Return inf if no such altitude exists, or if the wind is too strong to hold a course. The limit applies only if both
-    slope limits are the aircraft's limits, as in `planner.evaluation.leg_constraints`.
+    Return inf if there is no such limit below the ceiling, or if the wind is too strong to hold a course. The limit
+    applies only if both slope limits are the aircraft's limits, as in `planner.evaluation.leg_constraints`.
     """
     table = data.aircraft
     if not (math.isnan(data.max_climb) and math.isnan(data.max_dive) and table.equivalent > 0.0):
@@ -161,7 +161,10 @@ def _is_proven_closed(data: ProblemArrays, missiles: Flags, column_size: float, 
 
 @inner
 def _lowest_ground(data: ProblemArrays, i: int, j: int, column_size: float) -> float:
-    """Return the height of the lowest pixel below a column or next to it, m; -inf if a pixel has no data."""
+    """Return the lowest ground below a column or next to it, m; -inf if a pixel has no data.
+
+    i, j: indices of the column towards east and north.
+    """
     first_column = math.inf
     first_row = math.inf
     last_column = -math.inf
@@ -197,7 +200,8 @@ def _close_sphere(
 ) -> None:
     """Close the altitudes of columns that are completely inside a sphere.
 
-    east, north: distances of the sphere's centre from the map's south-western corner, m.
+    east, north, altitude, radius: sphere, m, with its centre relative to the map's south-western corner.
+    range_bottoms, range_tops, range_counts: closed altitude ranges of all columns, which are changed.
     """
     columns, rows = range_counts.shape
     first_column = max(0, math.floor((east - radius) / column_size))
@@ -225,7 +229,7 @@ def _close_sphere(
 def _close_range(
     range_bottoms: Floats, range_tops: Floats, range_counts: Ints, j: int, bottom: float, top: float
 ) -> None:
-    """Add the range from `bottom` to `top` (m) to the closed ranges of column j in a row of columns.
+    """Add the altitudes from `bottom` to `top` (m) to the closed ranges of column j in a row of columns.
 
     The range is merged with those that it overlaps. If the column already has the maximum number of closed ranges, the
     range stays open.

@@ -133,13 +133,14 @@ class FinalModel(NamedTuple):
 def add_departure_and_approach(
     plan: Plan, limits: Limits, final_model: FinalModel, kept_departure: ClimbOut | None = None
 ) -> Plan:
-    """Add the departure and approach that a plan's scenario requires, or the reason why they are missing.
+    """Add the departure and approach that a scenario requires to its plan, or a problem if none can be flown.
 
     limits: limits of the plan.
     final_model: airspeed and slope of the autopilot on a final.
     kept_departure: departure of a plan whose first legs have already been flown.
 
-    The tables `[launch]` and `[landing]` require them. Without these tables the plan is returned unchanged.
+    The tables `[launch]` and `[landing]` of a scenario require them. Without these tables the plan is returned
+    unchanged.
     """
     scenario = plan.scenario
     if scenario.home is None or scenario.terrain is None or (scenario.launch is None and scenario.landing is None):
@@ -190,7 +191,7 @@ class _Site:
         return self.plan.scenario
 
     def slopes(self, course: float, amsl: float) -> tuple[float, float]:
-        """Return the climb and dive slopes (m per m) for a course (rad) at an altitude (m AMSL)."""
+        """Return the climb and the dive slope (m per m) to plan with on a course (rad) at an altitude (m AMSL)."""
         certified_slopes = aircraft_slopes(self.problem.certified.aircraft, course, amsl)
         stated_limits = (self.limits.max_climb, self.limits.max_dive)
         slopes = []
@@ -217,7 +218,7 @@ class _Site:
         return max(0.0, abs(height_change)) / max_slope if max_slope > 0.0 else math.inf
 
     def certify_path(self, path: Floats, end_points: tuple[Floats, Floats]) -> Certificate:
-        """Return the certificate of a path, (n, 3) m, with a reduced required height near two points.
+        """Certify a path, (n, 3) m, with a reduced required height near two points.
 
         end_points: the two points, (3,) m. The required height is reduced near a point that is itself closer to the
             ground than required.
@@ -288,9 +289,9 @@ def _make_site(plan: Plan, limits: Limits, home: Floats, terrain: Terrain) -> _S
 
 
 def _with_map_error(limits: Limits) -> Limits:
-    """Return limits with a height reserve for the error of the elevation file.
+    """Return limits with a larger height reserve, which allows for the error of the elevation file.
 
-    The limits already have a margin for the autopilot's altitude error, which is independent of the error of the file.
+    The limits already allow for the autopilot's altitude error. Both errors are independent and add as squares.
     """
     altitude_error = 0.0 if limits.tracking is None else limits.tracking.up
     added_height = math.hypot(altitude_error, _MAP_HEIGHT_SIGMAS * MAP_HEIGHT_SD_M) - altitude_error
@@ -328,6 +329,7 @@ class _BestRejected:
     """Best rejected path, and the number of rejected paths, for a message."""
 
     def __init__(self) -> None:
+        """Start without rejected paths."""
         self.count, self._margin, self.problem = 0, -math.inf, ""
 
     def add(self, certificate: Certificate | None) -> None:
@@ -386,11 +388,11 @@ def _find_departure(site: _Site, launch: Launch) -> tuple[ClimbOut | None, str]:
 def _make_departure(
     site: _Site, course: float, points: list[MapPoint], takeoff_altitude: float
 ) -> ClimbOut | Certificate | None:
-    """Return the departure over some points, or its certificate if it is rejected.
+    """Make the departure over some points of the map; return it, or its certificate if it is rejected.
 
     takeoff_altitude: altitude at the end of the take-off, m AMSL.
 
-    Returns None if the climb would be too steep.
+    Return None if the aircraft cannot climb to the first waypoint on this path.
     """
     next_waypoints, first_waypoint = site.plan.waypoints[1:3], site.plan.waypoints[0]
     goal_altitude, top_altitude = float(first_waypoint[2]), max(takeoff_altitude, float(first_waypoint[2]))
@@ -417,7 +419,7 @@ def _make_departure(
 class _Launch(NamedTuple):
     """Launch: course (rad), point where the take-off is complete, and end of the first leg.
 
-    drifted_ends: points where a slow take-off is complete in the least and in the most crosswind to be expected.
+    drifted_ends: points where a slow take-off is complete in the least and in the strongest expected crosswind.
     """
 
     course: float
@@ -434,7 +436,7 @@ class _Launch(NamedTuple):
 
 
 def _find_launches(site: _Site, launch: Launch, takeoff_height: float, altitude: float) -> tuple[list[_Launch], str]:
-    """Return the launches that are clear of ground, missiles and zones; and a reason if there are none.
+    """Return the launches clear of ground, missiles and zones, and the reason if there are none.
 
     takeoff_height: height above home up to which the launch climbs straight ahead, m.
     altitude: altitude for which the climb performance is computed, m AMSL.
@@ -484,7 +486,7 @@ def _find_launches(site: _Site, launch: Launch, takeoff_height: float, altitude:
 
 
 def _drifted_ends(site: _Site, course: float, takeoff_height: float) -> tuple[MapPoint, ...]:
-    """Return the end points of a slow take-off in the least and in the most crosswind to be expected.
+    """Return the points where a slow take-off ends in the least and in the strongest expected crosswind.
 
     course: launch course, rad.
     takeoff_height: height above home at the end of the take-off, m.
@@ -590,7 +592,8 @@ def _find_approach(site: _Site, strip: LandingStrip, final_model: FinalModel) ->
         go_around = _min_go_around_height(site, final)
         if go_around is None:
             reason = (
-                f"no climb height is sufficient for a go-around on course {round(math.degrees(final.course)) % 360}°"
+                f"no climb height up to {_MAX_GO_AROUND_HEIGHT_M:,.0f} m clears the ground in a go-around on course"
+                f" {round(math.degrees(final.course)) % 360}°"
             )
             continue
         return Descent(corners, final.final_waypoints, point, final.course, final.height / final.length, go_around), ""
@@ -613,7 +616,11 @@ def _describe_strip_fault(terrain: Terrain, strip: LandingStrip, course: float) 
 def _find_finals(
     site: _Site, strip: LandingStrip, course: float, point: Floats, final_model: FinalModel
 ) -> tuple[list[_Final], str]:
-    """Return the clear and flyable finals on a course, shallowest first; and a reason if there are none."""
+    """Return the clear and flyable finals on a course, and the reason to state if there are none.
+
+    Finals that PX4 accepts come first, then the shortest ones.
+    point: landing point, (3,) m.
+    """
     field_altitude = float(point[2])
     tailwind = site.scenario.wind.components_on_course(course, field_altitude)[0]
     max_slope = GLIDE_SLOPE_FRACTION * math.tan(
@@ -631,7 +638,7 @@ def _find_finals(
         flown_slope = final_model.slope(height, length, tailwind, field_altitude)
         if flown_slope > max_slope:
             flown_deg, max_deg = math.degrees(math.atan(flown_slope)), math.degrees(math.atan(max_slope))
-            fault = f"the approach needs a glide of {flown_deg:.1f}°, but at most {max_deg:.1f}° can be flown there"
+            fault = f"the approach needs a glide of {flown_deg:.1f}°, but the aircraft can fly at most {max_deg:.1f}°"
             best_rejected = max(best_rejected, (-1e6, fault))
             continue
         final = _Final(course, length, height, _line_up_points(site, point, course, length, height), point)
@@ -657,7 +664,10 @@ def _line_up_points(site: _Site, point: Floats, course: float, length: float, he
 
 
 def _check_final(site: _Site, final: _Final) -> tuple[float, str]:
-    """Return a final's margin (m), negative if it is blocked, and a text on its obstacle, "" without one."""
+    """Return the margin of a final, m, and a text on its obstacle.
+
+    The margin is negative, and the text not empty, if the final is blocked.
+    """
     glide_start, point = final.final_waypoints[1], final.point
     distances, terrain_heights = _ground_profile(
         site.terrain, (float(glide_start[0]), float(glide_start[1])), final.course, final.length
@@ -687,7 +697,10 @@ def _check_final(site: _Site, final: _Final) -> tuple[float, str]:
 
 
 def _find_path_to_line_up(site: _Site, final: _Final) -> tuple[Floats | None, str]:
-    """Return the corners (n, 3) of the shortest path from the plan's end to a line-up; or None and the reason."""
+    """Find the shortest accepted path from the plan's end to the line-up of a final.
+
+    Return its corners (n, 3), m, and "", or None and the reason why no path is accepted.
+    """
     waypoints, final_altitude = site.plan.waypoints, float(final.final_waypoints[0, 2])
     last_waypoint, end_altitude = waypoints[-1], float(waypoints[-1, 2])
     destination_course = site.scenario.destination_course
@@ -755,7 +768,7 @@ def _approach_altitudes(
 
 
 def _scale_slope(site: _Site, factor: float, is_descent: bool, altitude: float, course: float) -> float:
-    """Return a fraction of the climb slope on a course (rad), or of the dive slope if `is_descent`, m per m."""
+    """Return `factor` times the climb slope, or the dive slope if `is_descent`, on a course (rad)."""
     return factor * site.slopes(course, altitude)[is_descent]
 
 
@@ -767,7 +780,7 @@ def _min_go_around_height(site: _Site, final: _Final) -> float | None:
     """
     home_altitude, field_altitude = float(site.home[2]), float(final.point[2])
     line_up = final.final_waypoints[0]
-    # The height is above the line-up, because an aircraft that aborts above the go-around height turns at once.
+    # The height must be above the line-up: an aircraft that aborts above the go-around height turns back at once.
     min_height = max(
         _MIN_GO_AROUND_HEIGHT_M,
         field_altitude - home_altitude + _MIN_GO_AROUND_HEIGHT_M,

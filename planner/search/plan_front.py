@@ -28,8 +28,7 @@ from planner.optimisers.front_sampling import FrontSampling
 from planner.optimisers.hypervolume import covering_order
 from planner.plan import Objective, Objectives, Plan, Violations
 from planner.search.algorithms import find_algorithm, limits_for
-from planner.search.plan_path import plan_path
-from planner.search.replan import with_waypoints
+from planner.search.plan_path import plan_path, with_waypoints
 from planner.search.search_state import SearchProgress, StopCondition
 from planner.seeding.first_samples import bridge_modes
 from planner.seeding.shortening import resample, shorten_path
@@ -130,6 +129,7 @@ class Front:
     ended: str = "completed"
 
     def __repr__(self) -> str:
+        """Describe the front in a line: scenario, number of plans, and why the search ended."""
         return f"<Front {self.default.plan.scenario.name}: {len(self.plans)} of {self.asked} plans, {self.ended}>"
 
     def _repr_html_(self) -> str:
@@ -175,7 +175,7 @@ def plan_front(
     finish: Callable[[Plan], Plan] = lambda plan: plan,
     generations: int = GENERATION_COUNT,
 ) -> Front:
-    """Compute up to `count` plans of a front.
+    """Compute up to `count` plans of a Pareto front.
 
     The front is empty if the default planner finds no safe plan. It has fewer than `count` plans if no further plan has
     a noticeable gain over the others. The fourth objective is energy. It is time if the scenario's objective is time,
@@ -309,7 +309,7 @@ def fit_margins(task: FrontTask, default: Floats) -> FrontTask:
 def reference_point(task: FrontTask, default: FrontPlan) -> Floats:
     """Return the reference point of the hypervolume, (4,); plans beyond it are ignored.
 
-    It consists of 1.5 times the length, exposure and time or energy of the default plan, and of the required clearance.
+    It has 1.5 times the length, the exposure, and the time or energy of the default plan, and the required clearance.
     """
     length, exposure, _, fourth = _objective_row(default, task.fourth)
     max_exposure = max(MIN_EXPOSURE_S, MAX_EXPOSURE_RATIO * exposure)
@@ -318,7 +318,7 @@ def reference_point(task: FrontTask, default: FrontPlan) -> Floats:
 
 
 def _with_values(task: FrontTask, plan: Plan) -> FrontPlan:
-    """Return a plan with its values; its clearance is exact instead of sampled."""
+    """Return a plan with its values; the clearance is computed exactly, not at samples."""
     row = task.values(np.array(plan.waypoints)[None])[0]
     clearance = least_height(task.problem.certified, plan.waypoints)
     return FrontPlan(plan, row[Value.LENGTH], row[Value.EXPOSURE], clearance, row[Value.TIME], row[Value.ENERGY])
@@ -517,7 +517,7 @@ def _certify_distinct(
     """Return up to `count` distinct safe plans that cover the front, and the number of unsafe plans.
 
     default_plan: the completed default plan, which is included if no plan is better.
-    template: plan whose fields the plans take over.
+    template: plan from which all fields other than path, scores and certificate are copied.
     finish: completes a plan.
 
     Each plan is certified and completed.
@@ -555,7 +555,10 @@ def _drop_dominated(plans: list[FrontPlan], fourth: str, amounts: Floats) -> lis
 
 
 def _make_plan(task: FrontTask, path: Floats, template: Plan) -> Plan:
-    """Return the plan of a path (w, 3) with scores and certificate; the template gives all other fields."""
+    """Make the plan of a path (w, 3) with its scores and certificate.
+
+    Copy all other fields from the template.
+    """
     counts, objectives = paper_scores(task.problem.certified, path[None])
     return replace(
         template,

@@ -7,6 +7,8 @@ in the straight frame, or only a long one, a lattice search looks for routes tha
 path exists, the search ends.
 """
 
+import math
+
 import numpy as np
 
 from aircraft.path_limits import Limits
@@ -16,8 +18,8 @@ from planner.evaluation.encoding import ENCODINGS
 from planner.evaluation.paper_scores import paper_scores
 from planner.evaluation.problem import make_problem
 from planner.plan import GIVEN_WAYPOINTS, Certificate, Objectives, Plan, Violations
-from planner.search.algorithms import find_algorithm, limits_for
-from planner.search.generations import may_try_again, path_generations, waypoint_generations
+from planner.search.algorithms import Algorithm, find_algorithm, limits_for
+from planner.search.generations import may_try_again, run_path_generations, run_waypoint_generations
 from planner.search.infeasibility_proof import is_closed
 from planner.search.search_cheapest import make_objective_cost, search_cheapest_path
 from planner.search.search_state import (
@@ -31,6 +33,8 @@ from planner.search.search_state import (
     with_narrow_margins,
 )
 from planner.search.seeds import (
+    LONG_PATH_EXCESS_FRACTION,
+    MIN_DETOUR_FRACTION,
     may_turn_back,
     search_other_sides,
     search_turning_back,
@@ -40,8 +44,10 @@ from planner.search.seeds import (
 )
 from world.arrays import Floats
 from world.errors import ScenarioError
+from world.geometry import leg_runs, path_length
 from world.random_streams import PLANNER, stream
 from world.scenario import Scenario
+from world.scenario_tables import PlannerTable
 
 # Per attempt: (stages, number of routes) of its grids, and the factor on the population.
 ATTEMPTS = (
@@ -64,6 +70,15 @@ MAX_WIND_FRACTION = 0.8
 MAX_POPULATION_VALUES = 30_000_000
 
 
+# Number of waypoints of a plan if the scenario states none.
+DEFAULT_WAYPOINTS = PlannerTable.model_fields["waypoints"].default
+# Number of waypoints with which the search is repeated, if the scenario states none and no path is safe.
+MORE_WAYPOINTS = 24
+
+# A search, its path (w, 3) and the certificate of the path.
+_Result = tuple[Search, Floats, Certificate]
+
+
 def plan_path(
     scenario: Scenario,
     limits: Limits,
@@ -76,7 +91,7 @@ def plan_path(
     first_safe: bool = False,
     previous: Floats | None = None,
 ) -> Plan:
-    """Plan a path. The same scenario, limits, algorithm and seed give the same plan.
+    """Plan a path through a scenario; the same scenario, limits, algorithm and seed give the same plan.
 
     >>> from planfly.workflow.uav import load_uav
     >>> from world.scenario import load_scenario
@@ -101,19 +116,34 @@ def plan_path(
     _check_options(scenario, limits.airspeed)
     problem = make_problem(scenario, limits_for(found_algorithm, limits))
     cost = make_objective_cost(scenario, limits, problem)
-    encoding = ENCODINGS[found_algorithm.encoding](problem.space, scenario.planner.waypoints)
-    search = Search(
-        problem,
-        found_algorithm,
-        encoding,
-        stream(seed, PLANNER),
-        progress,
-        stop,
-        first_safe,
-        required_kill_distance(problem),
-        improved,
-    )
-    waypoints, certificate = search_cheapest_path(search, _search_repeatedly(search, previous), cost)
+    stated_count = scenario.planner.waypoints
+
+    def search_with(count: int, evaluations: int) -> _Result:
+        """Search with a number of waypoints; the legs of a path with too few waypoints are halved."""
+        search = Search(
+            problem,
+            found_algorithm,
+            ENCODINGS[found_algorithm.encoding](problem.space, count),
+            stream(seed, PLANNER),
+            progress,
+            stop,
+            first_safe,
+            required_kill_distance(problem),
+            improved,
+            evaluations=evaluations,
+        )
+        path, path_certificate = search_cheapest_path(search, _search_repeatedly(search, previous), cost)
+        if count < stated_count:
+            path = with_waypoints(path, stated_count)
+            path_certificate = certify(problem, path)
+        return search, path, path_certificate
+
+    result = best = search_with(stated_count, 0)
+    for count in _other_waypoint_counts(scenario, found_algorithm, previous):
+        if not result[0].must_end() and _needs_other_count(best, count):
+            result = search_with(count, result[0].evaluations)
+            best = result if _is_better(result, best) else best
+    search, waypoints, certificate = best
     violations, objectives = paper_scores(problem.certified, waypoints[None])
     return Plan(
         scenario=scenario,
@@ -123,14 +153,71 @@ def plan_path(
         certificate=certificate,
         seed=seed,
         algorithm=found_algorithm.name,
-        evaluations=search.evaluations,
+        evaluations=result[0].evaluations,
         history=np.array(search.history).reshape(-1, 3),
-        ended=search.end_reason,
+        ended=result[0].end_reason,
     )
 
 
+def _other_waypoint_counts(scenario: Scenario, algorithm: Algorithm, previous_path: Floats | None) -> tuple[int, ...]:
+    """Return the numbers of waypoints with which a search may be repeated.
+
+    A path with more waypoints may turn more often; fewer waypoints are easier to place. A number that the scenario
+    states is the number of waypoints of the plan: its legs are then halved.
+
+    previous_path: older path to start from, which fixes the number; or None.
+    """
+    if previous_path is not None or not algorithm.seeded or algorithm.encoding != "rotated":
+        return ()
+    if "waypoints" not in scenario.planner.model_fields_set:
+        return (MORE_WAYPOINTS,)
+    return (DEFAULT_WAYPOINTS,) if scenario.planner.waypoints > DEFAULT_WAYPOINTS else ()
+
+
+def _needs_other_count(best: _Result, count: int) -> bool:
+    """Return True if a search with another number of waypoints may find a better path than the best so far.
+
+    Another number is tried if no path is safe, unless it is proven that there is none. If the shortest path is sought,
+    fewer waypoints are also tried if the best path is long, or longer than the straight line among zones, where paths
+    are not shortened.
+    """
+    search, waypoints, certificate = best
+    if not search.meets_goal(certificate):
+        return not search.is_closed
+    if search.first_safe or (search.problem.scenario.planner.objective or "length") != "length":
+        return False
+    is_among_zones = is_limited(search.problem.search.airspace)
+    max_excess = MIN_DETOUR_FRACTION if is_among_zones else LONG_PATH_EXCESS_FRACTION
+    max_length = (1.0 + max_excess) * math.dist(waypoints[0], waypoints[-1])
+    return count < search.encoding.waypoints and bool(path_length(waypoints) > max_length)
+
+
+def _is_better(result: _Result, other: _Result) -> bool:
+    """Return True if a path meets the goal and the other does not, or if both do and it is shorter.
+
+    If neither meets the goal, a certified path is better, and of two certified paths the one further from missiles.
+    """
+    (search, waypoints, certificate), (_, other_waypoints, other_certificate) = result, other
+    meets, other_meets = search.meets_goal(certificate), search.meets_goal(other_certificate)
+    if meets and other_meets:
+        return bool(path_length(waypoints) < path_length(other_waypoints))
+    if meets or other_meets:
+        return meets
+    key, other_key = ((item.ok, item.kill_distance) for item in (certificate, other_certificate))
+    return key > other_key
+
+
+def with_waypoints(path: Floats, count: int) -> Floats:
+    """Return a path (w, 3) with its longest legs halved until it has `count` waypoints."""
+    waypoints = [np.asarray(point, dtype=np.float64) for point in path]
+    while len(waypoints) < count:
+        longest_leg = int(np.argmax(leg_runs(np.array(waypoints))))
+        waypoints.insert(longest_leg + 1, 0.5 * (waypoints[longest_leg] + waypoints[longest_leg + 1]))
+    return np.array(waypoints)
+
+
 def certify_waypoints(scenario: Scenario, limits: Limits, waypoints: Floats, *, seed: int) -> Plan:
-    """Return the plan of given waypoints (w, 3), m, with scores and certificate; no search takes place.
+    """Make a plan from given waypoints (w, 3), m, with scores and certificate, without a search.
 
     The limits are those of the scenario's algorithm.
 
@@ -197,15 +284,16 @@ def _search_repeatedly(search: Search, previous_path: Floats | None) -> tuple[Fl
 def _check_options(scenario: Scenario, airspeed: float) -> None:
     """Raise ScenarioError for the first reason why no path can be searched.
 
-    The reasons are too much wind for the airspeed (m/s), too many values in a population, a budget below the
-    population, and a start or destination inside a missile's kill radius.
+    The wind may be too strong for the airspeed (m/s), the population too large, the budget smaller than the population,
+    or the start or destination inside a missile's kill radius.
     """
     if scenario.wind.speed > MAX_WIND_FRACTION * airspeed:
         raise ScenarioError.at(
             scenario.name,
             "wind.speed_mps",
             scenario.wind.speed,
-            f"allowed at most {MAX_WIND_FRACTION:.0%} of the airspeed {airspeed:g}, so that every course can be flown",
+            f"allowed at most {MAX_WIND_FRACTION:.0%} of the airspeed of {airspeed:g} m/s, so that every course can be"
+            " flown",
             shown=f"{scenario.wind.speed:g}",
         )
     settings = scenario.planner
@@ -274,17 +362,19 @@ def _run_attempt(search: Search, attempt: int, previous_path: Floats | None) -> 
     if algorithm.optimiser == "waypoints":
         # With a safe path and other sides tried, generations would shorten it by only 1e-4.
         if not (algorithm.seeded and search.has_safe()):
-            waypoint_generations(search, population, settings.generations)
+            run_waypoint_generations(search, population, settings.generations)
     else:
-        last_vector = path_generations(search, population, settings.generations, starts)
+        last_vector = run_path_generations(search, population, settings.generations, starts)
     if algorithm.final_shortening and search.end_reason == "completed":
         _finish_search(search, last_vector)
 
 
 def _finish_search(search: Search, last_vector: Floats | None) -> None:
-    """Shorten the best path, and the path of the last generation; if there is none, move waypoints instead.
+    """Shorten the best path and the path of the last generation.
 
-    last_vector: vector (d,) of that path.
+    Move waypoints if this finds no finished path.
+
+    last_vector: vector (d,) of the best path of the last generation, or None.
     """
     if search.can_shorten:
         if last_vector is not None:

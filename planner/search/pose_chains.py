@@ -112,7 +112,7 @@ class TurnLengths(NamedTuple):
     def lengths(self, turn: float) -> tuple[float, float]:
         """Return the lengths that a turn (rad) takes up before and after its corner, m.
 
-        A turn sharper than the table takes up about as much as the sharpest turn in it.
+        For a turn beyond the end of the table, return about the lengths of the table's sharpest turn.
         """
         position = min(turn / TURN_STEP_RAD, len(self.before) - 1.001)
         index = int(position)
@@ -124,7 +124,7 @@ class TurnLengths(NamedTuple):
 
 
 def arc_turn_lengths(radius: float) -> TurnLengths:
-    """Return the turn lengths of arcs with a radius (m), which are the lengths of their tangents.
+    """Return the leg lengths that arcs of a radius (m) take up: the lengths of their tangents.
 
     >>> [round(length) for length in arc_turn_lengths(150.0).lengths(math.radians(90.0))]
     [150, 150]
@@ -188,7 +188,7 @@ def measure_path(points: Sequence[MapPoint], turn_lengths: TurnLengths) -> PathM
 def climb_altitudes(
     points: Sequence[MapPoint], start_altitude: float, climb: SlopeOnCourse, min_altitude: float, end_altitude: float
 ) -> Floats:
-    """Return the altitude at each point of a path that climbs as steeply as allowed, m AMSL, (n,).
+    """Compute the altitude at each point of a path that climbs as steeply as allowed, (n,) m AMSL.
 
     start_altitude: altitude at the first point, m.
     climb: function that returns the climb slope on a course.
@@ -212,7 +212,7 @@ def climb_altitudes(
 def descent_altitudes(
     points: Sequence[MapPoint], start_altitude: float, climb: SlopeOnCourse, dive: SlopeOnCourse, end_altitude: float
 ) -> Floats:
-    """Return the altitude at each point of a path that descends as late, or climbs as early, as possible, (n,).
+    """Compute the altitudes (n,) of a path that descends as late, or climbs as early, as possible.
 
     climb, dive: functions that return the slope on a course.
 

@@ -12,12 +12,11 @@ from planner.evaluation.problem import make_problem
 from planner.plan import Objectives, Plan, Violations
 from planner.search.algorithms import find_algorithm, limits_for
 from planner.search.explain_failure import violated_zones
-from planner.search.plan_path import plan_path
+from planner.search.plan_path import plan_path, with_waypoints
 from planner.search.search_state import SearchProgress, StopCondition
 from planner.search.shared_budget import Search, SharedBudget
-from world.arrays import Floats
 from world.errors import MissionError
-from world.geometry import leg_courses, leg_runs
+from world.geometry import leg_courses
 from world.scenario import Scenario
 
 # Function that completes a plan, with a search that it may call for a changed scenario or for other limits.
@@ -134,7 +133,7 @@ def _check_first_waypoint(scenario: Scenario, old_plan: Plan, leg: int) -> None:
     missile = int(np.argmax(np.where(threats.kill_radius > 0.0, depths, -math.inf))) if len(depths) else -1
     if missile >= 0 and threats.kill_radius[missile] > 0.0 and depths[missile] >= 0.0:
         raise MissionError(
-            f"{scenario.name}: leg {leg}: its first waypoint, {leg}, is {depths[missile]:.0f} m inside the kill "
+            f"{scenario.name}: leg {leg}: it starts at waypoint {leg}, {depths[missile]:.0f} m inside the kill "
             f"radius of {threats.names[missile]} ({threats.kill_radius[missile]:.0f} m): no path from there is safe",
             file=scenario.name,
             field="leg",
@@ -142,15 +141,6 @@ def _check_first_waypoint(scenario: Scenario, old_plan: Plan, leg: int) -> None:
         )
     zone_names = violated_zones(scenario, old_plan.waypoints[[leg, leg]])
     if zone_names:
-        reason = f"its first waypoint, {leg}, violates {zone_names[0]}"
-        message = f"{scenario.name}: leg {leg}: {reason}, so every path from there violates it"
+        reason = f"it starts at waypoint {leg}, which violates {zone_names[0]}"
+        message = f"{scenario.name}: leg {leg}: {reason}; every path from there violates this zone"
         raise MissionError(message, file=scenario.name, field="leg", value=leg)
-
-
-def with_waypoints(path: Floats, count: int) -> Floats:
-    """Return a path (w, 3) with its longest legs halved until it has `count` waypoints."""
-    waypoints = [np.asarray(point, dtype=np.float64) for point in path]
-    while len(waypoints) < count:
-        longest_leg = int(np.argmax(leg_runs(np.array(waypoints))))
-        waypoints.insert(longest_leg + 1, 0.5 * (waypoints[longest_leg] + waypoints[longest_leg + 1]))
-    return np.array(waypoints)

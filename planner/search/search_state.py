@@ -81,7 +81,8 @@ CORNER_MARGINS_M = (2.0, 5.0)
 # Additional margins of slopes, rad, of last attempts with a path that fails only by its slopes: if a leg climbs at the
 # limit, shortening ends some hundredths of a degree beyond it.
 SLOPE_MARGINS_RAD = (math.radians(0.2), math.radians(0.6))
-# Distance, m, that a shortened path may lack to missiles to be tried with other margins, which add at most as much.
+# Distance to missiles, m, that a shortened path may lack to be tried with larger margins; these add at most this
+# distance.
 MAX_MISSING_DISTANCE_M = max(*EXTRA_MARGINS_M, *CORNER_MARGINS_M)
 # Distance from missiles in addition to the certificate's margin, m, in gaps too narrow for the search's usual margin.
 NARROW_KILL_MARGIN_M = 1.0
@@ -120,7 +121,7 @@ class Archive:
         return len(self.scores) > 0 and not are_violated(self.scores[0])
 
     def insert(self, vectors: Floats, scores: Floats) -> None:
-        """Insert new rows in the order of their rank; of equal rows, older ones stay first.
+        """Insert new paths in the order of their rank; of equal paths, older ones stay first.
 
         As soon as one row is feasible, infeasible rows are dropped, because there may be thousands of them to rank. A
         full archive accepts only rows that are better than its last row.
@@ -161,7 +162,7 @@ class Search:
     certificates: certificates by the path's vector.
     shortest: the shortest finished path (w, 3) from shortening and its certificate; its waypoints need not lie in their
     intervals.
-    furthest_short: the certified path (w, 3) from shortening that is furthest from missiles among those outside all
+    furthest_shortened: the certified path (w, 3) from shortening that is furthest from missiles among those outside all
     spheres but closer than the goal allows, and its certificate.
     narrow_places: places (3,) where shortened paths remain too close to missiles, deepest first for each path.
     budget_exhausted: True if the budget is too small for another shortening.
@@ -187,7 +188,7 @@ class Search:
     certificates: dict[bytes, Certificate] = field(default_factory=dict)
     shortest: tuple[Floats, Certificate] | None = None
     narrow_places: list[Floats] = field(default_factory=list)
-    furthest_short: tuple[Floats, Certificate] | None = None
+    furthest_shortened: tuple[Floats, Certificate] | None = None
     budget_exhausted: bool = False
     is_closed: bool = False
     grace: int = GRACE_PAUSES
@@ -225,8 +226,8 @@ class Search:
     def pause(self) -> None:
         """Raise SearchEnded if the search is asked to stop.
 
-        A search of whole paths that has no result yet continues for some more pauses, until it finds its first route.
-        If it finds no route in this time, its result is the straight line.
+        A search without a result continues for a few more pauses to find its first route. If it finds none, its result
+        is the straight line.
         """
         if not self.should_stop():
             return
@@ -277,7 +278,10 @@ class Search:
         return np.asarray(scores[0])
 
     def move_and_improve(self, vector: Floats, rounds: int, scale: float, max_evaluations: int) -> Floats:
-        """Move all waypoints of a vector (d,) at once, then `improve` it; return the best scores (8,)."""
+        """Move all waypoints of a vector (d,) at once, then `improve` it; return the best scores (8,).
+
+        rounds, scale: number and relative size of the moves, as in `move_all_waypoints`.
+        """
         if self._evaluation_budget() - self.evaluations < MIN_MOVE_BUDGET:
             return self.improve(vector, max_evaluations)
         moved_vector, evaluations = move_all_waypoints(self.problem.search, self.encoding, vector, rounds, scale)
@@ -295,13 +299,14 @@ class Search:
     def shorten(self, path: Floats) -> bool:
         """Shorten a path (w, 3); keep the result, and return True, if it is the shortest finished path."""
         data = self.problem.search
+        # Additional margin, m; True to model the corners as flown; additional margin of slopes, rad.
         attempts = [(margin, False, 0.0) for margin in EXTRA_MARGINS_M]
         if data.legs_hold_turns:
             attempts += [(margin, True, 0.0) for margin in CORNER_MARGINS_M]
         attempts += [(EXTRA_MARGINS_M[-1], False, slope_margin) for slope_margin in SLOPE_MARGINS_RAD]
-        first, certificate = path, None
+        first_path, certificate = path, None
         for extra_margin, corners_too, slope_margin in attempts:
-            path = first if corners_too else path
+            path = first_path if corners_too else path
             if slope_margin > 0.0 and not (certificate and self._violates_only_slopes(certificate)):
                 break
             if self._evaluation_budget() - self.evaluations < MAX_MODELS:
@@ -318,16 +323,16 @@ class Search:
             certificate = certify(self.problem, path)
             if self._keep_if_finished(path, certificate):
                 return True
-            least_distance = 0.0 if self.furthest_short is None else self.furthest_short[1].kill_distance
+            least_distance = 0.0 if self.furthest_shortened is None else self.furthest_shortened[1].kill_distance
             if certificate.ok and certificate.kill_distance > least_distance:
-                self.furthest_short = path, certificate
+                self.furthest_shortened = path, certificate
             if certificate.kill_distance < self.required_distance - MAX_MISSING_DISTANCE_M:
                 break
         self.narrow_places += list(closest_places(data, path, self.required_distance + data.tracking.across))
         return self._shorten_again(path)
 
     def _keep_if_finished(self, path: Floats, certificate: Certificate) -> bool:
-        """Keep a path (w, 3) as the shortest, report it, and return True, if its certificate meets the goal."""
+        """If a path (w, 3) meets the goal, store it as the shortest path, report it, and return True."""
         if not self.meets_goal(certificate):
             return False
         self.shortest = path, certificate
@@ -378,7 +383,7 @@ class Search:
         return bool(are_safe(self.archive.scores[0]))
 
     def first_safe_found(self) -> bool:
-        """Return True if the search should end with the first safe path and has finished one."""
+        """Return True if the search is to end with the first safe path, and has found a path that meets the goal."""
         if not self.first_safe or (self.shortest is None and not self.archive.is_feasible()):
             return False
         return self.shortest is not None or self.meets_goal(self.best_certified()[1])
@@ -400,7 +405,7 @@ class Search:
         return min(ratio, shortened_ratio) if self.best_is_safe() else shortened_ratio
 
     def meets_goal(self, certificate: Certificate) -> bool:
-        """Return True if a path with this certificate meets the goal of the search."""
+        """Return True if a path is certified and has the required distance from missiles, the goal of the search."""
         return certificate.ok and certificate.kill_distance >= self.required_distance
 
     def _evaluation_budget(self) -> float:
@@ -469,9 +474,9 @@ class Search:
         path further from missiles is better.
         """
         path, certificate = self.best_certified()
-        if self.shortest is None and self.furthest_short is not None and not self.meets_goal(certificate):
-            is_further = self.furthest_short[1].kill_distance > certificate.kill_distance
-            return self.furthest_short if is_further or not certificate.ok else (path, certificate)
+        if self.shortest is None and self.furthest_shortened is not None and not self.meets_goal(certificate):
+            is_further = self.furthest_shortened[1].kill_distance > certificate.kill_distance
+            return self.furthest_shortened if is_further or not certificate.ok else (path, certificate)
         if self.shortest is None or (
             self.meets_goal(certificate) and path_length(path) <= path_length(self.shortest[0])
         ):

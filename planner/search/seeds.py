@@ -38,7 +38,7 @@ from world.geometry import path_length
 QUICK_SEARCH_EVALUATIONS = 50
 # Maximum evaluations of the pattern search on a seed.
 SEED_SEARCH_EVALUATIONS = 300
-# Factor on both for seeds below a maximum height above ground, where few moves stay within the band.
+# Factor on both numbers of evaluations below a maximum height above ground, where few moves stay within the band.
 BAND_EFFORT_FACTOR = 3
 # Number of routes followed once a path is safe; after them other sides are tried.
 MAX_FOLLOWED_ROUTES = 2
@@ -48,9 +48,9 @@ MAX_FOLLOWED_RETRY_ROUTES = 3
 
 
 def try_straight_line(search: Search) -> bool:
-    """Return True if the straight line is safe; the search is then finished, because no path is shorter.
+    """Try the straight line; return True if it is safe, so that the search is finished: no path is shorter.
 
-    It is not tried, and the result is False, in an encoding other than the rotated one.
+    Encodings other than "rotated" do not try it, and return False.
     """
     if search.encoding.name != "rotated":
         return False
@@ -67,13 +67,14 @@ def starting_vectors(
 ) -> Floats:
     """Return the start vectors of a search, (n, d): a seed and the previous path.
 
+    grids: number of stages and number of routes of each grid.
     previous: older path (w, 3), or None.
     is_retry: True if an earlier attempt has failed. If there are zones, grids that are no finer than another grid are
         then skipped, and only the best routes are followed.
 
-    Only one seed is used, the one with the best result after improvement, because the marginals of several routes
-    describe none of them. The seed is used in its form before the improvement: afterwards it is so close to every limit
-    that hardly any sample around it is feasible.
+    Only one seed is used, the one with the best result after improvement, because a distribution
+    that is fitted to several routes describes none of them. The seed is used in its form before the improvement:
+    afterwards it is so close to every limit that hardly any sample around it is feasible.
     """
     encoding, space, waypoint_count = search.encoding, search.problem.space, search.encoding.waypoints
     if encoding.name != "rotated" or (not search.algorithm.seeded and previous is None):
@@ -194,9 +195,11 @@ def search_other_sides(search: Search) -> None:
 
 
 def _try_grids(search: Search, grids: tuple[tuple[int, float, float], ...]) -> list[Floats]:
-    """Shorten the routes on other sides that some grids propose; return the routes as paths (w, 3).
+    """Shorten the routes past other sides of obstacles that grids propose; return the routes (w, 3).
 
-    Where a shortened path remains too close to a missile, later grids are closed.
+    grids: as in `GRIDS`: number of stages, reduction of the spheres, and spacing across as a fraction of a step.
+
+    Places where a shortened path remains too close to a missile are closed in later grids.
     """
     encoding, space, data = search.encoding, search.problem.space, search.problem.search
     frame = rotated_frame(space.start, space.destination)
@@ -269,7 +272,7 @@ def _shorten_with_narrow_margins(search: Search, paths: list[Floats]) -> None:
                 break
             search.shorten(path)
     finally:
-        # A search that is interrupted raises an exception.
+        # Also restored if the search is interrupted, which raises SearchEnded.
         search.problem = usual_problem
 
 
@@ -309,9 +312,9 @@ FOLLOWED_MARGINS_M = (2.0, 5.0, 2.0)
 
 
 def may_turn_back(search: Search, certificate: Certificate) -> bool:
-    """Return True if a safe path is missing or long among the paths that advance along the straight line.
+    """Return True if a path that turns back may be better than the best path along the straight line.
 
-    A better path may then have to turn back.
+    This is the case if that path is not safe, or if it is long.
     """
     if not search.algorithm.seeded or search.encoding.name != "rotated" or search.must_end():
         return False
@@ -323,9 +326,9 @@ def may_turn_back(search: Search, certificate: Certificate) -> bool:
 def search_turning_back(search: Search, best: tuple[Floats, Certificate]) -> tuple[Floats, Certificate]:
     """Search along a route that may turn back.
 
-    best: best path so far, with its certificate.
+    Return the better of the new path and `best`, with its certificate.
 
-    Returns the better of the new path and `best`, with its certificate.
+    best: best path so far, with its certificate.
     """
     data, space = search.problem.search, search.problem.space
     frame, step = rotated_frame(space.start, space.destination), turning_step(data)

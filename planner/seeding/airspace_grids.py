@@ -121,7 +121,7 @@ def _closed_heights(zones: ZonesWithMargins, line: MapSegment, lateral: float, g
 
 @inner
 def _step_slopes(data: ProblemArrays, frame: RotatedFrame, step: float, amsl: float, fraction: float) -> Floats:
-    """Return the slopes that a grid allows for each lateral step: tangents of climb and dive, (sideways, 2).
+    """Return tangents of the steepest climb and dive, (sideways, 2), by the cells across per stage.
 
     step: length of a step along the line, m.
     amsl: altitude of the slope limits, m.
@@ -149,7 +149,7 @@ def _set_layer_costs(
     last_across: int,
     cell_costs: Floats,
 ) -> None:
-    """Fill the cost per m of a stage's cells in a range across; inf for a cell that no path may enter.
+    """Fill the cost per m of path in the cells of a stage; inf for a cell that no path may enter.
 
     along: position of the stage, m.
     extra: (across,) additional cost per m.
@@ -277,7 +277,7 @@ def cheapest_airspace_route(
     bound: float,
     pause: Callable[[], None] = lambda: None,
 ) -> tuple[Floats, float]:
-    """Return the points of the cheapest route over a grid, and its cost.
+    """Find the cheapest route over a grid; return its points and its cost.
 
     The points are along, across and up, (stages + 1, 3).
 
@@ -374,7 +374,7 @@ def continue_airspace_route(
 def end_airspace_route(
     data: ProblemArrays, frame: RotatedFrame, grid: AirspaceGrid, search: AirspaceSearch
 ) -> tuple[Floats, float]:
-    """Return the points of the route that a search found, and its cost.
+    """Trace the route that a search found; return its points and its cost.
 
     The points are along, across and up, (stages + 1, 3). Without a route, the points are (0, 3) and the cost is inf.
     """
@@ -416,22 +416,23 @@ FINER_COST_RATIO = 1.05
 MIN_LAYERS = 8
 # Maximum number of layers of a band of heights above ground.
 MAX_LAYERS = 24
-# Minimum layer_spacing of layers that do not follow the ground, as a fraction of the step along.
+# Minimum spacing of layers that do not follow the ground, as a fraction of the step along.
 MIN_LAYER_SPACING_STEPS = 0.05
 # Maximum number of cells of a grid: stages x across x layers.
 MAX_CELLS = 1_200_000
 
 
 def airspace_grid(data: ProblemArrays, frame: RotatedFrame, span: tuple[float, float], stages: int) -> AirspaceGrid:
-    """Return a grid with at most a number of stages; fewer stages if the grid would be too large.
+    """Make a grid for a problem with zones or a maximum height.
 
     span: lowest and highest position across, m.
+    stages: number of stages; fewer if the grid would have more than `MAX_CELLS` cells.
     """
     level_point = np.array([*data.destination[:2], data.start[2]])
     gentler_slope = math.tan(max(0.0, min(slope_limits(data, np.array(data.start), level_point))))
     space = data.airspace
     band_height = space.max_height - space.buffer - data.clearance - data.buffer
-    min_height = max(data.floor, float(np.nanmin(data.heights)) + data.clearance)
+    min_altitude = max(data.floor, float(np.nanmin(data.heights)) + data.clearance)
     follows_ground = math.isfinite(band_height)
     while True:
         step = frame.length / stages
@@ -445,10 +446,10 @@ def airspace_grid(data: ProblemArrays, frame: RotatedFrame, span: tuple[float, f
             layers = max(layers, min(2 * MAX_LAYERS, math.ceil(max_band_height / layer_spacing) + 1))
         else:
             layer_spacing = max(layer_spacing, MIN_LAYER_SPACING_STEPS * step)
-            layers = max(1, math.floor((data.ceiling - min_height) / layer_spacing) + 1)
+            layers = max(1, math.floor((data.ceiling - min_altitude) / layer_spacing) + 1)
         if stages <= 8 or (stages + 1) * across.size * layers <= MAX_CELLS:
             return AirspaceGrid(
-                stages, np.asarray(across, np.float64), layers, layer_spacing, follows_ground, min_height, gentle=True
+                stages, np.asarray(across, np.float64), layers, layer_spacing, follows_ground, min_altitude, gentle=True
             )
         stages = max(8, int(stages / 1.2))
 

@@ -48,7 +48,7 @@ def bridge_basis(inner: int) -> Floats:
 def first_samples(
     space: Space, encoding: Encoding, population: int, starts: Floats, rng: np.random.Generator
 ) -> Floats:
-    """Return the first population (n, d): the starts, and smooth paths around them.
+    """Draw the first population (n, d): the start vectors, and smooth paths around them.
 
     starts: vectors (s, d) to start from; without starts, the smooth paths are drawn around the straight line.
     """
@@ -59,8 +59,8 @@ def first_samples(
     # The entries of a bridge mode decrease with the number of waypoints; its middle should move by the spread.
     spread[1:] *= np.sqrt((inner_count + 1) / 2.0)
 
-    def bridges(count: int) -> Floats:
-        """Return smooth displacements (count, inner, 2) of across and up."""
+    def draw_displacements(count: int) -> Floats:
+        """Draw smooth displacements (count, inner, 2) of the inner waypoints, across and up."""
         weights = rng.normal(size=(count, inner_count, 2)) * deviations[:, None] * spread[1:]
         return np.asarray(np.einsum("nka,ik->nia", weights, modes, optimize=False))
 
@@ -70,14 +70,14 @@ def first_samples(
     out[..., 1] = 0.0
     heights = space.start[2] * (1.0 - fraction) + space.destination[2] * fraction
     out[..., 2] = heights[:, 0] + rng.uniform(0.0, 1.0, (population, 1)) * np.maximum(0.0, space.up[1] - heights[:, 0])
-    out[..., 1:] += bridges(population)
+    out[..., 1:] += draw_displacements(population)
     if len(starts):
         around_count = min(population, max(len(starts), int(SEEDED_SAMPLE_FRACTION * population)))
         seeds = starts[np.arange(around_count) % len(starts)].reshape(around_count, inner_count, 3)
         scale = np.exp(rng.uniform(np.log(MIN_SPREAD_FRACTION), np.log(MAX_SPREAD_FRACTION), (around_count, 1, 1)))
         scale[: len(starts)] = 0.0
         out[:around_count] = seeds
-        out[:around_count, :, 1:] += scale * bridges(around_count)
+        out[:around_count, :, 1:] += scale * draw_displacements(around_count)
         out[:around_count, :, :1] += (
             scale * rng.normal(size=(around_count, inner_count, 1)) * (upper[:, :1] - lower[:, :1])
         )

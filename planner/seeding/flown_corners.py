@@ -40,7 +40,7 @@ CORNER_STEP_M = 0.5
 STEEP_FRACTION = 0.8
 # Length of an arc in addition to the length for its climb or descent, m.
 ARC_MARGIN_M = 1.0
-# The same as a fraction of the additional margin.
+# Additional length of an arc, as a fraction of the additional margin.
 ARC_FRACTION = 0.4
 
 
@@ -78,11 +78,10 @@ def corners_near_ground(
 ) -> FlownCorners:
     """Find a path's corners that are flown close to the ground, or almost as steeply as allowed.
 
-    None is found on a path whose waypoints are flown over.
+    Fly-over turns have no such corners.
 
     path: (w, 3) m.
-    corners: simulated turns at the waypoints.
-    lags: altitude errors on the legs.
+    corners, lags: `CORNER` records of the turns, and `HEIGHT_LAG` records of the legs.
     margin: height added to the required clearance, m.
     """
     count = path.shape[0]
@@ -203,7 +202,7 @@ def corner_point(
     sample: int,
     out: Floats,
 ) -> None:
-    """Fill `out` (3,) with the position of a sample of the flown corner at `waypoint`.
+    """Compute the position of a sample of the flown corner at `waypoint`, and fill `out` (3,) with it.
 
     radius: radius of the turn, m.
     sample: number of the sample.

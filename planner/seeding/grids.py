@@ -133,9 +133,9 @@ def _pixel_steps(data: ProblemArrays, frame: RotatedFrame, along: float, length:
 
 @compiled
 def find_obstacles(data: ProblemArrays, frame: RotatedFrame, step: float, shrink: float = 0.0) -> Records:
-    """Return `OBSTACLE` records of the missiles for a grid with a given step between stages (m).
+    """Convert the missiles to `OBSTACLE` records for a grid with a given step between stages (m).
 
-    shrink: see `Grid`.
+    shrink: fraction of a step by which kill spheres are reduced; 0 for none.
     """
     growth = COARSE_GROWTH_STEPS * step if step > COARSE_STEP_M else 0.0
     if shrink > 0.0:
@@ -213,11 +213,11 @@ def set_cell_costs(
     for y in range(first_across, last_across + 1):
         # The destination is fixed, whatever its clearance.
         if stage == grid.stages and across[y] == 0.0:
-            min_height = -math.inf
+            min_altitude = -math.inf
         else:
-            min_height = _min_height(data, required, frame, stage * step, across[y], steps)
+            min_altitude = _min_height(data, required, frame, stage * step, across[y], steps)
         for z in range(layers.size):
-            cell_costs[z, y] = 1.0 + extra[stage, y] if layers[z] >= min_height else math.inf
+            cell_costs[z, y] = 1.0 + extra[stage, y] if layers[z] >= min_altitude else math.inf
     _add_kill_cost(obstacles, stage * step, grid, first_across, last_across, cell_costs)
 
 
@@ -376,7 +376,9 @@ def prune_cells(
     first_across: int,
     last_across: int,
 ) -> None:
-    """Set the costs of cells from which the destination is not reached within the bound to inf; fill the spans.
+    """Set to inf the costs of cells from which the destination cannot be reached within the bound.
+
+    Fill the spans.
 
     spans: `SPAN` records (layers,) to fill with the remaining cells.
     goal_distances: (across,) horizontal distance to the destination, m.
@@ -431,7 +433,7 @@ def cheapest_route(
     bound: float,
     pause: Callable[[], None] = lambda: None,
 ) -> tuple[Records, float]:
-    """Return `ROUTE_CELL` records (stages + 1,) of the cheapest route over a grid, and the route's cost.
+    """Find the cheapest route over a grid; return its `ROUTE_CELL` records (stages + 1,) and its cost.
 
     extra: (stages + 1, across) additional cost per m.
     bound: upper limit on the cost; more expensive routes are not searched.
@@ -536,7 +538,7 @@ def continue_route(
 
 @compiled
 def end_route(search: GridSearch) -> tuple[Records, float]:
-    """Return `ROUTE_CELL` records (stages + 1,) of the route that a search found, and its cost.
+    """Trace the route that a search found; return its `ROUTE_CELL` records (stages + 1,) and its cost.
 
     Without a route, there are no records and the cost is inf.
     """
@@ -581,7 +583,7 @@ MAX_CELLS = 1_200_000
 EXPECTED_COST_RATIO = 1.12
 # Distance from an earlier route within which a route costs up to twice as much, m.
 ROUTE_SPACING_M = 800.0
-# The same in steps, if that is larger.
+# Alternative distance from an earlier route, in grid steps; the larger one of both distances is used.
 ROUTE_SPACING_STEPS = 3.0
 
 
@@ -594,12 +596,12 @@ class GridRoute:
 
 
 def make_grid(data: ProblemArrays, frame: RotatedFrame, span: tuple[float, float], stages: int) -> Grid:
-    """Return a grid with square cells on the map, and with one layer at the altitude of the start.
+    """Make a grid with square cells on the map, and with one layer at the altitude of the start.
 
     span: lowest and highest position across, m.
     stages: number of stages; fewer if the grid would be too large.
     """
-    min_height, max_height = max(data.floor, float(np.nanmin(data.heights))), data.ceiling
+    min_altitude, max_altitude = max(data.floor, float(np.nanmin(data.heights))), data.ceiling
     level_point = np.array([*data.destination[:2], data.start[2]])
     gentler_slope = math.tan(max(0.0, min(slope_limits(data, np.array(data.start), level_point))))
     spacing_ratio = min(MAX_LAYER_SPACING_STEPS, max(MIN_LAYER_SPACING_STEPS, gentler_slope / LAYERS_PER_STEP))
@@ -609,8 +611,8 @@ def make_grid(data: ProblemArrays, frame: RotatedFrame, span: tuple[float, float
         right_count, left_count = math.floor(-span[0] / step), math.floor(span[1] / step)
         across = np.arange(-right_count, left_count + 1) * step
         layer_numbers = np.arange(
-            math.ceil((min_height - data.start[2]) / layer_spacing),
-            math.floor((max_height - data.start[2]) / layer_spacing) + 1,
+            math.ceil((min_altitude - data.start[2]) / layer_spacing),
+            math.floor((max_altitude - data.start[2]) / layer_spacing) + 1,
         )
         if stages <= 4 or (stages + 1) * across.size * max(1, layer_numbers.size) <= MAX_CELLS:
             return Grid(

@@ -205,7 +205,7 @@ def begin_lattice_search(data: ProblemArrays, frame: RotatedFrame, lattice: Latt
 
 @compiled
 def _start_states(data: ProblemArrays, frame: RotatedFrame, lattice: Lattice, table: _StateTable) -> Codes:
-    """Mark the states at the start as reached, and return them, (k,)."""
+    """Mark the states at the start as reached, at the prescribed course or on all courses; return them, (k,)."""
     first_state = ((lattice.behind * lattice.across + lattice.right) * lattice.layers + lattice.start_layer) * 8
     start_course = _nearest_course(frame, data.start_course)
     states = np.arange(first_state, first_state + 8) if start_course < 0 else np.array([first_state + start_course])
@@ -319,8 +319,8 @@ MAX_STEP_M = 2000.0
 LAYERS_PER_STEP = 2
 # Maximum number of states of a lattice.
 MAX_LATTICE_STATES = 4_000_000
-# Maximum number of expanded states of all lattices of a search together: of 600 scenarios none had a route over a finer
-# lattice if the first had used them all.
+# Maximum number of expanded states of all lattices of a search together.  In 600 scenarios, no finer lattice had a
+# route if the first lattice had used up this number.
 MAX_EXPANDED = 60_000
 # States expanded between two calls of `pause`: some 10 ms.
 STATES_PER_PAUSE = 2000
@@ -342,16 +342,16 @@ def turning_step(data: ProblemArrays) -> float:
 
 
 def make_lattice(data: ProblemArrays, frame: RotatedFrame, step: float) -> Lattice:
-    """Return a lattice over the whole map that has points at both ends.
+    """Make a lattice over the whole map that has points at both ends of the path.
 
     step: maximum spacing of the points, m. It is increased if the lattice would otherwise have more than
         `MAX_LATTICE_STATES` states.
     """
-    corners = [(e, n, 0.0) for e in (data.west, data.east) for n in (data.south, data.north)]
+    corners = [(east, north, 0.0) for east in (data.west, data.east) for north in (data.south, data.north)]
     min_corner, max_corner = frame.to_frame(corners)[:, :2].min(axis=0), frame.to_frame(corners)[:, :2].max(axis=0)
     level_point = np.array([*data.destination[:2], data.start[2]])
     gentler_slope = math.tan(max(0.01, min(slope_limits(data, np.array(data.start), level_point))))
-    min_height = max(data.floor, float(np.nanmin(data.heights)) + data.clearance)
+    min_altitude = max(data.floor, float(np.nanmin(data.heights)) + data.clearance)
     stages = max(1, math.ceil(frame.length / step))
     # Enlarge the spacing until the lattice is small enough.
     while True:
@@ -359,13 +359,13 @@ def make_lattice(data: ProblemArrays, frame: RotatedFrame, step: float) -> Latti
         layer_spacing = gentler_slope * step / LAYERS_PER_STEP
         behind, right = math.floor(-min_corner[0] / step), math.floor(-min_corner[1] / step)
         along, across = behind + math.floor(max_corner[0] / step) + 1, right + math.floor(max_corner[1] / step) + 1
-        layers_below = max(0, math.floor((data.start[2] - min_height) / layer_spacing))
+        layers_below = max(0, math.floor((data.start[2] - min_altitude) / layer_spacing))
         layers = layers_below + max(0, math.floor((data.ceiling - data.start[2]) / layer_spacing)) + 1
         if stages == 1 or along * across * layers * 8 <= MAX_LATTICE_STATES:
             break
         stages -= 1
     goal_layer = min(layers - 1, max(0, round((data.destination[2] - data.start[2]) / layer_spacing) + layers_below))
-    first_height = data.start[2] - layers_below * layer_spacing
+    first_altitude = data.start[2] - layers_below * layer_spacing
     return Lattice(
         step,
         behind,
@@ -373,7 +373,7 @@ def make_lattice(data: ProblemArrays, frame: RotatedFrame, step: float) -> Latti
         along,
         across,
         behind + stages,
-        first_height,
+        first_altitude,
         layer_spacing,
         layers,
         layers_below,
@@ -389,7 +389,9 @@ def cheapest_lattice_route(
     max_states: int,
     pause: Callable[[], None] = lambda: None,
 ) -> tuple[Records, int]:
-    """Return `LATTICE_CELL` records of the cheapest route over a lattice, and the number of expanded states.
+    """Find the cheapest route over a lattice.
+
+    Return its `LATTICE_CELL` records and the number of expanded states.
 
     max_turn: largest turn per step, in units of 45 degrees.
     max_states: maximum number of expanded states.
@@ -438,18 +440,20 @@ def lattice_route(
 def ceiling_route(
     data: ProblemArrays, frame: RotatedFrame, step: float, depth: float, pause: Callable[[], None] = lambda: None
 ) -> Floats:
-    """Return world points (k, 3) of a route at the altitude of the ceiling; (0, 3) without a route.
+    """Find a route at the altitude of the ceiling.
+
+    Return its world points (k, 3), m, or (0, 3) without a route.
 
     step: spacing of the lattice, m.
     depth: depth to which the route may enter the missiles' spheres, m.
-    pause: see `lattice_route`.
+    pause: function called from time to time; an exception raised there stops the search.
 
     The spheres of missiles on the ground are narrowest at the ceiling. Only one layer is searched, which takes
     milliseconds. The climb to the ceiling at the start and the descent at the destination may therefore be too steep.
     """
     start, destination = (np.array([*end[:2], data.ceiling]) for end in (data.start, data.destination))
     for end in (start, destination):
-        # Locked like a scenario's ends, because to compiled code an unlocked array has another type.
+        # Read-only like a scenario's ends: for a writable array the kernels would be compiled again.
         end.setflags(write=False)
     level_data = data._replace(start=start, destination=destination, floor=data.ceiling, kill_margin=-depth)
     return lattice_route(level_data, frame, step, pause)[0]

@@ -104,8 +104,8 @@ def search_patterns(
     must_end: called after every `EVALUATIONS_PER_PAUSE` evaluations; if it returns True, the search ends with its
         present result.
 
-    The vectors are the best feasible vector, if there is one, and the vector with the lowest merit, if it is not the
-    same.
+    The vectors are the best feasible vector, if there is one, and the vector with the lowest merit, if it is another
+    one.
     """
     frames = require_frames(encoding)
     inner_count = encoding.waypoints - 2
@@ -220,10 +220,7 @@ def _evaluate_merit(
 
 @inner
 def _merit_of_scores(violations: Record, objectives: Record) -> tuple[float, bool]:
-    """Return the merit of scores, and True if they show no violation.
-
-    The merit is the length ratio plus prices of violations.
-    """
+    """Return the merit of scores (length ratio plus priced violations), and True without violations."""
     price, is_feasible = EXPOSURE_PRICE * objectives.kill_exposure, True
     if objectives.kill_exposure > 0.0:
         price += ANY_EXPOSURE_PRICE
@@ -266,9 +263,9 @@ def _begin_search(data: ProblemArrays, frames: WaypointFrames, start: Floats, st
 def _fill_trial(
     box: _Box, moves: Floats, k: int, steps: Floats, round_start: Floats, vector: Floats, trial: Floats
 ) -> None:
-    """Fill a trial vector (d,) with a vector after its move k, clipped to the box.
+    """Apply move k to a vector (d,), clip the result to the box, and fill `trial` (d,) with it.
 
-    If k is the number after the last move, the displacement of the whole round is repeated instead.
+    If k is one more than the last move, the displacement of the whole round is repeated instead.
     """
     for d in range(vector.size):
         step = steps[k] * moves[k, d] if k < moves.shape[0] else vector[d] - round_start[d]

@@ -82,7 +82,7 @@ class Shortening(NamedTuple):
 
     path: (w, 3) m.
     rounds, models: number of rounds done and of models evaluated.
-    corners_too: see `active_constraints`.
+    corners_too: True to also constrain the height and slope of corners as they are flown.
     """
 
     path: Floats
@@ -101,7 +101,7 @@ def begin_shortening(
 
     samples: number of ground samples on each leg.
     extra_margin: additional margin to spheres and ground, m.
-    corners_too: see `active_constraints`.
+    corners_too: True to also constrain the height and slope of corners as they are flown.
     """
     active = active_constraints(data, path, samples, extra_margin, corners_too)
     return Shortening(path.copy(), active, np.zeros(constraint_count(active)), 0, 0, corners_too)

@@ -95,7 +95,7 @@ class ActiveConstraints(NamedTuple):
 def active_constraints(
     data: ProblemArrays, path: Floats, samples: int, extra_margin: float, corners_too: bool
 ) -> ActiveConstraints:
-    """Return the constraints that are active near a path (w, 3).
+    """Find the constraints that are active near a path (w, 3), and compute their coefficients.
 
     samples: number of ground samples on each leg.
     extra_margin: additional margin to spheres and ground, m.
@@ -200,7 +200,7 @@ def _find_near_missiles(
 
 @inner
 def constraint_count(active: ActiveConstraints) -> int:
-    """Return the number of constraints of `lagrangian`."""
+    """Return the number of all constraints in `lagrangian`: of missiles, ground, slopes, turns and corners."""
     legs = active.low.size
     return active.pairs.shape[0] + legs * (active.samples + 4) + (legs + 1) * (3 + SAMPLES_PER_CORNER)
 
@@ -209,9 +209,9 @@ def constraint_count(active: ActiveConstraints) -> int:
 def carry_multipliers(
     previous_active: ActiveConstraints, multipliers: Floats, next_active: ActiveConstraints
 ) -> Floats:
-    """Return the multipliers for a new set of active constraints, taken from the previous set.
+    """Return the multipliers (c,) for a new set of active constraints, taken from the previous set.
 
-    A pair of leg and missile that is new gets the multiplier 0.
+    A new pair of leg and missile gets the multiplier 0.
     """
     new_multipliers = np.zeros(constraint_count(next_active))
     pair_count = next_active.pairs.shape[0]
@@ -274,13 +274,17 @@ def _add_constraint(
     if not new_multiplier > 0.0:
         return -multiplier * multiplier / (2.0 * penalty)
     size, first_row = model.gradient.size, 3 * (first_waypoint - 1)
-    for a in range(3 * waypoint_count):
-        row = first_row + a
+    for offset in range(3 * waypoint_count):
+        row = first_row + offset
         if 0 <= row < size:
-            model.gradient[row] -= new_multiplier * model.slopes[a // 3, a % 3]
-            for b in range(a + 1):
-                if first_row + b >= 0:
-                    model.band[row, a - b] += penalty * model.slopes[a // 3, a % 3] * model.slopes[b // 3, b % 3]
+            model.gradient[row] -= new_multiplier * model.slopes[offset // 3, offset % 3]
+            for other_offset in range(offset + 1):
+                if first_row + other_offset >= 0:
+                    model.band[row, offset - other_offset] += (
+                        penalty
+                        * model.slopes[offset // 3, offset % 3]
+                        * model.slopes[other_offset // 3, other_offset % 3]
+                    )
     return (new_multiplier * new_multiplier - multiplier * multiplier) / (2.0 * penalty)
 
 
@@ -322,13 +326,15 @@ def _add_travel_cost(data: ProblemArrays, path: Floats, model: LagrangianModel) 
     for i in range(path.shape[0] - 1):
         total += model_leg(data.travel, data.aircraft, path[i], path[i + 1], leg)
         first_row = 3 * (i - 1)
-        for a in range(6):
-            row = first_row + a
+        for offset in range(6):
+            row = first_row + offset
             if 0 <= row < size:
-                model.gradient[row] += leg.slopes[a // 3, a % 3]
-                for b in range(a + 1):
-                    if first_row + b >= 0:
-                        model.band[row, a - b] += leg.curvature[a // 3, a % 3, b // 3, b % 3]
+                model.gradient[row] += leg.slopes[offset // 3, offset % 3]
+                for other_offset in range(offset + 1):
+                    if first_row + other_offset >= 0:
+                        model.band[row, offset - other_offset] += leg.curvature[
+                            offset // 3, offset % 3, other_offset // 3, other_offset % 3
+                        ]
     return total
 
 

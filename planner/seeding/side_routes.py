@@ -139,7 +139,7 @@ class SideSearch(NamedTuple):
     cell_costs: Floats
     spans: Records
     centre_index: int
-    goal: int
+    goal_layer: int
     stages_done: int
 
 
@@ -150,7 +150,7 @@ CELLS_PER_PAUSE = 100_000
 def grid_costs(
     data: ProblemArrays, frame: RotatedFrame, grid: Grid, bound: float, pause: Callable[[], None] = lambda: None
 ) -> GridCosts:
-    """Return the costs of the cheapest routes over a grid from the start to each cell, and on to the destination.
+    """Compute the costs of the cheapest routes to each cell of a grid, and on to the destination.
 
     bound: upper limit on the cost of a whole route.
     pause: called after every `CELLS_PER_PAUSE` cells; an exception raised there stops the search.
@@ -165,16 +165,16 @@ def grid_costs(
 
 @compiled
 def begin_grid_costs(data: ProblemArrays, frame: RotatedFrame, grid: Grid) -> SideSearch:
-    """Return a new search for these costs, before its first stage."""
+    """Return a new search for the costs of partial routes over a grid, before its first stage."""
     stages, width, layer_count = grid.stages, grid.across.size, grid.layers.size
     step = frame.length / stages
     shape = (stages + 1, layer_count, width)
-    centre_index, start = int(np.argmin(np.abs(grid.across))), int(np.argmin(np.abs(grid.layers - data.start[2])))
+    centre_index, start_layer = int(np.argmin(np.abs(grid.across))), int(np.argmin(np.abs(grid.layers - data.start[2])))
     start_costs, goal_costs = np.full(shape, np.inf), np.full(shape, np.inf)
     spans = np.zeros((stages + 1, layer_count), dtype=SPAN)
     for z in range(layer_count):
-        spans[0, z].first, spans[0, z].last = (centre_index, centre_index) if z == start else (width, -1)
-    start_costs[0, start, centre_index] = 0.0
+        spans[0, z].first, spans[0, z].last = (centre_index, centre_index) if z == start_layer else (width, -1)
+    start_costs[0, start_layer, centre_index] = 0.0
     return SideSearch(
         GridCosts(start_costs, np.zeros(shape, dtype=np.int32), goal_costs, np.zeros(shape, dtype=np.int32)),
         layers_per_step(data, frame, step, grid.layers, grid.ratio),
@@ -195,13 +195,13 @@ def continue_grid_costs(
     stages, width, layer_count = grid.stages, grid.across.size, grid.layers.size
     step, required = frame.length / stages, required_clearance(data)
     layer_spacing = grid.layers[1] - grid.layers[0] if layer_count > 1 else 1.0
-    costs, step_layers, obstacles, cell_costs, spans, centre_index, goal, done = search
+    costs, step_layers, obstacles, cell_costs, spans, centre_index, goal_layer, stages_done = search
     start_costs, parents, goal_costs, successors = costs
-    height_differences = grid.layers - grid.layers[goal]
+    height_differences = grid.layers - grid.layers[goal_layer]
     goal_distances = np.empty(width)
     extra = np.zeros((stages + 1, width))
-    end_number = min(2 * stages, done + max_stages)
-    for step_number in range(done, end_number):
+    end_number = min(2 * stages, stages_done + max_stages)
+    for step_number in range(stages_done, end_number):
         stage = step_number + 1
         if stage <= stages:
             first, last = width, -1
@@ -228,7 +228,7 @@ def continue_grid_costs(
             prune_cells(start_costs[stage], spans[stage], goal_distances, height_differences, bound, first, last)
             continue
         if step_number == stages:
-            goal_costs[stages, goal, centre_index] = 0.0
+            goal_costs[stages, goal_layer, centre_index] = 0.0
         stage = 2 * stages - 1 - step_number
         next_costs, stage_costs = goal_costs[stage + 1], goal_costs[stage]
         _relax_stage_back(
@@ -243,12 +243,12 @@ def continue_grid_costs(
             grid.ratio,
         )
         _drop_cells_above_bound(start_costs[stage], goal_costs[stage], spans[stage], bound)
-    return SideSearch(costs, step_layers, obstacles, cell_costs, spans, centre_index, goal, end_number)
+    return SideSearch(costs, step_layers, obstacles, cell_costs, spans, centre_index, goal_layer, end_number)
 
 
 @inlined
 def passing_side(lateral_offset: float, vertical_offset: float) -> int:
-    """Return the side on which a point passes an obstacle.
+    """Return the side on which a point passes an obstacle: LEFT, RIGHT, OVER or UNDER.
 
     lateral_offset, vertical_offset: offset of the point to the left of the obstacle's centre, and above the centre, m.
     """
@@ -372,7 +372,7 @@ def side_routes(
 
 
 def closest_places(data: ProblemArrays, path: Floats, distance: float) -> Floats:
-    """Return the points of a path (w, 3) at which it is too close to missile spheres, deepest first, (k, 3).
+    """Find the points of a path (w, 3) that are too close to missile spheres, the closest first, (k, 3) m.
 
     distance: required distance from the spheres, m.
 
@@ -389,7 +389,7 @@ def closest_places(data: ProblemArrays, path: Floats, distance: float) -> Floats
 
 
 def close_places(data: ProblemArrays, places: Floats, radius: float) -> ProblemArrays:
-    """Return data with additional missile spheres that close places (k, 3) to grids and lattices.
+    """Add missile spheres around places (k, 3) to the data, so that grids and lattices avoid them.
 
     radius: radius of the spheres, m.
     """
@@ -397,7 +397,7 @@ def close_places(data: ProblemArrays, places: Floats, radius: float) -> ProblemA
     closed["east"], closed["north"], closed["up"] = places.T
     closed["kill_radius"] = closed["kill_scale"] = radius
     threats = np.concatenate([data.threats, closed])
-    # Locked like a scenario's threats, because to compiled code an unlocked array has another type.
+    # Read-only like a scenario's threats: for a writable array the kernels would be compiled again.
     threats.setflags(write=False)
     return data._replace(threats=threats, missiles=make_missile_index(threats))
 
@@ -412,24 +412,26 @@ def optimistic_grid(
     spread: float,
     ratio: float,
 ) -> Grid:
-    """Return a grid with smaller kill spheres, and with lower ground in each cell.
+    """Make a grid with smaller kill spheres and lower ground, so that its routes also use narrow gaps.
 
-    The ground of a cell is taken from a smaller area around it.
-
-    shrink, spread, ratio: see `Grid`.
+    shrink, spread, ratio: reduction of the spheres, size of the area of highest ground, and spacing across, as in
+    `Grid`.
 
     The highest layer is at the ceiling, where the spheres of missiles on the ground are narrowest.
     """
     square_grid = make_grid(data, frame, span, stages)
     step = ratio * frame.length / square_grid.stages
     across = np.arange(math.ceil(span[0] / step), math.floor(span[1] / step) + 1) * step
-    layers, start = square_grid.layers, data.start[2]
-    if data.ceiling > start and layers.size > 1:
-        layer_spacing = (data.ceiling - start) / math.ceil((data.ceiling - start) / (layers[1] - layers[0]))
+    layers, start_altitude = square_grid.layers, data.start[2]
+    if data.ceiling > start_altitude and layers.size > 1:
+        layer_spacing = (data.ceiling - start_altitude) / math.ceil(
+            (data.ceiling - start_altitude) / (layers[1] - layers[0])
+        )
         layers = (
-            start
+            start_altitude
             + np.arange(
-                -math.floor((start - layers[0]) / layer_spacing), round((data.ceiling - start) / layer_spacing) + 1
+                -math.floor((start_altitude - layers[0]) / layer_spacing),
+                round((data.ceiling - start_altitude) / layer_spacing) + 1,
             )
             * layer_spacing
         )

@@ -74,7 +74,7 @@ def waypoint_chains(
     pause: Callable[[], None] = lambda: None,
     max_legs: int = ALL_LEGS,
 ) -> WaypointChains:
-    """Return the best path through each candidate position of each waypoint.
+    """Find the best path through each candidate position of each waypoint.
 
     candidates: (w, k, 3) m; only the first candidate of each end is used.
     bound: upper limit on the cost of a path, m; paths above it are dropped, which saves time.
@@ -108,7 +108,7 @@ def _advance_sweeps(
     The forward sweep extends partial paths from the start. Then the backward sweep extends partial paths from the
     destination.
 
-    legs: (w - 1, k, k) costs of legs, filled when needed; a negative number is minus a lower bound.
+    legs: (w - 1, k, k) costs of legs, filled when needed; a negative number -x means that x is a lower bound.
     cursor: a `_CURSOR` record (1,), at which the sweeps continue.
     """
     count, width, _ = candidates.shape
@@ -212,8 +212,8 @@ def _extend_paths(
         turn_cost = 0.0
         if 0 < previous < candidates.shape[0] - 1:
             far_point = candidates[previous - step, link[previous, j]]
-            a, c = (far_point, point) if step > 0 else (point, far_point)
-            turn_cost = _corner_cost(data, limits, a, candidates[previous, j], c, corners)
+            first_point, last_point = (far_point, point) if step > 0 else (point, far_point)
+            turn_cost = _corner_cost(data, limits, first_point, candidates[previous, j], last_point, corners)
         if not lower_bound + turn_cost < min(cost[i, k], max_cost):
             continue
         first_candidate, second_candidate = (j, k) if step > 0 else (k, j)
@@ -296,7 +296,7 @@ def _corner_cost(
 
 @compiled
 def free_points(data: ProblemArrays, points: Floats) -> Flags:
-    """Return a mask of the points that are on the map, above the clearance and outside kill spheres, (n,).
+    """Return a mask (n,) of the points that are on the map, above the clearance and outside kill spheres.
 
     points: (n, 3) m.
 

@@ -31,8 +31,9 @@ COST_ROUNDING_M = 1e-3
 
 @inner
 def penalised_leg_cost(data: ProblemArrays, limits: PrecomputedLimits, a: Floats, b: Floats, max_cost: float) -> float:
-    """Return the length of a leg plus the cost of its violations, m of path.
+    """Return the length of the leg a-b plus the cost of its violations, m of path.
 
+    a, b: ends of the leg, (3,) m.
     Once the cost exceeds `max_cost`, the evaluation ends; the result is then a lower bound.
     """
     dx, dy = b[0] - a[0], b[1] - a[1]
@@ -111,9 +112,9 @@ def _max_depth_below_leg(
 
 @compiled
 def _choose_candidates(data: ProblemArrays, candidates: Floats) -> tuple[Ints, int]:
-    """Choose one candidate (w, c, 3) for each waypoint, so that the sum of the leg costs is smallest.
+    """Choose one of the candidates (w, c, 3) of each waypoint, so that the sum of the leg costs is smallest.
 
-    Return the chosen candidates (w,) and the number of legs evaluated.
+    Return the indices of the chosen candidates (w,) and the number of legs evaluated.
     """
     count, width, _ = candidates.shape
     parents = np.zeros((count, width), dtype=np.int64)

@@ -66,7 +66,7 @@ def test_unknown_name_lists_the_known_ones(name: str) -> None:
         ("mass_kg = 11.0", "mass_kg = true", r"mass_kg = True is not a positive number$"),
         ("mass_kg = 11.0", 'mass_kg = "11"', r"mass_kg = '11' is not a positive number$"),
         ("mass_kg = 11.0", "mass_kg = ", r"Invalid value"),
-        ("airspeed_mps = 25.0", "airspeed_mps = 50.0", r"<= airspeed_max_mps does not hold"),
+        ("airspeed_mps = 25.0", "airspeed_mps = 50.0", r"<= airspeed_max_mps, found"),
         ("title = ", "title = 1 #", r"title = 1 is not a string$"),
     ],
 )
@@ -117,12 +117,12 @@ def test_a_battery_or_fuel(folder: Path) -> None:
         ("[model]\ncolour = 3", r"model: unknown key colour$"),
         ("[model]\nengine_settles = 1", r"model\.engine_settles = 1 is not true or false$"),
         ("[model.command]\nflap = 1", r"model\.command: unknown key flap$"),
-        ("[model.command]\nelevator = 1", r"model\.command\.elevator = 1 is not a property and 2 number"),
-        ('[model.command]\nelevator = ["a b", 1, 1]', r"is not a property and 2 number"),
-        ('[model.command]\nelevator = ["a", 1, 0]', r"is not a property and 2 number"),
-        ('[model.reading]\npower = ["a", true]', r"is not a property and 1 number"),
-        ('[model.reading]\npower = ["a"]', r"is not a property and 1 number"),
-        ('[model.reading]\npower = ["a", inf]', r"is not a property and 1 number"),
+        ("[model.command]\nelevator = 1", r"model\.command\.elevator = 1 is not a property name and 2 number"),
+        ('[model.command]\nelevator = ["a b", 1, 1]', r"is not a property name and 2 number"),
+        ('[model.command]\nelevator = ["a", 1, 0]', r"is not a property name and 2 number"),
+        ('[model.reading]\npower = ["a", true]', r"is not a property name and 1 number"),
+        ('[model.reading]\npower = ["a"]', r"is not a property name and 1 number"),
+        ('[model.reading]\npower = ["a", inf]', r"is not a property name and 1 number"),
     ],
 )
 def test_bad_model_tables(folder: Path, text: str, message: str) -> None:

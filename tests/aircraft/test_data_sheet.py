@@ -183,13 +183,13 @@ def test_the_slope_of_an_elliptic_wing() -> None:
         # 2.1 kg on 0.8 m2 at lift coefficients of 2.4 and 0.5; or areas for those at 10 m/s.
         (
             {"area": 0.8},
-            "stall 10 m/s: allowed 4.18..9.17 m/s without flaps for 2.1 kg on 0.8 m2, or 0.14..0.672 m2 at this stall",
+            "stall 10 m/s: allowed 4.18..9.17 m/s without flaps for 2.1 kg on 0.8 m2, or a wing area of 0.14..0.672",
         ),
         ({"span": 0.8}, "span 0.8 m: allowed 0.82..2.59 m with a wing of 0.269 m2"),
         ({"fuel": 1.3}, "fuel 1.3 kg: allowed up to 60 % of the mass, 1.26 kg"),
         ({"fuel": 0.3, "motor": 900.0}, "fuel 0.3 kg: cannot be combined with --motor"),
         ({"top": 15.9, "climb": math.radians(30.0)}, "climb 30 degrees: allowed about 2.."),
-        ({"motor": 120.0, "volts": 7.4, "propeller": (0.2, 0.1)}, "motor 120 rpm a volt: allowed about "),
+        ({"motor": 120.0, "volts": 7.4, "propeller": (0.2, 0.1)}, "motor 120 rpm per volt: allowed about "),
     ],
 )
 def test_what_is_no_small_aircraft_is_refused(changed: dict[str, float], told: str) -> None:

@@ -248,7 +248,7 @@ def test_the_note_on_a_home_at_zero_says_where_it_comes_from() -> None:
 def test_px4s_distance_to_the_first_waypoint_is_named_as_px4s() -> None:
     verdict = judge_geometry(setup_of(CASES["a first waypoint 12 km from home"]))
     assert verdict.headline == "flyable"
-    assert "PX4 would reject the mission: first waypoint too far away: 12000 m from home" in verdict.summary
+    assert "PX4 would reject the mission: the first waypoint is 12000 m from home" in verdict.summary
 
 
 FILE = """QGC WPL 110

@@ -68,7 +68,7 @@ NAMES = ["plan", "again", "front", "studio", "ways of the studio"]
 @pytest.mark.parametrize("way", WAYS, ids=NAMES)
 def test_what_circles_about_the_destination_reach_is_in_every_certificate(way: Callable[[Scenario], Plan]) -> None:
     (problem,) = way(scenario_of("none", **BESIDE_THE_END)).certificate.problems
-    assert "PX4 circles about the destination" in problem
+    assert "PX4 circles around the destination" in problem
     assert "missile sam is in range" in problem
 
 

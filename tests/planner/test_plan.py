@@ -141,7 +141,10 @@ def test_plans_are_equal_if_their_files_are() -> None:
 
 def test_margins_that_given_waypoints_miss_do_not_fail() -> None:
     problems = ("leg 1: 420 m long", "landing: none of 3 paths is clear")
-    certificate, counted = replace(CERTIFICATE, problems=problems), ("it violates constraints at its sampled points",)
+    certificate, counted = (
+        replace(CERTIFICATE, problems=problems),
+        ("the path violates constraints at its sampled points",),
+    )
     for algorithm, failures, unmet in (("umda", problems, ()), (GIVEN_WAYPOINTS, problems[1:], problems[:1])):
         plan = made(certificate=certificate, algorithm=algorithm)
         assert (plan.failures, plan.unmet_margins) == (failures, unmet)
@@ -293,10 +296,10 @@ def test_a_notebook_shows_what_it_keeps_from_its_limits(plan: Plan) -> None:
     rows = {row[0].text: row[1].text for row in page.find("table/tbody") or ()}
     assert page.findtext("strong") == "Plan tight: safe"
     assert rows["length / straight line"] == "1.2500"
-    assert rows["clearance to spare, at least"] == "9.0 m"
-    assert rows["outside missiles' reach by at least"] == "51 m"
-    assert rows["lengths of legs to spare"] == "84 m"
-    assert rows["turns and slopes to spare"] == "5.0°, 1.25°"
+    assert rows["smallest margin of the clearance"] == "9.0 m"
+    assert rows["smallest distance from a kill zone"] == "51 m"
+    assert rows["smallest margin of a leg's length"] == "84 m"
+    assert rows["margins of turns and slopes"] == "5.0°, 1.25°"
     assert rows["algorithm, seed"] == "umda, 7"
 
 

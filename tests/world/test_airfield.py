@@ -144,7 +144,7 @@ CASES = {
     "a launch without speed": (HOME + '[launch]\nmethod = "hand"\nspeed_mps = 0', "launch.speed_mps: 0: allowed 1..60"),
     "a runway up a wall": (
         HOME + '[launch]\nmethod = "runway"\nincline_deg = 5.1',
-        "launch: incline_deg: 5.1: allowed 0..5 of a runway",
+        "launch: incline_deg: 5.1: allowed 0..5 for a runway",
     ),
     "a runway that pushes": (
         HOME + '[launch]\nmethod = "runway"\nspeed_mps = 20',

@@ -159,8 +159,8 @@ def test_the_corner_beyond_a_tilted_tile_is_named(tmp_path: Path) -> None:
     with pytest.raises(TerrainError) as caught:
         require_covered(raster, MIDDLE, extents)
     found = re.search(
-        r"its corner east (-?\d+) m, north (-?\d+) m is (\d+) m outside the data; east (-?\d+)\.\.(-?\d+) m,"
-        r" north (-?\d+)\.\.(-?\d+) m is within",
+        r"its corner east (-?\d+) m, north (-?\d+) m is (\d+) m outside the data; the largest area inside is"
+        r" east (-?\d+)\.\.(-?\d+) m, north (-?\d+)\.\.(-?\d+) m \(",
         str(caught.value),
     )
     assert found is not None, caught.value

@@ -33,7 +33,11 @@ CASES: dict[str, tuple[str, str, str]] = {
     "unknown table": ("", "[weather]\nrain = 1", "weather: unknown key"),
     "missing name": ('name = "small"', "", "name: Field required"),
     "a number of 9000 digits": ("amsl_m = 400", f"amsl_m = 1{'0' * 9000}", "not valid TOML"),
-    "ends on one another": ("east_m = 4000", "east_m = -3991", "destination: less than 10 m from start"),
+    "ends on one another": (
+        "east_m = 4000",
+        "east_m = -3991",
+        "destination: less than 10 m horizontally from the start",
+    ),
     "a fault in the second threat": (
         "",
         THREAT + THREAT + "name = 3",

@@ -19,8 +19,9 @@ MAX_CROSSINGS = 50_000
 
 
 def check_edges(rings: Sequence[Sequence[Sequence[float]]], *, closed: bool = True) -> None:
-    """Raise ValueError for an outline with too many corners, or with too many edges in one place.
+    """Raise ValueError for outlines with too many corners, or with too many edges in one place.
 
+    rings: corners (east, north) of each outline.
     closed: True for rings; False for lines, in which the last corner is not joined to the first.
 
     >>> check_edges([[(0.0, 0.0), (1.0, 0.0), (1.0, 1.0)]])
@@ -40,6 +41,8 @@ def check_edges(rings: Sequence[Sequence[Sequence[float]]], *, closed: bool = Tr
 
 def count_crossings(rings: Sequence[Sequence[Sequence[float]]], max_count: int, *, closed: bool = True) -> int:
     """Return the number of pairs of edges that cross or touch; counting stops above ``max_count``.
+
+    rings, closed: as for `check_edges`.
 
     Successive edges of a ring, which share a corner, are not counted.
 

@@ -64,7 +64,7 @@ def _crs_definition(database: sqlite3.Connection, system: int) -> str:
 def _plain_columns(columns: dict[str, Any]) -> dict[str, Any]:
     """Return the columns whose values are text or numbers.
 
-    The zone's name is added with the key "name", as in the other file formats, whatever its column is called.
+    The value of a column "name", "identifier" or "title" is also added under the key "name".
     """
     plain = {key: value for key, value in columns.items() if isinstance(value, str | int | float)}
     name = next((value for key, value in plain.items() if key.lower() in ("name", "identifier", "title")), None)

@@ -13,10 +13,9 @@ _CIRCLE_CORNERS = 256
 
 
 def unite_inclusions(zones: Sequence[Zone]) -> tuple[Zone, ...]:
-    """Return the zones with all inclusions merged into one zone.
+    """Return zones with all inclusions merged into one, for an autopilot that must be inside at least one of them.
 
-    With several inclusions, an aircraft has to be inside at least one of them. Circles are approximated by inscribed
-    polygons. Exclusions, and a single inclusion, are returned unchanged.
+    Circles are approximated by inscribed polygons. Exclusions, and a single inclusion, are returned unchanged.
 
     >>> from world.airspace.zones import make_cylinder
     >>> circles = [Zone(f"fence item {k}", "inclusion", make_cylinder(800.0 * k, 0.0, 500.0)) for k in range(2)]
@@ -39,7 +38,7 @@ def unite_inclusions(zones: Sequence[Zone]) -> tuple[Zone, ...]:
 
 
 def _zone_outline(shape: Polygon | Cylinder) -> shapely.Polygon:
-    """Return the outline of a zone without holes; a circle is replaced by a polygon inside it."""
+    """Return the outline of a shape without its holes; a circle is approximated by an inscribed polygon."""
     if isinstance(shape, Polygon):
         return shapely.Polygon(shape.rings[0])
     angles = np.linspace(0.0, 2.0 * math.pi, _CIRCLE_CORNERS, endpoint=False)

@@ -38,7 +38,16 @@ _ABOVE_GROUND = ("AGL", "AAGL", "ASFC", "GND", "SFC")
 
 @dataclass(slots=True)
 class _Block:
-    """Airspace that is being read: its class, and the contents of its lines up to the current line."""
+    """Airspace that is being read: the contents of its lines up to the current line, in degrees and m.
+
+    line: number of the line with which it begins.
+    kind: its type (AY).
+    limits: limits in openAIP's form, by the keys "lowerLimit" and "upperLimit".
+    corners: corners and arcs of its outline, latitude and longitude.
+    airway, width: points of an airway, and its width.
+    circle: center and radius.
+    centre, clockwise: variables for the arcs and circles that follow.
+    """
 
     line: int
     airspace_class: str
@@ -55,9 +64,7 @@ class _Block:
 
 
 def is_openair(text: str) -> bool:
-    r"""Return True if a text begins an airspace in the OpenAir format.
-
-    Its first command is AC, or AN by mistake before AC.
+    r"""Return True if a text is in OpenAir format: its first command is AC or, in wrong order, AN.
 
     >>> is_openair("* Slovenia\nAC D\nAN CTR"), is_openair("QGC WPL 110")
     (True, False)
@@ -67,11 +74,11 @@ def is_openair(text: str) -> bool:
 
 
 def openair_zones(text: str, source: str) -> Iterator[tuple[str, dict[str, Any] | str]]:
-    r"""Yield the location of each airspace in a file, and its [[zones]] entries or why it restricts no flight.
+    r"""Yield the location of each airspace in a file, and its [[zones]] entries or the reason to skip it.
 
-    Every airspace is an exclusion, with one exception: airspace of class E, F or G or without a class, unless its type
-    is more restrictive. An arc is approximated by chords within `ARC_BEND` of it. Raises ScenarioError for a line that
-    cannot be read.
+    Airspace of class E, F or G or without a class restricts no flight and is skipped, unless its type is more
+    restrictive. Any other airspace is an exclusion. An arc is approximated by chords within `ARC_BEND` of it. Raises
+    ScenarioError for a line that cannot be read.
 
     >>> text = "AC D\nAN CTR\nAL GND\nAH 2500ft AMSL\nV X=46:00:00N 014:00:00E\nDC 5"
     >>> [(where, entries["radius_m"], entries["ceiling_amsl_m"]) for where, entries in openair_zones(text, "a file")]
@@ -120,7 +127,7 @@ def _clean_line(line: str) -> str:
 
 
 def _finish_block(block: _Block, source: str) -> tuple[str, dict[str, Any] | str]:
-    """Return the location of an airspace in its file, and its [[zones]] entries or why it is skipped.
+    """Return the location of an airspace in its file, and its [[zones]] entries or the reason why it is skipped.
 
     Raises ScenarioError if the airspace does not have exactly one shape.
     """
@@ -147,7 +154,7 @@ def _finish_block(block: _Block, source: str) -> tuple[str, dict[str, Any] | str
 
 
 def _airway_rings(block: _Block, source: str) -> list[list[_Position]]:
-    """Return the outline of an airway, which extends by half its width on both sides of its segments."""
+    """Return the outline of an airway as one ring (latitude, longitude): a band of its width along its segments."""
     if len(block.airway) < 2 or not block.width > 0.0:
         raise ScenarioError(
             f"{source}: DY: an airway needs at least two points, and a width (V W=) before them", file=source
@@ -251,9 +258,7 @@ def _read_arc_by_points(block: _Block, text: str) -> None:
     if len(ends) != 2:
         raise ValueError("expected two points: 39:36:40N 119:46:10W, 39:29:09N 119:36:10W")
     centre = _required_centre(block)
-    (first_bearing, first_radius), (last_bearing, last_radius) = (
-        _bearing_and_distance(centre, place) for place in ends
-    )
+    (first_bearing, first_radius), (last_bearing, last_radius) = (_bearing_and_distance(centre, end) for end in ends)
     # The end points are kept as stated, even if they do not agree with the centre.
     arc = _arc_positions(centre, (first_radius, last_radius), first_bearing, last_bearing, block.clockwise)
     _add_corners(block.corners, [ends[0], *arc[1:-1], ends[1]])
@@ -330,7 +335,7 @@ def _parse_position(text: str) -> _Position:
 
 
 def _parse_degrees(text: str, max_degrees: float) -> float:
-    """Parse degrees, with optional minutes and seconds separated by colons; return degrees."""
+    """Parse an angle with optional minutes and seconds, such as 45:40:30; return degrees."""
     parts = [_parse_number(part) for part in text.split(":")]
     if len(parts) > 3 or any(part > 60.0 for part in parts[1:]):
         raise ValueError("expected degrees, and minutes and seconds of at most 60")

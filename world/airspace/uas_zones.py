@@ -58,7 +58,9 @@ def _zone_properties(properties: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 def ed269_zones(data: Mapping[str, Any], source: str) -> Iterator[_FoundZone]:
-    """Yield the location of each volume in a file, and its [[zones]] entries or why it restricts no flight.
+    """Yield the location of each volume in an ED-269 file, and its [[zones]] entries or the reason to skip it.
+
+    A zone without a restriction is skipped.
 
     Raises ScenarioError for an invalid volume.
     """
@@ -108,12 +110,12 @@ def _ed269_volume(volume: Any, source: str) -> dict[str, Any]:
 
 
 def ed318_zones(feature: Mapping[str, Any], location: str, index: int, source: str) -> Iterator[_FoundZone]:
-    """Yield the location and the [[zones]] entries of each layer of an ED-318 feature.
+    """Yield the location of each layer of an ED-318 feature, and its [[zones]] entries or the reason to skip it.
 
     location: location of the feature in the file, for messages.
     index: index of the feature, from 0.
 
-    A feature that restricts no flight yields its location and the reason, as in `ed269_zones`.
+    A feature without a restriction is skipped.
     """
     properties = _zone_properties(feature["properties"])
     name = _one_line_name(properties.get("name")) or _one_line_name(properties.get("identifier")) or f"zone {index + 1}"
@@ -147,9 +149,9 @@ def _flatten_geometries(geometry: Any) -> Iterator[Any]:
 
 
 def _ed318_layer(geometry: Any, default_layer: Mapping[str, Any], source: str) -> Iterator[dict[str, Any]]:
-    """Yield the [[zones]] entries of each part of a geometry.
+    """Yield the [[zones]] entries of each part of an ED-318 geometry.
 
-    default_layer: table with the vertical limits of a geometry that has no layer of its own.
+    default_layer: table with the vertical limits, for a geometry without its own table ``layer``.
     """
     geometry = geometry if isinstance(geometry, dict) else {}
     layer = geometry.get("layer")
@@ -183,8 +185,9 @@ def _ed318_layer(geometry: Any, default_layer: Mapping[str, Any], source: str) -
 
 
 def _parse_limit(value: Any, unit: Any, datum: Any, limit_name: str, source: str) -> dict[str, Any] | None:
-    """Convert a limit to openAIP's form; return None if there is no limit.
+    """Convert a vertical limit to openAIP's form: value, unit and referenceDatum; None for no limit.
 
+    value, unit, datum: values of the file.
     limit_name: "lower" or "upper".
     """
     if value is None or value == "":
@@ -225,7 +228,7 @@ def _circle_entries(centre: Any, radius: Any, source: str) -> dict[str, float]:
 
 
 def _one_line_name(value: Any) -> str:
-    """Return a name in one line; if there are several texts, the first English text, else the first."""
+    """Return a zone's name in one line; from a list of texts, the first English text or else the first."""
     if isinstance(value, list):
         texts = [
             text_entry
@@ -245,7 +248,10 @@ def _upper_word(value: Any) -> str:
 
 
 def _period_texts(applicability: Any, source: str) -> list[str]:
-    """Return the periods in which a zone is active, as [[zones]] texts; empty for an always active zone."""
+    """Return the periods in which a zone is active, as texts of a [[zones]] table; empty for an always active zone.
+
+    applicability: value of the file, a list of periods with schedules; None for always.
+    """
     if applicability is None:
         return []
     if not isinstance(applicability, list) or not all(isinstance(entry, dict) for entry in applicability):
@@ -268,9 +274,10 @@ def _period_texts(applicability: Any, source: str) -> list[str]:
 
 
 def _parse_moment(value: Any, extreme_offset: timedelta) -> datetime | None:
-    """Return a date and time in UTC, or None for an empty value.
+    """Parse a date and time; return it in UTC, or None for an empty value.
 
-    extreme_offset: offset that is added to a time without a UTC offset.
+    extreme_offset: shift from local time to UTC for a time without a UTC offset, in the time zone that makes the
+        period longest.
     """
     if value is None or value == "":
         return None
@@ -279,11 +286,11 @@ def _parse_moment(value: Any, extreme_offset: timedelta) -> datetime | None:
 
 
 def _daily_period(start: datetime | None, end: datetime | None, schedule_entry: Mapping[str, Any]) -> Period:
-    """Convert one entry of a schedule to a period.
+    """Convert one entry of a schedule (days of the week, and hours) to a period of activity.
 
-    start, end: first and last time of the schedule.
+    start, end: first and last time of the schedule; None if unknown.
 
-    An entry with sunrise, sunset or hours without a UTC offset becomes the whole day.
+    Hours that are stated by sunrise or sunset, or without a UTC offset, become the whole day.
     """
     stated_days = schedule_entry.get("day") or []
     day_names = [_upper_word(day) for day in ([stated_days] if isinstance(stated_days, str) else stated_days)]
@@ -302,11 +309,11 @@ def _daily_period(start: datetime | None, end: datetime | None, schedule_entry: 
 
 
 def _minute_of_day(value: Any, *, rounds_up: bool = False) -> int | None:
-    """Return a time as minutes after 00:00 UTC of the stated day; None if it has no UTC offset.
+    """Convert a time of day to minutes after 00:00 UTC; None if it is empty or has no UTC offset.
 
     rounds_up: True to round a part of a minute up.
 
-    The result is negative for a time on the previous day in UTC.
+    The result is negative for a time on the previous day in UTC, and above 1,440 for a time on the next day.
     """
     if value is None or value == "":
         return None

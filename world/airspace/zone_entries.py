@@ -83,12 +83,12 @@ def zone_entries(properties: Mapping[str, Any], source: str) -> dict[str, Any]:
 
 
 def published_entries(limits: Mapping[str, Any], source: str) -> dict[str, Any]:
-    """Convert the limits of an authority's zone as `zone_entries` does, and mark them as `PUBLISHED`.
+    """Convert the limits of an authority's zone as `zone_entries` does, mark them as `PUBLISHED`, and correct them.
 
-    Some limits in authorities' files leave no vertical band. A lower limit above the upper limit (both AMSL, or both
-    above ground) is swapped with it, and the zone is marked `UPSIDE_DOWN`. An upper limit of 0 or below may mean no
-    limit or the lower limit, so the zone extends to all heights. An upper limit equal to the lower limit is ignored.
-    The last two kinds of zones are marked `NO_BAND`.
+    Limits that leave no vertical band are corrected:
+    - A lower limit above the upper limit (both AMSL, or both above ground) is swapped with it; mark `UPSIDE_DOWN`.
+    - An upper limit of 0 or below may mean no limit or the lower limit: extend the zone to all heights; mark `NO_BAND`.
+    - An upper limit equal to the lower limit is ignored; mark `NO_BAND`.
 
     >>> high, low = ({"value": feet, "unit": "FT", "referenceDatum": "MSL"} for feet in (1000, 500))
     >>> published_entries({"lowerLimit": high, "upperLimit": low}, "a file")["ceiling_amsl_m"]
@@ -115,7 +115,7 @@ def published_entries(limits: Mapping[str, Any], source: str) -> dict[str, Any]:
 
 
 def _comparable_limit(limit: Any) -> tuple[bool, float] | None:
-    """Return True for a height above ground or False for an altitude, and the limit in m; None if invalid."""
+    """Return two values for a limit: True if it is a height above ground, and its value in m; None if invalid."""
     if not isinstance(limit, dict):
         return None
     try:
@@ -125,7 +125,7 @@ def _comparable_limit(limit: Any) -> tuple[bool, float] | None:
 
 
 def _faa_limits(properties: Mapping[str, Any], source: str) -> dict[str, Any]:
-    """Convert limits in the FAA's form to openAIP's form."""
+    """Convert the limits in the FAA's properties (LOWER_VAL, LOWER_UOM, LOWER_CODE; UPPER) to openAIP's form."""
     limits = {}
     for limit_name, key in _FAA_LIMIT_KEYS.items():
         if (value := properties.get(f"{limit_name}_VAL")) is None:
@@ -141,7 +141,10 @@ def _faa_limits(properties: Mapping[str, Any], source: str) -> dict[str, Any]:
 
 
 def _limit_entry(value: Any, key: str, kind: Any, source: str) -> dict[str, float]:
-    """Convert a limit in openAIP's form to an entry of a [[zones]] table.
+    """Convert a limit in openAIP's form to an entry of a [[zones]] table, such as {"ceiling_agl_m": 90.0}.
+
+    key: property that states the limit.
+    kind: kind of the zone, "inclusion" or "exclusion".
 
     A floor at the ground needs no entry. Raises ScenarioError for an invalid limit.
     """

@@ -44,7 +44,7 @@ def geojson_zones(text: str, source: str) -> Iterator[Found]:
         data = json.loads(text, parse_constant=_reject_constant)
     except (ValueError, RecursionError) as error:
         raise ScenarioError(f"{source}: not valid JSON: {str(error).splitlines()[0]}", file=source) from error
-    # A large file takes several times its size: the text, and each feature once it is read, are released.
+    # The data of a large file takes several times its size: release the text, and each feature once it is converted.
     del text
     if not isinstance(data, dict):
         raise ScenarioError(f"{source}: expected a GeoJSON object, got {type(data).__name__}", file=source)
@@ -134,7 +134,10 @@ def _geojson_zone(feature: Any, location: str, index: int, source: str) -> tuple
 
 
 def _check_holes(parts: list[list[list[tuple[float, float]]]], source: str) -> None:
-    """Raise ScenarioError if a hole of a polygon lies outside its outline."""
+    """Raise ScenarioError if a hole of a polygon lies outside its outline.
+
+    parts: polygons, each as rings of (latitude, longitude), the outline first.
+    """
     try:
         is_inside = all(are_holes_inside(part) for part in parts if part)
     except ValueError as error:
@@ -150,7 +153,7 @@ def _parse_rings(coordinates: Any) -> list[list[tuple[float, float]]]:
 
 
 def _parse_corner(coordinates: Any) -> tuple[float, float]:
-    """Return the latitude and longitude of a GeoJSON position.
+    """Return the latitude and longitude of a GeoJSON position, which states the longitude first.
 
     Raises TypeError if it is not a list of numbers.
     """
@@ -248,7 +251,10 @@ def _kml_zone(placemark: _Element, source: str) -> dict[str, Any]:
 
 
 def _ceiling_entry(polygon: _Element, heights: list[float], source: str) -> tuple[str, float]:
-    """Return the key of a polygon's ceiling and its height, m; ("", 0) without a ceiling."""
+    """Return the [[zones]] key of a KML polygon's ceiling and its height, m; ("", 0) without a ceiling.
+
+    heights: heights of the polygon's corners, m.
+    """
     mode = _kml_text(polygon, "altitudeMode") or "clampToGround"
     if mode == "clampToGround":
         return "", 0.0
@@ -266,7 +272,7 @@ def _ceiling_entry(polygon: _Element, heights: list[float], source: str) -> tupl
 
 
 def _parse_positions(element: _Element, source: str) -> list[tuple[float, float, float]]:
-    """Return longitude, latitude and height of an element's positions."""
+    """Return longitude, latitude and height (0 if not stated) of each position in an XML element."""
     positions = []
     for coordinates in _find_descendants(element, "coordinates"):
         for position in (coordinates.text or "").split():
@@ -283,7 +289,7 @@ def _parse_positions(element: _Element, source: str) -> list[tuple[float, float,
 
 
 def _extended_data(placemark: _Element, source: str) -> dict[str, Any]:
-    """Return the entries of a placemark's ExtendedData: Data with a value, and SimpleData."""
+    """Return the values of a placemark's ExtendedData (Data and SimpleData) by name, with numbers converted."""
     texts = {str(element.get("name")): _kml_text(element, "value") for element in _find_descendants(placemark, "Data")}
     texts |= {
         str(element.get("name")): (element.text or "").strip() for element in _find_descendants(placemark, "SimpleData")
@@ -427,7 +433,9 @@ def read_zone_file(path: Path, source: str, max_zones: int = MAX_ZONES) -> FileZ
 
 
 def _repair_outline(entries: dict[str, Any], max_crossings: int, source: str) -> tuple[list[str], int]:
-    """Repair the outline of a zone from an authority's file, and remove the marks from its entries.
+    """Repair the outline in a zone's entries, in place, if the zone comes from an authority's file.
+
+    entries: [[zones]] entries; the marks `PUBLISHED`, `UPSIDE_DOWN` and `NO_BAND` are removed.
 
     Returns notes about the zone, and the number of crossings of its outline. Raises ScenarioError for more crossings
     than ``max_crossings``.

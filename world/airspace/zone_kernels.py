@@ -82,7 +82,7 @@ def zone_records(zones: Sequence[Zone]) -> ZoneRecords:
 
 
 def _set_boxes(zones: Records, edges: Records) -> None:
-    """Set the bounding boxes of polygons from their edges."""
+    """Set the bounding boxes of all polygons, from their edges; the boxes of cylinders are unchanged."""
     polygons = np.flatnonzero(~zones["round"])
     if polygons.size:
         # Every polygon has edges, and the edges of a polygon are consecutive.
@@ -106,16 +106,16 @@ def _make_edges(rings: list[Ring]) -> Records:
 
 
 def _level_record(level: ZoneLevel | None, default_height: float) -> tuple[float, bool]:
-    """Return the height of a level, m, and True if it is a height above ground.
+    """Return the height of a floor or ceiling, m, and True if it is a height above ground.
 
-    Without a level the height is the default.
+    Without a level the result is the default height, and False.
     """
     return (default_height, False) if level is None else (level.height, level.datum == "ground")
 
 
 @inlined
 def box_distance(records: ZoneRecords, z: int, west: float, east: float, south: float, north: float) -> float:
-    """Return the horizontal distance between a box and the bounding box of zone z, m; 0 if they overlap."""
+    """Return the horizontal distance between a box on the map and the bounding box of zone z, m; 0 if they overlap."""
     zone = records.zones[z]
     east_gap = max(0.0, zone.west - east, west - zone.east)
     north_gap = max(0.0, zone.south - north, south - zone.north)
@@ -124,7 +124,7 @@ def box_distance(records: ZoneRecords, z: int, west: float, east: float, south: 
 
 @inlined
 def distance_to_edge(edge: Record, east: float, north: float) -> float:
-    """Return the horizontal distance from a position to one edge, m."""
+    """Return the horizontal distance from a position (east, north, m) to an edge, a record of `EDGE`, m."""
     step_e, step_n = edge.to_east - edge.east, edge.to_north - edge.north
     east_offset, north_offset = east - edge.east, north - edge.north
     fraction = (east_offset * step_e + north_offset * step_n) / (step_e * step_e + step_n * step_n)
@@ -137,6 +137,9 @@ def distance_to_edge(edge: Record, east: float, north: float) -> float:
 @inner
 def nearest_edge(records: ZoneRecords, z: int, east: float, north: float) -> tuple[float, int]:
     """Return the distance from a position to the outline of zone z, m, and the index of the nearest edge.
+
+    z: index of the zone in ``records``.
+    east, north: position, m.
 
     The distance is horizontal, and negative inside the zone. The index is -1 for a cylinder, which has no edges.
     """
@@ -194,8 +197,9 @@ def height_outside_band(zone: Record, up: float, ground: float) -> float:
 def inside_fraction(
     records: ZoneRecords, z: int, ax: float, ay: float, bx: float, by: float, begin_fraction: float, end_fraction: float
 ) -> float:
-    """Return the fraction of the segment a-b that lies in a part of the segment and inside zone z.
+    """Return the fraction of the segment a-b that is inside zone z, within a part of the segment.
 
+    ax, ay, bx, by: ends of the segment, east and north, m.
     begin_fraction, end_fraction: limits of the part, as fractions of the segment; 0 and 1 for the whole segment.
 
     The result is exact. Entries and exits alternate, so the fraction inside is the sum of the exit fractions minus the
@@ -238,13 +242,13 @@ def inside_fraction(
 
 @inlined
 def _corner_distance2(edge: Record, ax: float, ay: float, dx: float, dy: float, run2: float) -> tuple[float, float]:
-    """Return the squared distance from an edge's first corner to a segment, m^2, and the nearest point.
+    """Return the squared distance from an edge's first corner to a segment, m^2, and the segment's nearest point.
 
-    ax, ay: start of the segment.
-    dx, dy: vector of the segment.
+    ax, ay: start of the segment, east and north, m.
+    dx, dy: vector of the segment, m.
     run2: squared length of the vector, m^2.
 
-    The nearest point is a fraction of the segment.
+    The nearest point is given as a fraction of the segment.
     """
     fraction = ((edge.east - ax) * dx + (edge.north - ay) * dy) / run2 if run2 > 0.0 else 0.0
     fraction = min(1.0, max(0.0, fraction))
@@ -256,9 +260,11 @@ def _corner_distance2(edge: Record, ax: float, ay: float, dx: float, dy: float, 
 def segment_distance(records: ZoneRecords, z: int, ax: float, ay: float, bx: float, by: float) -> tuple[float, float]:
     """Return the horizontal distance from the segment a-b to zone z, m, and the segment's nearest point.
 
-    The nearest point is a fraction of the segment. If the segment meets the shape, the distance is 0, and the point is
-    inside the shape or on its outline; `edge_distance` gives the depth. The result is exact, because two straight lines
-    that do not cross are nearest at an end of one of them.
+    ax, ay, bx, by: ends of the segment, east and north, m.
+
+    The nearest point is given as a fraction of the segment. If the segment meets the shape, the distance is 0, and the
+    point is inside the shape or on its outline. The result is exact, because two straight lines that do not cross are
+    nearest at an end of one of them.
     """
     zone = records.zones[z]
     dx, dy = bx - ax, by - ay

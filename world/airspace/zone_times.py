@@ -95,7 +95,7 @@ def parse_period(text: str) -> Period | None:
 def parse_time(text: str) -> datetime:
     """Parse an ISO 8601 time with a UTC offset, and return it in UTC; 24:00 is 00:00 of the next day.
 
-    Raises ValueError.  Its message does not repeat the text, which the caller adds.
+    Raises ValueError for any other text. The message does not repeat the text.
 
     >>> parse_time("2026-05-01T24:00+02:00").isoformat()
     '2026-05-01T22:00:00+00:00'
@@ -114,7 +114,7 @@ def parse_time(text: str) -> datetime:
 
 
 def _parse_part(text: str) -> datetime:
-    """Parse a time within a longer text; the error message names this part."""
+    """Parse a time that is a part of a longer text; unlike `parse_time`, name this part in the error message."""
     try:
         return parse_time(text)
     except ValueError as error:

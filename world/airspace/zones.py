@@ -38,9 +38,10 @@ class ZoneLevel:
 
 @dataclass(frozen=True, slots=True)
 class Polygon:
-    """Parts of the map, each with or without holes, by their edges.
+    """Polygon on the map, of one or more parts, each with or without holes.
 
-    rings: outlines run anticlockwise, holes clockwise (the inside is to the left); none crosses itself or another.
+    rings: outlines in anticlockwise direction, and holes in clockwise direction: the inside is to the left. No ring
+        crosses itself or another ring.
     """
 
     rings: tuple[Ring, ...]
@@ -115,7 +116,7 @@ def make_polygon(rings: Sequence[Sequence[tuple[float, float]]]) -> Polygon:
 
 
 def _fault_text(shape: shapely.Polygon) -> str:
-    """Return shapely's reason why a polygon is invalid, with the position on the map, m."""
+    """Describe the fault of an invalid polygon: shapely's reason, and its position on the map, m."""
     reason, _, position = shapely.is_valid_reason(shape).rstrip("]").partition("[")
     coordinates = [f"{float(value):.1f} m" for value in position.split()]
     return f"{reason} at east {coordinates[0]}, north {coordinates[1]}" if len(coordinates) >= 2 else reason
@@ -155,7 +156,7 @@ def _orient_ring(ring: Ring, depth: int) -> Ring:
 
 
 def make_cylinder(east: float, north: float, radius: float) -> Cylinder:
-    """Make a cylinder.
+    """Make a cylinder from its centre and its radius, m.
 
     Raises ValueError for a radius of zero or below, and for values that are not finite.
 
@@ -181,7 +182,10 @@ def is_hole(ring: Ring) -> bool:
 
 
 def band_outline(corners: Sequence[tuple[float, float]], width: float) -> list[tuple[float, float]]:
-    """Return the outline of a band of constant width along a line, with semicircular ends, m.
+    """Return the outline of a band of constant width along a line, with semicircular ends: (east, north) m.
+
+    corners: corners of the line, (east, north) m.
+    width: m.
 
     Raises ValueError for a line that crosses itself too often.
 
@@ -204,19 +208,18 @@ REPAIR_MARGIN_DEG = 1e-6
 def repair_rings(
     rings: Sequence[Sequence[Sequence[float]]], max_crossings: int = MAX_CROSSINGS
 ) -> tuple[list[list[list[float]]], int] | None:
-    """Repair rings that cross.
+    """Replace rings that cross themselves or each other by the rings of the area that they enclose.
 
     rings: rings of [latitude, longitude], the outline first.
     max_crossings: maximum number of crossings.
 
-    Returns the rings of the enclosed area, and the number of edge crossings. Returns no rings for an outline that
-    encloses no area, and None if there is nothing to repair. A ring that is not inside another ring is a part of the
-    area, not a hole. A ring of fewer than three different corners is left out. The area is extended by
-    `REPAIR_MARGIN_DEG` on all sides. Raises ValueError for more crossings than ``max_crossings``, and for too many
-    corners or edges (`check_edges`).
+    Returns the new rings, and the number of edge crossings. Returns None if there is nothing to repair, and no rings
+    for an outline that encloses no area. A ring that is not inside another ring is a part of the area, not a hole. A
+    ring of fewer than three different corners is left out. The area is extended by `REPAIR_MARGIN_DEG` on all sides.
+    Raises ValueError for more crossings than ``max_crossings``, and for too many corners or edges (`check_edges`).
 
-    >>> made, crossings = repair_rings([[[0, 0], [2, 2], [2, 0], [0, 2]]])
-    >>> len(made), crossings  # both halves of a bow tie, joined in the middle
+    >>> repaired, crossings = repair_rings([[[0, 0], [2, 2], [2, 0], [0, 2]]])
+    >>> len(repaired), crossings  # both halves of a bow tie, joined in the middle
     (1, 1)
     >>> repair_rings([[[0, 0], [2, 0], [2, 2]]]) is None
     True
@@ -276,7 +279,7 @@ def _enclosed_area(rings: Sequence[shapely.Polygon]) -> shapely.Geometry:
 
 
 def are_holes_inside(rings: Sequence[Sequence[tuple[float, float]]]) -> bool:
-    """Return True if all holes are inside the outline, or if a ring is invalid (see `make_polygon`).
+    """Return True if all holes are inside the outline; invalid rings are not checked, because `make_polygon` does it.
 
     rings: the outline first, then its holes.
 

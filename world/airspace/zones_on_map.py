@@ -62,9 +62,9 @@ def ring_on_map(origin: GeoOrigin, corners: Sequence[Sequence[float]]) -> list[t
 
 
 def add_corner_count(count: int, shape: Polygon | Cylinder) -> int:
-    """Return a count of corners plus the number of corners of a shape.
+    """Add the number of corners of a shape to a count of corners, and return the sum.
 
-    Raises ValueError above `MAX_MAP_CORNERS`.
+    Raises ValueError if the sum exceeds `MAX_MAP_CORNERS`.
 
     >>> add_corner_count(4, make_polygon([[(0.0, 0.0), (90.0, 0.0), (90.0, 90.0)]]))
     7
@@ -112,12 +112,12 @@ _DEGREE_LENGTH_M = 111_000.0
 
 
 def select_near_zones(tables: Sequence[ZoneTable], source: str, origin: GeoOrigin, bounds: Floats) -> list[ZoneTable]:
-    """Return the zones of a file that are relevant for an area.
-
-    They are all inclusions, and the exclusions within `MAX_ZONE_DISTANCE` of the area.
+    """Return the zones of a file that a flight in an area can meet.
 
     source: name of the file in messages.
-    bounds: (2, 2) m, west and east, south and north of the area.
+    bounds: [[west, east], [south, north]] of the area, (2, 2) m.
+
+    They are all inclusions, and the exclusions within `MAX_ZONE_DISTANCE` of the area.
 
     Raises ScenarioError if an omitted zone has an invalid shape; `make_zones` checks the other zones.
     """
@@ -134,9 +134,9 @@ def select_near_zones(tables: Sequence[ZoneTable], source: str, origin: GeoOrigi
 
 
 def _check_rings(table: ZoneTable) -> None:
-    """Raise ValueError if the rings in degrees of a zone are not a valid polygon.
+    """Raise ValueError if a zone that is stated in degrees is not a valid polygon.
 
-    The rings are checked in degrees, without projection on the map.
+    For speed, degrees are multiplied by a constant length instead of projected on the map.
     """
     rings = table.rings_deg if table.polygon_deg is None else [table.polygon_deg]
     if rings and rings[0]:
@@ -150,9 +150,9 @@ def _check_rings(table: ZoneTable) -> None:
 
 
 def _is_near_area(table: ZoneTable, origin: GeoOrigin, bounds: Floats) -> bool:
-    """Return True if a zone's bounding box is within `MAX_ZONE_DISTANCE` of the area.
+    """Return True if a zone's bounding box is within `MAX_ZONE_DISTANCE` of an area, or if it is stated in m.
 
-    Also return True for a zone that is not stated in degrees.
+    bounds: [[west, east], [south, north]] of the area, (2, 2) m.
     """
     max_distance, corners = MAX_ZONE_DISTANCE, table.rings_deg if table.polygon_deg is None else [table.polygon_deg]
     if table.lat_deg is not None and table.lon_deg is not None:
@@ -168,7 +168,7 @@ def _is_near_area(table: ZoneTable, origin: GeoOrigin, bounds: Floats) -> bool:
 
 
 def _make_shape(table: ZoneTable, origin: GeoOrigin) -> Polygon | Cylinder:
-    """Make the shape of a zone on the map.  Raises ValueError if it is invalid."""
+    """Make the shape of a zone on the map from the table that states it. Raises ValueError if it is invalid."""
     if table.radius_m is not None:
         east, north = table.east_m, table.north_m
         if east is None or north is None:
@@ -183,7 +183,7 @@ def _make_shape(table: ZoneTable, origin: GeoOrigin) -> Polygon | Cylinder:
 
 
 def _make_level(amsl: float | None, above_ground: float | None) -> ZoneLevel | None:
-    """Return the level that a zone's table states, AMSL or above ground; None without a level."""
+    """Make a floor or ceiling from its altitude AMSL or its height above ground, m; None if both are None."""
     if amsl is not None:
         return ZoneLevel(amsl, "amsl")
     return None if above_ground is None else ZoneLevel(above_ground, "ground")
@@ -192,7 +192,8 @@ def _make_level(amsl: float | None, above_ground: float | None) -> ZoneLevel | N
 def check_ends(zones: Sequence[Zone], source: str, ends: Sequence[tuple[str, Floats]], ground: Terrain | None) -> None:
     """Raise ScenarioError for a start or destination inside an exclusion or outside an inclusion.
 
-    ends: key in the file and position (3,) m of each end.
+    source: name of the file in messages.
+    ends: start and destination, each as its key in the file and its position, (3,) m.
     """
     records = zone_records(zones)
     for key, point in ends:
@@ -220,7 +221,10 @@ def first_violated_zone(zones: Sequence[Zone], point: Floats, ground: Terrain | 
 def _first_violated_by_records(
     zones: Sequence[Zone], records: ZoneRecords, point: Floats, ground: Terrain | None
 ) -> Zone | None:
-    """Return the result of `first_violated_zone` for zones whose records are already made."""
+    """Return the first zone that a position violates, or None; as `first_violated_zone`, with given records.
+
+    records: the same zones as records for kernels.
+    """
     east, north, up = (float(value) for value in point)
     ground_height = math.nan if ground is None else float(ground.height(east, north))
     for k, zone in enumerate(zones):
@@ -303,12 +307,12 @@ def level_heights(level: ZoneLevel | None, ground: Floats, default: float) -> Fl
 
 
 def zone_walls(zone: Zone, terrain: Terrain | None, default_floor: float, default_ceiling: float) -> list[Floats]:
-    """Return the walls of a zone: one array (k, 2, 3) m for each ring.
+    """Return the walls of a zone for drawing: one array (k, 2, 3) m for each ring.
 
     The array has the lower and the upper end of the wall at each of the k corners.
 
-    default_floor: altitude of unknown ground, m AMSL.
-    default_ceiling: ceiling of a zone without a ceiling, m AMSL.
+    default_floor: altitude of the ground where it is unknown, m AMSL.
+    default_ceiling: altitude of the upper end for a zone without a ceiling, m AMSL.
 
     A floor below the ground is raised to the ground.
 

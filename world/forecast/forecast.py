@@ -73,13 +73,13 @@ class Forecast:
 
     @property
     def grid_km(self) -> float:
-        """Largest distance between neighbouring nodes; 0 for a single place."""
+        """Largest distance between neighbouring nodes of the grid, km; 0 for a single place."""
         north = np.diff(self.latitudes).max(initial=0.0)
         east = np.diff(self.longitudes).max(initial=0.0) * math.cos(math.radians(float(np.abs(self.latitudes).min())))
         return float(max(north, east)) * _KM_PER_DEGREE
 
     def step_at(self, departure: datetime) -> tuple[datetime, datetime]:
-        """Return the forecast's times just before and after a departure."""
+        """Return the two successive times of the forecast between which a departure lies."""
         after = int(np.clip(np.searchsorted(self.times, departure.timestamp(), side="right"), 1, len(self.times) - 1))
         return (
             datetime.fromtimestamp(float(self.times[max(0, after - 1)]), UTC),
@@ -87,13 +87,16 @@ class Forecast:
         )
 
     def end_of_steps(self, departure: datetime) -> datetime:
-        """Return the last time after a departure that is reached without a step longer than `LONGEST_STEP`."""
+        """Return the last time of the forecast after a departure, before any step longer than `LONGEST_STEP`.
+
+        The wind is not interpolated over a longer step.
+        """
         times = self.times[self.times >= departure.timestamp()]
         long_steps = np.flatnonzero(np.diff(times) > LONGEST_STEP.total_seconds())
         return self.last_time if not len(long_steps) else datetime.fromtimestamp(float(times[long_steps[0]]), UTC)
 
     def field_from(self, departure: datetime, member: int = 0) -> WindField:
-        """Return the wind of one member; its times are in seconds after the departure."""
+        """Return the wind of one member of the ensemble as a field with times in s after the departure."""
         field = WindField(
             self.times - departure.timestamp(),
             self.latitudes,
@@ -104,7 +107,7 @@ class Forecast:
         return field.between(0.0, LONGEST_FLIGHT_S)
 
     def facts(self, departure: datetime) -> "ForecastFacts":
-        """Return the facts on the forecast that the first lines of an answer state."""
+        """Return the source and extent of the forecast for messages, for one departure."""
         return ForecastFacts(
             source=self.source,
             issued=self.issued,

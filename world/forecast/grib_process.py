@@ -39,9 +39,12 @@ _TIMEOUT_S = 1800.0
 
 
 def read_in_process(path: Path, box: Box, ground_amsl: float) -> Forecast:
-    """Read a GRIB file in another process, like `world.forecast.read_forecast.read_forecast`.
+    """Read a GRIB file in another process, because its library aborts the process on some damaged files.
 
-    Raises ForecastError.
+    box: area around the mission.
+    ground_amsl: altitude of the ground at the mission's start, m, for heights above ground.
+
+    Raises ForecastError for a file that cannot be read.
     """
     # The child process finds planfly's packages where this process found them.
     root = str(Path(__file__).parents[2])
@@ -59,11 +62,11 @@ def read_in_process(path: Path, box: Box, ground_amsl: float) -> Forecast:
     except subprocess.TimeoutExpired:
         code, lines = None, []
     if code == 0:
-        found: Forecast | ForecastError = pickle.loads(process.stdout)
-        if isinstance(found, ForecastError):
-            raise found
-        return found
-    # Of Python's errors, the last line states the reason.
+        answer: Forecast | ForecastError = pickle.loads(process.stdout)
+        if isinstance(answer, ForecastError):
+            raise answer
+        return answer
+    # The last line of a Python traceback states the reason.
     reason = (
         lines[-1][:150] if code == 1 and lines else f"eccodes {'hangs' if code is None else 'aborts'} with this file"
     )

@@ -58,7 +58,7 @@ def read_open_meteo(path: Path, ground_amsl: float) -> Forecast:
     places = [_read_place(path, entry, ground_amsl) for entry in entries]
     first = places[0]
     latitudes = np.unique([place.latitude for place in places])
-    # In one turn: a grid may extend over the antimeridian.
+    # Longitudes within 180 degrees of the first place, because a grid may extend over the antimeridian.
     place_longitudes = [
         first.longitude + (place.longitude - first.longitude + 180.0) % 360.0 - 180.0 for place in places
     ]
@@ -99,7 +99,11 @@ def _fault(path: Path, field: str, allowed: str) -> ForecastError:
 
 
 def _read_place(path: Path, entry: dict[str, Any], ground_amsl: float) -> _Place:
-    """Read the winds at one place."""
+    """Read the winds at one place of Open-Meteo's answer.
+
+    entry: JSON object of the place.
+    ground_amsl: altitude of the ground, m, if the object states no elevation.
+    """
     hourly, units = entry.get("hourly"), entry.get("hourly_units")
     if not isinstance(hourly, dict) or not isinstance(units, dict):
         reason = f": {entry['reason']}" if isinstance(entry.get("reason"), str) else ""
@@ -108,11 +112,11 @@ def _read_place(path: Path, entry: dict[str, Any], ground_amsl: float) -> _Place
     longitude = _number(path, entry, "longitude", -180.0, 360.0)
     ground = _number(path, entry, "elevation", -500.0, 9000.0) if "elevation" in entry else ground_amsl
     times = _read_times(path, hourly, units, entry)
-    found = [_find_level(path, hourly, match) for name in hourly if (match := _SPEED_NAME.match(name)) is not None]
-    # A model has null at all times of a level that it does not have.
-    levels = [level for level in found if not any(_is_null(hourly[name]) for name in level if name)]
+    all_levels = [_find_level(path, hourly, match) for name in hourly if (match := _SPEED_NAME.match(name)) is not None]
+    # The values of a level that a model does not have are null at all times.
+    levels = [level for level in all_levels if not any(_is_null(hourly[name]) for name in level if name)]
     if not levels:
-        allowed = "no wind: wind_speed_10m and wind_direction_10m, or those of other levels, are needed"
+        allowed = "no wind: wind_speed_10m and wind_direction_10m, or speed and direction of other levels, are needed"
         raise _fault(path, "hourly", allowed)
     count = _count_complete_times([hourly[name] for level in levels for name in level if name], len(times))
     groups = []
@@ -134,11 +138,12 @@ def _read_place(path: Path, entry: dict[str, Any], ground_amsl: float) -> _Place
 
 
 def _find_level(path: Path, hourly: dict[str, Any], match: re.Match[str]) -> tuple[str, str, str]:
-    """Return the names of a level's speed, direction and geopotential height.
+    """Return the names of the three variables of a level: wind speed, wind direction, geopotential height.
+
+    hourly: variables of the place.
+    match: match of `_SPEED_NAME` with the name of the speed.
 
     The last name is "" for a level at a height above ground.
-
-    match: match of the name of the speed.
     """
     name, level = match.group(), f"{match.group(1)}{match.group(2)}"
     direction = next((text for text in (f"wind_direction_{level}", f"winddirection_{level}") if text in hourly), None)
@@ -158,7 +163,7 @@ def _is_null(values: Any) -> bool:
 def _count_complete_times(columns: Sequence[Any], count: int) -> int:
     """Return the number of times up to the last time at which all columns have a value.
 
-    A model that ends before the requested days has null at all later times.
+    count: number of times in each column. A model that ends before the requested days has null at all later times.
     """
     lists = [values for values in columns if isinstance(values, list) and len(values) == count]
     while count > 0 and any(values[count - 1] is None for values in lists):
@@ -169,7 +174,7 @@ def _count_complete_times(columns: Sequence[Any], count: int) -> int:
 def _number(
     path: Path, entry: dict[str, Any], name: str, low: float, high: float, default: float | None = None
 ) -> float:
-    """Return a number from an entry. Raises ForecastError outside its limits."""
+    """Return the number under a name of an entry. Raises ForecastError if it is missing or outside its limits."""
     value = entry.get(name, default)
     if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
         raise _fault(path, name, f"{str(value)[:40]}: allowed {low:g}..{high:g}")
@@ -177,7 +182,7 @@ def _number(
 
 
 def _read_times(path: Path, hourly: dict[str, Any], units: dict[str, Any], entry: dict[str, Any]) -> Floats:
-    """Return the times, (t,) s since 1970 in UTC."""
+    """Return the times of the hourly variables, (t,) s since 1970 in UTC."""
     values = hourly.get("time")
     if not isinstance(values, list) or not values:
         raise _fault(path, "hourly.time", "missing: a list of times is needed")
@@ -198,7 +203,11 @@ def _read_times(path: Path, hourly: dict[str, Any], units: dict[str, Any], entry
 def _column(
     path: Path, hourly: dict[str, Any], units: dict[str, Any], name: str, count: int, factors: Mapping[str, float]
 ) -> Floats:
-    """Return the values of one hourly variable, (t,), in the first unit of `factors`."""
+    """Return the first values of one hourly variable, (count,), converted by the factor of its unit.
+
+    units: unit of each variable.
+    factors: factor of each allowed unit; the factor of the resulting unit is 1.
+    """
     factor = unit_factor(units.get(name), factors)
     if factor is None:
         raise _fault(path, f"hourly_units.{name}", f"{units.get(name)!r}: allowed {', '.join(sorted(factors))}")

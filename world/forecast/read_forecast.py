@@ -57,9 +57,10 @@ _GROUND_NAMES = {"orog", "orography", "zsfc", "surface_altitude", "hsurf", "topo
 
 
 def read_forecast(path: Path, box: Box, ground_amsl: float) -> Forecast:
-    """Read the part of a forecast that is needed for the wind in a box.
+    """Read the part of a forecast file that is needed for the wind in a box around a mission.
 
-    ground_amsl: ground at the mission's start, m AMSL, for heights above ground in a file without the model's ground.
+    ground_amsl: altitude of the ground at the mission's start, m AMSL. Heights above ground are measured from it if the
+        file does not state the ground of its model.
 
     Raises ForecastError, in one line, for a file that is missing or damaged, or that lacks a required variable. Raises
     MissingExtraError if xarray or cfgrib is not installed.
@@ -72,7 +73,11 @@ def read_forecast(path: Path, box: Box, ground_amsl: float) -> Forecast:
 
 @functools.lru_cache(maxsize=4)
 def _read_cached(path: Path, version: tuple[int, int], box: Box, ground_amsl: float) -> Forecast:
-    """Read a forecast; the version of the file is a part of the cache's key."""
+    """Read a forecast, and cache it.
+
+    version: time of the last change and size of the file, a part of the cache's key.
+    box, ground_amsl: as for `read_forecast`.
+    """
     try:
         with path.open("rb") as file:
             start = file.read(64)
@@ -97,7 +102,10 @@ def _read_cached(path: Path, version: tuple[int, int], box: Box, ground_amsl: fl
 
 
 def read_grib(path: Path, box: Box, ground_amsl: float) -> Forecast:
-    """Read a GRIB file as `read_forecast` does; see `world.forecast.grib_process`."""
+    """Read a GRIB file in this process; call `world.forecast.grib_process.read_in_process` instead.
+
+    box, ground_amsl: as for `read_forecast`.
+    """
     import cfgrib
 
     arguments = {"indexpath": "", "errors": "raise"}
@@ -112,7 +120,7 @@ def _call_library(path: Path, function: Callable[[], Any]) -> Any:
     line of its text.
     """
     hook = sys.unraisablehook
-    # Objects of files that are not open fail when they are closed: Python would print that.
+    # Objects of files that could not be opened fail when they are closed, and Python would print the error.
     sys.unraisablehook = lambda _: None
     try:
         with warnings.catch_warnings():
@@ -120,7 +128,7 @@ def _call_library(path: Path, function: Callable[[], Any]) -> Any:
             return function()
     except Exception as error:
         reason = (str(error).splitlines() or [type(error).__name__])[0][:150]
-        # They are closed here, not later with the hook of the caller. It takes 0.3 s in a large process.
+        # Close such objects now, while the hook is replaced. It takes 0.3 s in a large process.
         gc.collect()
     finally:
         sys.unraisablehook = hook
@@ -128,7 +136,7 @@ def _call_library(path: Path, function: Callable[[], Any]) -> Any:
 
 
 class _ForecastReader:
-    """Reader of one file.
+    """Reader of the wind in the xarray datasets of one file; its methods share the axes of the result.
 
     path: the file.
     box: area around the mission.
@@ -145,7 +153,7 @@ class _ForecastReader:
         return ForecastError(f"{self.path}: {field}: {allowed}", file=str(self.path), field=field, allowed=allowed)
 
     def read(self, datasets: Sequence[Any]) -> Forecast:
-        """Return the forecast in datasets of xarray."""
+        """Return the forecast in the datasets of a file. Raises ForecastError if it lacks a required variable."""
         decoded = [self._decode_times(dataset) for dataset in datasets]
         pairs = [pair for dataset in decoded for pair in self._wind_pairs(dataset)]
         if not pairs:
@@ -209,9 +217,9 @@ class _ForecastReader:
         raise self._error("time", f"missing for {array.name}: a coordinate in hours or seconds since a date is needed")
 
     def _find_issue(self, decoded: Sequence[Any]) -> datetime | None:
-        """Return the time of issue that a file states, or None.
+        """Return the time at which the forecast was issued, or None if the file does not state it.
 
-        An analysis of several times has no time of issue.
+        decoded: datasets of the file, with decoded times. An analysis of several times has no time of issue.
         """
         for dataset in decoded:
             for name, variable in dataset.variables.items():
@@ -227,7 +235,7 @@ class _ForecastReader:
     # Axes.
 
     def _set_axes(self, arrays: Sequence[Any]) -> None:
-        """Set latitudes and longitudes from the first variable, and the times that are common to all variables."""
+        """Set the axes of the result: the grid of the first variable, and the times common to all variables."""
         times = [self._valid_times(array)[1] for array in arrays]
         common = functools.reduce(np.intersect1d, times)
         if not len(common):
@@ -237,15 +245,15 @@ class _ForecastReader:
 
     def _horizontal(self, array: Any) -> tuple[Any, Any]:
         """Return the latitude and longitude coordinates of a variable."""
-        found = []
+        coordinates = []
         for standard_name, names in (("latitude", ("lat", "latitude")), ("longitude", ("lon", "longitude"))):
             for name, coordinate in array.coords.items():
                 if coordinate.attrs.get("standard_name") == standard_name or str(name).lower() in names:
-                    found.append(coordinate)
+                    coordinates.append(coordinate)
                     break
             else:
                 raise self._error(standard_name, f"missing for {array.name}")
-        return found[0], found[1]
+        return coordinates[0], coordinates[1]
 
     def _axes(self, array: Any) -> tuple[Floats, Floats]:
         """Return the latitudes and longitudes of the nodes around the box, in ascending order, deg."""
@@ -254,8 +262,8 @@ class _ForecastReader:
             return self._regular_axes(latitude.values, longitude.values)
         rows, columns = self._node_indices(latitude, longitude)
         center = 0.5 * (self.box.west + self.box.east)
-        near = center + (longitude.values.reshape(-1) - center + 180.0) % 360.0 - 180.0
-        return latitude.values.reshape(-1)[rows].astype(np.float64), near[columns].astype(np.float64)
+        wrapped_longitudes = center + (longitude.values.reshape(-1) - center + 180.0) % 360.0 - 180.0
+        return latitude.values.reshape(-1)[rows].astype(np.float64), wrapped_longitudes[columns].astype(np.float64)
 
     def _regular_axes(self, latitudes: Floats, longitudes: Floats) -> tuple[Floats, Floats]:
         """Return the axes of the regular grid to which a grid with two-dimensional coordinates is interpolated."""
@@ -265,13 +273,18 @@ class _ForecastReader:
         return axes
 
     def _node_indices(self, latitude: Any, longitude: Any) -> tuple[Any, Any]:
-        """Return the indices of the nodes around the box, in ascending order of latitude and of longitude."""
+        """Return the indices of the rows and columns of nodes around the box, by ascending latitude and longitude.
+
+        latitude, longitude: coordinates of the file's regular grid.
+
+        Raises ForecastError if the grid is unsuitable, or if its nodes around the box are too far apart.
+        """
         center = 0.5 * (self.box.west + self.box.east)
-        near = center + (longitude.values.reshape(-1).astype(np.float64) - center + 180.0) % 360.0 - 180.0
+        wrapped_longitudes = center + (longitude.values.reshape(-1).astype(np.float64) - center + 180.0) % 360.0 - 180.0
         indices = []
         for name, values, low, high in (
             ("latitude", latitude.values.reshape(-1).astype(np.float64), self.box.south, self.box.north),
-            ("longitude", near, self.box.west, self.box.east),
+            ("longitude", wrapped_longitudes, self.box.west, self.box.east),
         ):
             if len(values) < 2:
                 raise self._error(name, "one node: allowed at least two nodes around the mission")
@@ -287,14 +300,14 @@ class _ForecastReader:
             first = max(0, int(np.searchsorted(ordered, low, side="right")) - 1)
             last = min(len(ordered), int(np.searchsorted(ordered, high, side="left")) + 1)
             first, last = min(first, len(ordered) - 2), max(last, 2)
-            around = slice(first, max(last, first + 2))
-            # Nodes at both ends of a file that does not close round the globe are no neighbours.
-            gap = float(np.diff(ordered[around]).max())
+            selected = slice(first, max(last, first + 2))
+            # The first and last node of a file that does not cover all longitudes are not neighbours.
+            gap = float(np.diff(ordered[selected]).max())
             if gap > MAX_SPACING_DEG:
                 raise self._error(
                     name, f"nodes {gap:.3g}° apart around the mission: allowed up to {MAX_SPACING_DEG:g}°"
                 )
-            indices.append(order[around])
+            indices.append(order[selected])
         return indices[0], indices[1]
 
     # ------------------------------------------------------------------
@@ -304,6 +317,7 @@ class _ForecastReader:
         """Return the altitude of the ground in the forecast's model, (y, x) m AMSL; None if not stated."""
         for dataset in datasets:
             for name, array in dataset.data_vars.items():
+                # The ground has no level, and is the same at all times and for all members.
                 is_surface = array.attrs.get("GRIB_typeOfLevel") == "surface" and _is_height(name, array)
                 is_named = bool(_names_of(name, array) & _GROUND_NAMES)
                 if not (is_surface or is_named) or self._level_of(array, name) is not None:
@@ -328,11 +342,12 @@ class _ForecastReader:
         return factor
 
     def _wind_pairs(self, dataset: Any) -> Iterator[tuple[Any, Any]]:
-        """Yield the pairs of variables of a dataset that are an eastward and a northward wind."""
-        east = {str(n): a for n, a in dataset.data_vars.items() if _is_component(n, a, _U_NAME, _EAST_NAMES)}
-        north = {str(n): a for n, a in dataset.data_vars.items() if _is_component(n, a, _V_NAME, _NORTH_NAMES)}
+        """Yield each eastward wind of a dataset with its northward wind, which differs in name by u and v."""
+        variables = dataset.data_vars.items()
+        east = {str(name): array for name, array in variables if _is_component(name, array, _U_NAME, _EAST_NAMES)}
+        north = {str(name): array for name, array in variables if _is_component(name, array, _V_NAME, _NORTH_NAMES)}
         for name, array in east.items():
-            partners = [other for other, found in north.items() if _partner_key(other, "v") == _partner_key(name, "u")]
+            partners = [north_name for north_name in north if _partner_key(north_name, "v") == _partner_key(name, "u")]
             if not partners and len(east) == len(north) == 1:
                 partners = list(north)
             if not partners:
@@ -345,10 +360,11 @@ class _ForecastReader:
             raise self._error(next(iter(north)), "its eastward wind is missing")
 
     def _level_of(self, array: Any, name: Any) -> tuple[LevelKind, str | None, Floats] | None:
-        """Return the kind of a variable's levels, their dimension, and their values.
+        """Return the kind of a variable's levels, their dimension, and their values; None without levels.
 
-        The dimension is None for a single level. The values are hPa, m above ground or m AMSL. Return None for a
-        variable without levels.
+        name: name of the variable, which may state a height above ground.
+
+        The dimension is None for a single level. The values are hPa, m above ground or m AMSL.
         """
         for coordinate_name, coordinate in array.coords.items():
             kind = self._level_kind(str(coordinate_name), coordinate)
@@ -385,7 +401,10 @@ class _ForecastReader:
         return None
 
     def _group(self, datasets: Sequence[Any], east: Any, north: Any) -> LevelGroup:
-        """Return the wind of one pair of variables, and the altitudes or heights of its levels.
+        """Read the wind of one pair of variables, with the altitudes or heights of its levels.
+
+        datasets: datasets of the file, in which the heights of pressure levels are looked up.
+        east, north: variables of the eastward and the northward wind.
 
         Levels without any value around the mission are left out. Raises ForecastError for a level with only some
         values, for no level at all, and for winds that are not plausible.
@@ -408,7 +427,7 @@ class _ForecastReader:
             if latitude.ndim == 2:
                 rotate_to_north(velocities, latitude.values, longitude.values, self.latitudes, self.longitudes)
         shape = velocities.shape[1:-1]
-        altitudes = np.broadcast_to(self._geopotential(datasets, east, dim) if kind == "pressure" else values, shape)
+        altitudes = np.broadcast_to(self._geopotential(datasets, east) if kind == "pressure" else values, shape)
         is_missing = ~np.isfinite(velocities).all(axis=(0, -1)) | ~np.isfinite(altitudes)
         is_used = ~is_missing.all(axis=(0, 1, 2))
         if not is_used.any():
@@ -436,26 +455,26 @@ class _ForecastReader:
         attributes = array.attrs
         return attributes.get("standard_name") == "x_wind" or attributes.get("GRIB_uvRelativeToGrid") == 1
 
-    def _geopotential(self, datasets: Sequence[Any], wind: Any, dim: str | None) -> Floats:
-        """Return the altitudes of a wind's pressure levels, (t, y, x, k) m AMSL.
+    def _geopotential(self, datasets: Sequence[Any], wind: Any) -> Floats:
+        """Return the altitudes of a wind's pressure levels, (t, y, x, k) m AMSL, from the geopotential height.
 
-        They are read from the geopotential height.
+        wind: variable of the wind.
         """
-        level_kind = self._level_of(wind, wind.name)
+        wind_level = self._level_of(wind, wind.name)
         for dataset in datasets:
             for name, array in dataset.data_vars.items():
                 if not _is_height(name, array):
                     continue
                 level = self._level_of(array, name)
-                if level is None or level_kind is None or level[0] != "pressure":
+                if level is None or wind_level is None or level[0] != "pressure":
                     continue
-                if not np.array_equal(level[2], level_kind[2]):
+                if not np.array_equal(level[2], wind_level[2]):
                     raise self._error(str(name), f"its pressure levels differ from those of {wind.name}")
                 heights: Floats = self._values(array, level[1]).mean(axis=0) * self._height_factor(array)
                 rises = np.diff(heights[..., np.argsort(-level[2])], axis=-1)
                 if (rises <= 0.0).any():
                     raise self._error(
-                        str(name), "the height of a pressure level is not above that of a higher pressure"
+                        str(name), "the height of a pressure level is not above the height of a higher pressure"
                     )
                 return heights
         raise self._error(
@@ -465,7 +484,9 @@ class _ForecastReader:
     def _values(self, array: Any, level_dim: str | None = None) -> Floats:
         """Return the values of a variable around the box at the common times, (m, t, y, x, k).
 
-        t is 1 for a variable without times.
+        level_dim: name of the dimension of the levels; None for a single level.
+
+        m is the number of members, and t is 1 for a variable without times.
         """
         latitude, longitude = self._horizontal(array)
         axes = self._axes(array)
@@ -479,28 +500,31 @@ class _ForecastReader:
             if time_dim is not None:
                 array = array.isel({time_dim: np.flatnonzero(np.isin(times, self.times))})
         member_dim = next((str(dim) for dim in array.dims if str(dim) in _MEMBER_DIMS), None)
-        space = [str(dim) for dim in latitude.dims] + [str(dim) for dim in longitude.dims if dim not in latitude.dims]
-        used = {time_dim, member_dim, level_dim, *space}
-        extra = [str(dim) for dim in array.dims if dim not in used]
-        if any(array.sizes[dim] > 1 for dim in extra):
+        grid_dims = [
+            *(str(dim) for dim in latitude.dims),
+            *(str(dim) for dim in longitude.dims if dim not in latitude.dims),
+        ]
+        known_dims = {time_dim, member_dim, level_dim, *grid_dims}
+        unknown_dims = [str(dim) for dim in array.dims if dim not in known_dims]
+        if any(array.sizes[dim] > 1 for dim in unknown_dims):
             raise self._error(
-                str(array.name), f"dimension {extra[0]!r} is not known: allowed time, level, member and place"
+                str(array.name), f"dimension {unknown_dims[0]!r} is not known: allowed time, level, member and place"
             )
-        array = array.isel(dict.fromkeys(extra, 0))
+        array = array.isel(dict.fromkeys(unknown_dims, 0))
         if latitude.ndim == 1:
             nodes = self._node_indices(latitude, longitude)
         else:
             nodes = near_nodes(latitude.values, longitude.values, self.latitudes, self.longitudes)
-        array = array.isel(dict(zip(space, nodes, strict=True)))
+        array = array.isel(dict(zip(grid_dims, nodes, strict=True)))
         if array.size > MAX_NODES:
             raise self._error(str(array.name), f"{array.size:,} values around the mission: allowed {MAX_NODES:,}")
         array = _call_library(self.path, array.load)
         for dim, name in ((member_dim, "_member"), (time_dim, "_time"), (level_dim, "_level")):
             array = array.expand_dims(name) if dim is None else array.rename({dim: name})
-        values = array.transpose("_member", "_time", *space, "_level").values.astype(np.float64)
+        values = array.transpose("_member", "_time", *grid_dims, "_level").values.astype(np.float64)
         if latitude.ndim == 2:
-            around = np.ix_(*nodes)
-            values = regrid(values, latitude.values[around], longitude.values[around], *axes)
+            node_indices = np.ix_(*nodes)
+            values = regrid(values, latitude.values[node_indices], longitude.values[node_indices], *axes)
         return values
 
 
@@ -525,7 +549,11 @@ def _time_coordinates(array: Any) -> dict[str, Any]:
 
 
 def _is_component(name: Any, array: Any, pattern: re.Pattern[str], standard_names: tuple[str, ...]) -> bool:
-    """Return True if a variable is a component of the wind, by its standard name or else by its name."""
+    """Return True if a variable is a component of the wind, by its CF standard name or else by its own name.
+
+    pattern: names of the component in files without standard names.
+    standard_names: standard names of the component.
+    """
     standard_name = str(array.attrs.get("standard_name", ""))
     is_other_quantity = standard_name not in ("", "unknown") and "wind" not in standard_name
     return standard_name in standard_names or (pattern.match(str(name)) is not None and not is_other_quantity)
@@ -537,7 +565,9 @@ def _is_height(name: Any, array: Any) -> bool:
 
 
 def _partner_key(name: str, letter: str) -> str:
-    """Return the name of a wind component without the part that states its axis.
+    """Return the name of a wind component without its axis, which is equal for the two components of one wind.
+
+    letter: letter of the axis, "u" or "v".
 
     >>> _partner_key("u10", "u") == _partner_key("v10", "v")
     True

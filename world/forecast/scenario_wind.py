@@ -53,7 +53,10 @@ def map_box(origin: GeoOrigin, bounds: Floats) -> Box:
 
 
 def departure_of(at: str) -> datetime:
-    """Return the time of take-off, which is the start of a scenario's time of flight."""
+    """Return the time of take-off, UTC: the start of a scenario's time span of the flight.
+
+    at: the time span as text; see `world.airspace.zone_times.parse_span`.
+    """
     return parse_span(at)[0].astimezone(UTC)
 
 
@@ -85,8 +88,8 @@ def forecast_wind(
 ) -> tuple[Wind, "WindTable"]:
     """Return the wind of a flight in a forecast, and the [wind] table with the mean profile of this wind.
 
-    at: time of flight, whose start is the take-off.
-    member: member of the ensemble.
+    at: time span of the flight as text; its start is the take-off.
+    member: member of the ensemble, from 0.
 
     Raises ForecastError if the take-off is outside the forecast's times, or if an end of the mission is outside its box
     or its levels. Also raises ForecastError if the mean wind is stronger than a scenario allows.
@@ -177,7 +180,10 @@ def check_coverage(wind: Wind, file: str, latitudes: Floats, longitudes: Floats,
 
 
 def _check_places(facts: ForecastFacts, file: str, latitudes: Floats, longitudes: Floats) -> None:
-    """Raise ForecastError if places (deg) are outside the forecast's box, or too far from its only place."""
+    """Raise ForecastError if positions are outside the forecast's box, or too far from its only place.
+
+    latitudes, longitudes: (n,) deg.
+    """
     south, west, north, east = facts.box
     center = 0.5 * (west + east)
     near = center + (longitudes - center + 180.0) % 360.0 - 180.0
@@ -197,9 +203,13 @@ def _check_places(facts: ForecastFacts, file: str, latitudes: Floats, longitudes
 
 
 def shift_wind(wind: Wind, speed: float, from_course: float, gradient: float) -> Wind:
-    """Return a wind with another mean.  The wind of a forecast changes by the same vector everywhere.
+    """Return a wind with another mean profile; the wind of a forecast keeps its deviations from the mean.
 
-    speed, from_course, gradient: see `Wind`.  A change of the gradient is added to the wind of a forecast.
+    speed: m/s, at the reference altitude.
+    from_course: direction that the mean wind blows from, rad.
+    gradient: change of the speed with altitude, 1/s.
+
+    The wind of a forecast changes by the same vector at all positions of one altitude.
     """
     field, mean_gradient = wind.field, gradient
     if field is not None:

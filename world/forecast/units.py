@@ -52,7 +52,9 @@ _SPELLINGS = {
 
 
 def unit_factor(units: object, factors: Mapping[str, float]) -> float | None:
-    """Return the factor from stated units to the first of the units of `factors`; None for other units.
+    """Return the factor from a unit, in any known spelling, to the unit with the factor 1; None for other units.
+
+    factors: factors by unit, such as `SPEED_UNITS`.
 
     >>> unit_factor("m s**-1", SPEED_UNITS), unit_factor("kt", SPEED_UNITS), unit_factor("K", SPEED_UNITS)
     (1.0, 0.5144444444444445, None)

@@ -51,11 +51,11 @@ class WindField:
     velocities: Floats
 
     def __eq__(self, other: object) -> bool:
-        """Return True for a field of the same numbers."""
+        """Return True if the other field has the same numbers."""
         return isinstance(other, WindField) and np.array_equal(self.packed(), other.packed())
 
     def __hash__(self) -> int:
-        """Return the hash of the numbers."""
+        """Return a hash of the field's numbers."""
         return hash(self.packed().tobytes())
 
     def packed(self) -> Floats:
@@ -70,11 +70,11 @@ class WindField:
 
     @classmethod
     def unpacked(cls, numbers: Floats, count: int) -> "WindField":
-        """Return the field that `packed` stored in an array of numbers.
+        """Make a field from the numbers of `packed`.
 
-        count: expected length of the packed form.
+        count: expected number of numbers.
 
-        Raises ValueError if the packed form has another length or is not a wind field.
+        Raises ValueError for another number of numbers, or if they are not a wind field.
         """
         if numbers.size != count or count < _HEADER_SIZE or not np.isfinite(numbers).all():
             raise ValueError("not a wind field")
@@ -82,23 +82,23 @@ class WindField:
         axes_end = _HEADER_SIZE + sum(shape[:3])
         if min(shape) < 1 or axes_end + _NODE_SIZE * math.prod(shape) != count:
             raise ValueError("not a wind field")
-        first, second, third = np.split(numbers[_HEADER_SIZE:axes_end], np.cumsum(shape[:2]))
+        times, latitudes, longitudes = np.split(numbers[_HEADER_SIZE:axes_end], np.cumsum(shape[:2]))
         nodes = numbers[axes_end:].reshape(*shape, _NODE_SIZE)
-        is_ascending = all((np.diff(axis) > 0.0).all() for axis in (first, second, third))
+        is_ascending = all((np.diff(axis) > 0.0).all() for axis in (times, latitudes, longitudes))
         if not is_ascending or (np.diff(nodes[..., _ALTITUDE], axis=-1) < 0.0).any():
             raise ValueError("not a wind field")
-        return cls(first, second, third, nodes[..., _ALTITUDE].copy(), nodes[..., _EAST:].copy())
+        return cls(times, latitudes, longitudes, nodes[..., _ALTITUDE].copy(), nodes[..., _EAST:].copy())
 
     def interpolate(
         self, seconds: ArrayLike, latitudes: ArrayLike, longitudes: ArrayLike, altitudes: ArrayLike
     ) -> Floats:
         """Return the wind at n points, m/s, east and north, and the altitude at which it applies, (n, 3).
 
-        The altitude (m AMSL) is the point's altitude, limited to the levels of the field at the point.
-
-        seconds: (n,) s, or one value, as all arguments.
+        seconds: times of the points, s, (n,) or one value like all arguments.
         latitudes, longitudes: deg.
         altitudes: m AMSL.
+
+        The resulting altitude (m AMSL) is the point's altitude, limited to the levels of the field at the point.
         """
         points = (seconds, latitudes, longitudes, altitudes)
         arrays = np.broadcast_arrays(*(np.atleast_1d(np.asarray(values, dtype=np.float64)) for values in points))
@@ -121,9 +121,9 @@ class WindField:
 
 @inner
 def _bracket(field: Floats, start: int, count: int, value: float) -> tuple[int, float]:
-    """Return the index of the node at or below a value on an axis, and the value's fraction of the way to the next.
+    """Return the index of the last node of an axis not above a value, and the fraction of the step to the next node.
 
-    The axis is ``field[start : start + count]``.  Beyond the ends of the axis, the value at the end applies.
+    The axis is ``field[start : start + count]``, in ascending order. A value beyond an end is moved to that end.
     """
     low, high = 0, count - 1
     if high == 0 or value <= field[start]:
@@ -143,11 +143,12 @@ def _bracket(field: Floats, start: int, count: int, value: float) -> tuple[int, 
 def _level_number(
     field: Floats, corner: int, steps: tuple[int, int, int], fractions: tuple[float, float, float], number: int
 ) -> float:
-    """Return one number of a level, interpolated between its eight nodes.
+    """Interpolate one number of a level linearly in time, latitude and longitude, between eight nodes.
 
-    corner: index of the level's node at the lower corner of the cell.
-    steps: distances of the next node in time, latitude and longitude, in numbers; 0 on an axis of one node.
-    fractions: of the way to the next node.
+    field: numbers of a packed field.
+    corner: index in ``field`` of the first node of the cell, on this level.
+    steps: differences of the index to the next node in time, latitude and longitude; 0 on an axis of one node.
+    fractions: position in the cell along these axes, 0..1.
     number: `_ALTITUDE`, `_EAST` or `_NORTH`.
     """
     total = 0.0
@@ -169,7 +170,7 @@ def interpolate_field(
 ) -> tuple[float, float, float]:
     """Return the wind at a point of a packed field, m/s, east and north, and the altitude at which it applies, m AMSL.
 
-    That altitude is the point's altitude, limited to the levels there.
+    The resulting altitude is the point's altitude, limited to the levels there.
 
     field: `WindField.packed`.
     seconds: s on the field's axis of time.
@@ -181,7 +182,7 @@ def interpolate_field(
     rows_begin = _HEADER_SIZE + times
     columns_begin = rows_begin + rows
     nodes_begin = columns_begin + columns
-    # The turn of the longitude that is nearest to the field.
+    # Shift the longitude by whole turns to within 180 degrees of the field's middle.
     offset = longitude - 0.5 * (field[columns_begin] + field[nodes_begin - 1])
     if abs(offset) > 180.0:
         longitude -= 360.0 * round(offset / 360.0)
@@ -227,11 +228,11 @@ def _interpolate_points(
     field: Floats, seconds: Floats, latitudes: Floats, longitudes: Floats, altitudes: Floats
 ) -> Floats:
     """Return the wind and its altitude at n points, (n, 3), by `interpolate_field`."""
-    found = np.empty((seconds.size, 3))
+    winds = np.empty((seconds.size, 3))
     for k in range(seconds.size):
         east, north, altitude = interpolate_field(field, seconds[k], latitudes[k], longitudes[k], altitudes[k])
-        found[k, 0], found[k, 1], found[k, 2] = east, north, altitude
-    return found
+        winds[k, 0], winds[k, 1], winds[k, 2] = east, north, altitude
+    return winds
 
 
 # ----------------------------------------------------------------------
@@ -261,15 +262,15 @@ class MeanProfile:
     gradient: float
 
     def velocities_at(self, heights: Floats) -> Floats:
-        """Return the wind at heights above the reference altitude (m), m/s, east and north on a new last axis."""
+        """Return the wind, m/s, at heights above the reference altitude (m); a new last axis has east and north."""
         speeds = self.speed + self.gradient * heights
         return np.stack([-speeds * math.sin(self.from_course), -speeds * math.cos(self.from_course)], axis=-1)
 
 
 def without_levels_above(field: WindField, amsl: float) -> WindField:
-    """Return a field without the levels that are above an altitude (m AMSL) everywhere.
+    """Return a field without the levels that are above an altitude (m AMSL) everywhere, except for the lowest of them.
 
-    The lowest of these levels is kept.
+    That level is needed to interpolate the wind up to the altitude.
     """
     lowest = field.altitudes.min(axis=(0, 1, 2))
     count = min(len(lowest), int((lowest <= amsl).sum()) + 1)
@@ -307,7 +308,7 @@ def fit_mean_profile(
     reference_amsl: float,
     altitudes: tuple[float, float],
 ) -> MeanProfile:
-    """Return the mean profile of a wind field at a time (s) and a place (deg).
+    """Fit the mean profile of a wind field at a time (s on the field's axis) and a place (deg).
 
     reference_amsl: altitude of the profile's speed, m AMSL.
     altitudes: lowest and highest altitude of the mission, between which the profile is fitted, m AMSL.
@@ -324,11 +325,12 @@ def fit_mean_profile(
 
 
 def limit_gradient(gradient: float, speed: float, heights: Floats) -> float:
-    """Return a gradient (1/s) limited so that the speed of a mean profile is at least 0 at heights (m).
-
-    It is also limited to +-`_MAX_GRADIENT`.
+    """Limit the gradient of a mean profile (1/s) so that its speed is at least 0 at all heights.
 
     speed: m/s at height 0.
+    heights: heights above the reference altitude, m, of any shape.
+
+    The gradient is also limited to +-`_MAX_GRADIENT`.
     """
     lowest, highest = min(-1.0, float(heights.min())), max(1.0, float(heights.max()))
     limited = max(min(_MAX_GRADIENT, max(-_MAX_GRADIENT, gradient), speed / -lowest), -speed / highest)

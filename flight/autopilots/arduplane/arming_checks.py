@@ -1,4 +1,4 @@
-"""Describe settings with which ArduPlane does not arm, which leave the verdict open.
+"""Describe settings with which ArduPlane does not arm; they leave the verdict undecided.
 
 Read from ArduPlane 4.6.3 and 4.7: `AP_Arming::pre_arm_checks` and `AP_Arming_Plane::pre_arm_checks` call the functions
 that each check names.  A battery is full, and the aircraft stands at home with its throttle stick at idle.
@@ -57,7 +57,7 @@ def describe_failed_arming_checks(
     for name, (lowest, highest) in _LIMITS_FOR_ARMING.items():
         if not lowest <= values[name] <= highest:
             limit_text = f"at least {lowest:g}" if math.isinf(highest) else f"at most {highest:g}"
-            yield f"{name} {values[name]:g} prevents arming, which needs {limit_text}"
+            yield f"{name} {values[name]:g} prevents arming: ArduPlane requires {limit_text}"
     yield from _describe_mission_faults(parameters, values, mission)
     yield from _describe_pulse_faults(values)
     yield from _describe_radio_failsafe_faults(parameters, values)
@@ -78,15 +78,15 @@ def _describe_mission_faults(
     if parameters.by_origin("file").get("RTL_AUTOLAND") == 0.0:
         for mark in _MARKS_OF_AUTOLAND:
             if mark in mission.commands:
-                yield f"RTL_AUTOLAND 0 prevents arming with {mark.name} in the mission"
+                yield f"RTL_AUTOLAND 0 prevents arming, because the mission has {mark.name}"
     bits = int(values["ARMING_MIS_ITEMS"])
     for bit, command in _ITEMS_FOR_ARMING.items():
         if bits & bit and command not in mission.commands:
-            yield f"ARMING_MIS_ITEMS {bits} prevents arming without {command.name}"
+            yield f"ARMING_MIS_ITEMS {bits} prevents arming, because the mission has no {command.name}"
     if bits & _RALLY_FOR_ARMING and mission.rally_distance > (parameters.rally_limit or math.inf):
-        yield f"ARMING_MIS_ITEMS {bits} prevents arming without a rally point within RALLY_LIMIT_KM of home"
+        yield f"ARMING_MIS_ITEMS {bits} prevents arming, because no rally point is within RALLY_LIMIT_KM of home"
     elif bits & _RALLY_FOR_ARMING and math.isinf(mission.rally_distance):
-        yield f"ARMING_MIS_ITEMS {bits} prevents arming without a rally point"
+        yield f"ARMING_MIS_ITEMS {bits} prevents arming, because there is no rally point"
 
 
 def _describe_pulse_faults(values: Mapping[str, float]) -> Iterator[str]:
@@ -100,7 +100,7 @@ def _describe_pulse_faults(values: Mapping[str, float]) -> Iterator[str]:
         lowest, trim, highest = (values[f"{name}_{end}"] for end in ("MIN", "TRIM", "MAX"))
         if not lowest <= trim <= highest:
             range_text = f"{name}_MIN {lowest:g} to {name}_MAX {highest:g}"
-            yield f"{name}_TRIM {trim:g} prevents arming, which needs {range_text}"
+            yield f"{name}_TRIM {trim:g} prevents arming: ArduPlane requires {range_text}"
 
 
 def _describe_radio_failsafe_faults(parameters: ArduPilotParameters, values: Mapping[str, float]) -> Iterator[str]:
@@ -115,13 +115,13 @@ def _describe_radio_failsafe_faults(parameters: ArduPilotParameters, values: Map
     idle = values.get(f"{channel}_{end}", math.nan)
     if parameters.throttle_failsafe == 1.0 and (value <= idle if is_reversed else value >= idle):
         side = "above" if is_reversed else "below"
-        yield f"THR_FS_VALUE {value:g} prevents arming, which needs a value {side} {channel}_{end} {idle:g}"
+        yield f"THR_FS_VALUE {value:g} prevents arming: ArduPlane requires a value {side} {channel}_{end} {idle:g}"
     # `AP_Arming_Plane::pre_arm_checks` up to 4.6: 4.7 has no FS_SHORT_TIMEOUT.
     has_timeout = parameters.version == "4.6" or "FS_SHORT_TIMEOUT" in parameters.by_origin("file")
     long_timeout, short_timeout = values["FS_LONG_TIMEOUT"], values["FS_SHORT_TIMEOUT"]
     if has_timeout and parameters.short_failsafe != _SHORT_FAILSAFE_OFF and long_timeout < short_timeout:
         limit_text = f"at least FS_SHORT_TIMEOUT {short_timeout:g}"
-        yield f"FS_LONG_TIMEOUT {long_timeout:g} prevents arming in ArduPlane 4.6, which needs {limit_text}"
+        yield f"FS_LONG_TIMEOUT {long_timeout:g} prevents arming: ArduPlane 4.6 requires {limit_text}"
 
 
 def _describe_battery_faults(
@@ -131,21 +131,25 @@ def _describe_battery_faults(
 
     A threshold prevents arming if a full battery does not meet it, or if it is below the critical threshold. Follows
     `AP_BattMonitor_Backend::arming_checks`.
+
+    monitor: prefix of the monitor's parameters, such as "BATT2".
+    full_voltage: voltage of the full battery, V.
+    has_current: True if the monitor measures the current.
     """
     for unit in ("VOLT", "MAH"):
-        low, critical = (values[f"{monitor}_{level}_{unit}"] for level in ("LOW", "CRT"))
-        if 0.0 < low < critical:
-            limit_text = f"at least {monitor}_CRT_{unit} {critical:g}"
-            yield f"{monitor}_LOW_{unit} {low:g} prevents arming, which needs {limit_text}"
+        low_threshold, critical_threshold = (values[f"{monitor}_{level}_{unit}"] for level in ("LOW", "CRT"))
+        if 0.0 < low_threshold < critical_threshold:
+            limit_text = f"at least {monitor}_CRT_{unit} {critical_threshold:g}"
+            yield f"{monitor}_LOW_{unit} {low_threshold:g} prevents arming: ArduPlane requires {limit_text}"
     capacity = values[f"{monitor}_CAPACITY"]
     for level in ("ARM", "LOW", "CRT"):
         charge, voltage = values[f"{monitor}_{level}_MAH"], values[f"{monitor}_{level}_VOLT"]
         if charge > 0.0 and charge > capacity and (has_current or level == "ARM"):
             limit_text = f"at most {monitor}_CAPACITY {capacity:g}"
-            yield f"{monitor}_{level}_MAH {charge:g} prevents arming, which needs {limit_text}"
+            yield f"{monitor}_{level}_MAH {charge:g} prevents arming: ArduPlane requires {limit_text}"
         if voltage > full_voltage:
             limit_text = f"at most the {full_voltage:g} V of a full battery"
-            yield f"{monitor}_{level}_VOLT {voltage:g} prevents arming, which needs {limit_text}"
+            yield f"{monitor}_{level}_VOLT {voltage:g} prevents arming: ArduPlane requires {limit_text}"
 
 
 def _describe_fence_faults(
@@ -158,7 +162,7 @@ def _describe_fence_faults(
     kinds = int(parameters.fence_type)
     has_mission_fence = bool(kinds & _MISSION_FENCE_BIT and mission.has_fence)
     if parameters.fence_enable > 0.0 and not (kinds & OWN_FENCE_BITS or has_mission_fence):
-        yield f"FENCE_ENABLE {parameters.fence_enable:g} prevents arming without a fence of FENCE_TYPE {kinds}"
+        yield f"FENCE_ENABLE {parameters.fence_enable:g} prevents arming, because no fence of FENCE_TYPE {kinds} exists"
     if not kinds or not (parameters.fence_enable > 0.0 or parameters.fence_auto_enable > 0.0):
         return
     margin, radius, ceiling, floor = (values[f"FENCE_{name}"] for name in ("MARGIN", "RADIUS", "ALT_MAX", "ALT_MIN"))
@@ -166,17 +170,17 @@ def _describe_fence_faults(
     side_margin = values[side_name]
     if has_mission_fence and side_margin > mission.smallest_inclusion:
         limit_text = f"at most the {mission.smallest_inclusion:g} m of an inclusion circle"
-        yield f"{side_name} {side_margin:g} prevents arming, which needs {limit_text}"
+        yield f"{side_name} {side_margin:g} prevents arming: ArduPlane requires {limit_text}"
     # These are checked with any FENCE_TYPE.
     if side_margin > radius:
-        yield f"{side_name} {side_margin:g} prevents arming, which needs at most FENCE_RADIUS {radius:g}"
+        yield f"{side_name} {side_margin:g} prevents arming: ArduPlane requires at most FENCE_RADIUS {radius:g}"
     if margin < 0.0:
-        yield f"FENCE_MARGIN {margin:g} prevents arming, which needs at least 0"
+        yield f"FENCE_MARGIN {margin:g} prevents arming: ArduPlane requires at least 0"
     if ceiling < 0.0 or floor < _LOWEST_FENCE_FLOOR_M or ceiling - floor <= 2.0 * margin:
-        range_text = f"FENCE_ALT_MIN {floor:g} to FENCE_ALT_MAX {ceiling:g}"
-        yield f"{range_text} prevents arming with FENCE_MARGIN {margin:g}"
+        range_text = f"FENCE_ALT_MIN {floor:g} and FENCE_ALT_MAX {ceiling:g}"
+        yield f"{range_text} prevent arming with FENCE_MARGIN {margin:g}"
     is_on_at_home = parameters.fence_enable > 0.0 or parameters.fence_auto_enable == _ON_WHEN_ARMED
     if has_mission_fence and is_on_at_home and mission.fence_at_home:
         name = "FENCE_ENABLE" if parameters.fence_enable > 0.0 else "FENCE_AUTOENABLE"
         value = parameters.fence_enable or parameters.fence_auto_enable
-        yield f"{name} {value:g} prevents arming at home, which is {mission.fence_at_home}"
+        yield f"{name} {value:g} prevents arming, because home is {mission.fence_at_home}"

@@ -32,7 +32,7 @@ from flight.autopilots.arduplane.parameters import (
 from flight.autopilots.arduplane.releases import choose_release, release_note, simulated_release
 from flight.autopilots.arduplane.tracking_error import tracking_error
 from flight.autopilots.autopilot import Autopilot, Origin, StoredAutopilot, StoredParameters
-from flight.autopilots.gust_height import height_in_updrafts
+from flight.autopilots.gust_height import updraft_altitude_gain
 from flight.autopilots.parts import (
     Candidate,
     Cause,
@@ -111,8 +111,8 @@ _UNION_OF_INCLUSIONS_BIT = 1 << 1
 class ArduPlane(Autopilot):
     """ArduPlane's control law: L1 along the legs, TECS for altitude and airspeed.
 
-    >>> made = ArduPlane(ArduPilotParameters.defaults())
-    >>> made.turns.acceptance_radius, made.turns.distance(math.radians(45.0), 0.0), made.speeds.limits[:2]
+    >>> default = ArduPlane(ArduPilotParameters.defaults())
+    >>> default.turns.acceptance_radius, default.turns.distance(math.radians(45.0), 0.0), default.speeds.limits[:2]
     (90.0, 45.0, (9.0, 22.0))
     """
 
@@ -147,12 +147,12 @@ class ArduPlane(Autopilot):
         stored = StoredParameters(parameters.values, parameters.unused, parameters.source)
         return StoredAutopilot(parameters=stored, program=self.program, version=parameters.version)
 
-    def in_release(self, version: ArduPlaneVersion) -> Self:
+    def with_release(self, version: ArduPlaneVersion) -> Self:
         """Return the same autopilot with the control law of another ArduPlane release."""
-        return replace(self, parameters=self.parameters.in_release(version))
+        return replace(self, parameters=self.parameters.with_release(version))
 
     @classmethod
-    def of_flight_log(
+    def from_flight_log(
         cls, program: str, parameters: Mapping[str, float], source: str
     ) -> tuple[Self, tuple[str, ...]] | None:
         """Return ArduPlane with the parameters of a flight log, written by any ArduPlane release, and notes.
@@ -161,7 +161,7 @@ class ArduPlane(Autopilot):
         """
         if not program.startswith("ArduP"):
             return None
-        law_parameters, notes = ArduPilotParameters.of_log(parameters, source, simulated_release(program))
+        law_parameters, notes = ArduPilotParameters.from_log(parameters, source, simulated_release(program))
         note = release_note(program)
         return cls(law_parameters), (note, *notes) if note else notes
 
@@ -226,7 +226,7 @@ class ArduPlane(Autopilot):
         ]
         fence_parameters = parameters.changed(FENCE_ENABLE=1.0) if mission.enables_fence else parameters
         if fence_parameters.has_own_fence:
-            texts.append(f"the circle and the altitudes of FENCE_TYPE {parameters.fence_type:g} are not judged")
+            texts.append(f"the circle and the altitude limits of FENCE_TYPE {parameters.fence_type:g} are not judged")
         if mission.returns and parameters.rtl_follows_terrain:
             texts.append(
                 f"TERRAIN_FOLLOW {parameters.terrain_follow:g} makes returns follow the terrain, which is not simulated"
@@ -270,8 +270,8 @@ class ArduPlane(Autopilot):
             cruise_parameter="AIRSPEED_CRUISE",
             max_throttle=parameters.throttle_max,
             max_throttle_name=f"THR_MAX {100.0 * parameters.throttle_max:g} %" if parameters.throttle_max < 1.0 else "",
-            climb_limit=RateLimit.of_parameters(TECS_CLMB_MAX=parameters.tecs_climb_max),
-            sink_limit=RateLimit.of_parameters(TECS_SINK_MAX=parameters.tecs_sink_max),
+            climb_limit=RateLimit.from_parameters(TECS_CLMB_MAX=parameters.tecs_climb_max),
+            sink_limit=RateLimit.from_parameters(TECS_SINK_MAX=parameters.tecs_sink_max),
             max_pitch=self._max_pitch + parameters.pitch_trim,
             max_pitch_name=f"{' and '.join(self._max_pitch_parameters)} {math.degrees(self._max_pitch):g}°",
         )
@@ -297,6 +297,9 @@ class ArduPlane(Autopilot):
         """Return the true airspeed on the landing glide, m/s, by TECS_LAND_ARSPD and LAND_WIND_COMP.
 
         ``cruise`` is not used. Without TECS_LAND_ARSPD the airspeed follows from AIRSPEED_CRUISE and AIRSPEED_MIN.
+
+        tail_wind: m/s, negative for a head wind.
+        amsl: altitude of the landing point, m.
         """
         return landing_airspeed(self.parameters, tail_wind) * self.speeds.true_airspeed_factor(amsl)
 
@@ -356,7 +359,7 @@ class ArduPlane(Autopilot):
         )
 
     def _unsimulated_return_text(self, mission: ReturnMission) -> str:
-        """Return "terrain" if an RTL follows the terrain, which is not simulated; otherwise ""."""
+        """Return the reason "terrain" if an RTL follows the terrain, which is not simulated; otherwise ""."""
         return "terrain" if self.parameters.rtl_follows_terrain else ""
 
     def _unjudged_return_texts(self, mission: ReturnMission) -> tuple[str, ...]:
@@ -387,21 +390,24 @@ class ArduPlane(Autopilot):
         would climb in the flare (`flight.autopilots.arduplane.ground_law`).
 
         >>> default = ArduPlane(ArduPilotParameters.defaults())
-        >>> default.returns.parameters_of(RtlSettings(180.0, lands=True, field_depth=50.0))
+        >>> default.returns.make_parameters(RtlSettings(180.0, lands=True, field_depth=50.0))
         {'RTL_ALTITUDE': 180.0, 'RTL_AUTOLAND': 1.0, 'TECS_LAND_PMAX': -1.0}
         """
         values = {} if settings.altitude is None else {"RTL_ALTITUDE": settings.altitude}
-        stated = self.parameters.by_origin("file")
+        file_values = self.parameters.by_origin("file")
         if settings.autoland is not None:
             values["RTL_AUTOLAND"] = float(settings.autoland)
-        elif settings.lands and self.parameters.rtl_autoland == 0.0 and "RTL_AUTOLAND" not in stated:
+        elif settings.lands and self.parameters.rtl_autoland == 0.0 and "RTL_AUTOLAND" not in file_values:
             values["RTL_AUTOLAND"] = 1.0
-        if settings.lands and settings.field_depth > _LOW_FIELD_M and "TECS_LAND_PMAX" not in stated:
+        if settings.lands and settings.field_depth > _LOW_FIELD_M and "TECS_LAND_PMAX" not in file_values:
             values["TECS_LAND_PMAX"] = _NOSE_DOWN_DEG
         return values
 
     def _landing_glide(self, height: float, run: float, tail_wind: float, amsl: float) -> LandingGlide:
-        """Return the landing glide that ArduPlane flies, by LAND_FLARE_*, LAND_WIND_COMP and TECS_LAND_*."""
+        """Return the landing glide that ArduPlane flies, by LAND_FLARE_*, LAND_WIND_COMP and TECS_LAND_*.
+
+        Arguments as for `flight.autopilots.parts.GroundRules.glide`.
+        """
         airspeed = self._landing_airspeed(0.0, tail_wind, amsl)
         return landing_glide(height, run, airspeed + tail_wind, self.parameters)
 
@@ -409,11 +415,10 @@ class ArduPlane(Autopilot):
     def _return_rules(self) -> ReturnRules:
         """Rules of an RTL from RTL_*, FLIGHT_OPTIONS, LEVEL_ROLL_LIMIT, RALLY_*, TECS_* and the slope limits.
 
-        >>> made = ArduPlane(ArduPilotParameters.defaults().changed(RTL_ALTITUDE=-1, FLIGHT_OPTIONS=16, RTL_AUTOLAND=2))
-        >>> made.returns.rules.height, made.returns.rules.initial_climb, made.returns.rules.rally_limit
-        (nan, inf, 5000.0)
-        >>> made.returns.rules.landing_join
-        'straight'
+        >>> parameters = ArduPilotParameters.defaults().changed(RTL_ALTITUDE=-1, FLIGHT_OPTIONS=16, RTL_AUTOLAND=2)
+        >>> rules = ArduPlane(parameters).returns.rules
+        >>> rules.height, rules.initial_climb, rules.rally_limit, rules.landing_join
+        (nan, inf, 5000.0, 'straight')
         """
         parameters = self.parameters
         return ReturnRules(
@@ -458,7 +463,7 @@ class ArduPlane(Autopilot):
         """Deviations from the legs, and the altitude that ArduPlane gains in updrafts while it holds its airspeed."""
         return Deviations(
             tracking_error=partial(tracking_error, self.parameters),
-            gust_rise=height_in_updrafts,
+            gust_rise=updraft_altitude_gain,
             altitude_candidates=HEIGHT_CANDIDATES,
             track_candidates=SIDE_CANDIDATES,
             pitch_candidates=self._pitch_candidates,
@@ -471,12 +476,12 @@ class ArduPlane(Autopilot):
 
     @property
     def _max_pitch_parameters(self) -> tuple[str, ...]:
-        """Names of the parameters of the largest pitch, which are both if they are equal."""
+        """Names of the parameters that set the largest pitch; both names if the two limits are equal."""
         return tuple(name for name, limit in self._pitch_limits.items() if limit == self._max_pitch)
 
     @property
     def _pitch_limits(self) -> dict[str, float]:
-        """Limits of the pitch by their parameters, rad; TECS_PITCH_MAX 0 is none."""
+        """Upper pitch limits by parameter, rad; infinite for TECS_PITCH_MAX 0, which sets no limit."""
         parameters = self.parameters
         return {
             "TECS_PITCH_MAX": parameters.tecs_pitch_max or math.inf,
@@ -485,12 +490,15 @@ class ArduPlane(Autopilot):
 
     @property
     def _pitch_candidates(self) -> tuple[Candidate, ...]:
-        """The parameters of the largest pitch, up to the value at which another parameter becomes the limit."""
-        name, *others = self._max_pitch_parameters
+        """Parameters that set the largest pitch, with the values to try if a climb reaches this pitch.
+
+        The values end where another parameter becomes the limit.
+        """
+        name, *other_names = self._max_pitch_parameters
         higher_limits = (limit for limit in self._pitch_limits.values() if limit > self._max_pitch)
         max_tried = min(MAX_TRIED_PITCH_DEG, *map(math.degrees, higher_limits), math.inf)
         is_raised = max_tried > math.degrees(self._max_pitch)
-        return (Candidate(name, 1.0, max_tried, "deg", others=tuple(others)),) if is_raised else ()
+        return (Candidate(name, 1.0, max_tried, "deg", others=tuple(other_names)),) if is_raised else ()
 
     def with_parameters(self, origin: Origin = "file", /, **values: float) -> "ArduPlane":
         """Return a copy with the given parameters changed; also for an autopilot that runs the ArduPlane program."""
@@ -498,7 +506,11 @@ class ArduPlane(Autopilot):
 
 
 def _transfer_state(previous_record: Record, record: Record, start: Floats) -> None:
-    """Start a new leg at ``start``, as after a change of mode; keep the state of TECS and the airspeed filter."""
+    """Start a new leg at ``start``, as after a change of mode; keep the state of TECS and the airspeed filter.
+
+    previous_record, record: records of the control law before and after the change; the memory of the second is set.
+    start: position, (3,) m.
+    """
     record.memory = previous_record.memory
     for name in _LEG_FIELDS:
         setattr(record.memory, name, 0)
@@ -578,18 +590,18 @@ class ArduPlaneFromGround:
         ground.takeoff_end_altitude = take_off.end_altitude
         ground.launch_up = take_off.home[2]
         ground.takeoff_pitch, ground.leg = self._climb_pitch(take_off), take_off.waypoint
-        # Start when the aircraft moved at 5 m/s, at which its course over the ground is known.
+        # Time since the ground speed reached 5 m/s, from which on ArduPlane knows its course over the ground.
         acceleration = take_off.acceleration
         ground.time_at_course_speed = (
             max(0.0, take_off.speed - _COURSE_SPEED_MPS) / acceleration if acceleration else 0.0
         )
 
     def _climb_pitch(self, take_off: TakeOff) -> float:
-        """Return the climb pitch of a take-off, rad: the item's pitch, or the maximum pitch.
+        """Return the climb pitch of a take-off, rad: the pitch of the take-off item, or the maximum pitch.
 
-        If the motor runs before the launch, TECS runs too, and the launch winds its integrator up to the maximum pitch.
-        This was seen in two flights of ArduPlane 4.6.3. In five flights in which the launch acceleration started the
-        motor, ArduPlane climbed with the item's pitch.
+        If the motor runs before the launch, TECS runs too. The launch then winds up the pitch integrator of TECS to the
+        maximum pitch, as two flights of ArduPlane 4.6.3 showed. If the launch acceleration starts the motor, ArduPlane
+        climbs with the item's pitch, as five flights showed.
         """
         if self.motor_start > -math.inf or take_off.acceleration <= 0.0:
             return take_off.pitch
@@ -623,15 +635,15 @@ _COURSE_SPEED_MPS = 5.0
 # Join to the landing sequence after an RTL, by RTL_AUTOLAND; with 3 the landing sequence is only for go-arounds.
 _LANDING_JOIN_BY_AUTOLAND: dict[int, Literal["", "circle", "straight"]] = {1: "circle", 2: "straight"}
 _RETURN_PATH_TEXT = (
-    "RTL_AUTOLAND 4 returns along the mission's return path or landing sequence: this is not simulated, and the RTL"
-    " ends in its loiter"
+    "RTL_AUTOLAND 4 returns along the mission's return path or landing sequence, which is not simulated: the simulated"
+    " RTL ends in its loiter"
 )
 
 # `Plane::verify_loiter_heading` waits for the heading to the position of the next item.  The position of an RTL item is
 # 0 N 0 E.
 _EXIT_BEFORE_RTL_TEXT = (
-    "ArduPlane leaves the loiter on the heading to 0° N 0° E, and starts the RTL there: the flight does so, but the"
-    " route is judged with an exit on the heading to home"
+    "ArduPlane leaves the loiter on the heading to 0° N 0° E, because an RTL item has no position: the simulated flight"
+    " does the same, but the route is judged with an exit on the heading to home"
 )
 
 # Bit of MIS_OPTIONS: clear the mission when ArduPlane starts.
@@ -675,6 +687,8 @@ def _simulated_landing(target: ReturnTarget, *, engine_out: bool) -> LandingStar
     The RTL joins the sequence after its loiter, or flies straight to it. The landing itself is not simulated, so an RTL
     whose sequence begins with the landing ends at its loiter. After an engine failure, an RTL ends at its loiter or at
     the start of the sequence.
+
+    engine_out: True after an engine failure.
     """
     landing = target.landing
     if engine_out:
@@ -682,12 +696,12 @@ def _simulated_landing(target: ReturnTarget, *, engine_out: bool) -> LandingStar
     return landing if landing and not landing.is_landing else None
 
 
-def _radius_growth(up: float) -> float:
+def _radius_growth(amsl: float) -> float:
     """Return the ratio of the loiter radius flown at an altitude (m AMSL) to the radius at sea level.
 
     The ratio is the square of the ratio of true to equivalent airspeed.
     """
-    return float(eas_to_tas_ratio(up)) ** 2
+    return float(eas_to_tas_ratio(amsl)) ** 2
 
 
 def _mission_notes(parameters: ArduPilotParameters) -> list[str]:
@@ -702,8 +716,8 @@ def _mission_notes(parameters: ArduPilotParameters) -> list[str]:
     if not int(parameters["MIS_OPTIONS"]) & _CLEAR_AT_START:
         return []
     return [
-        f"MIS_OPTIONS {parameters['MIS_OPTIONS']:g} clears the mission each time ArduPlane starts: upload it after the"
-        " last power-up"
+        f"MIS_OPTIONS {parameters['MIS_OPTIONS']:g} clears the mission each time ArduPlane starts: upload the mission"
+        " after the last power-up"
     ]
 
 
@@ -715,4 +729,4 @@ def _bank_limit_note(bank: float) -> str:
     """
     if bank <= 0.0:
         return ""
-    return f"NAVL1_LIM_BANK {bank:g} is not simulated: ArduPlane may fly smaller loiter circles than planfly"
+    return f"NAVL1_LIM_BANK {bank:g} is not simulated: ArduPlane may fly smaller loiters than the simulation"

@@ -41,8 +41,8 @@ def failsafe_causes(
     ends_landed: True if the mission ends on the ground.
 
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
-    >>> made = ArduPilotParameters.defaults().changed(FS_LONG_ACTN=1, BATT_FS_LOW_ACT=1, BATT_LOW_VOLT=14)
-    >>> for cause in failsafe_causes(made, has_fence=False):
+    >>> parameters = ArduPilotParameters.defaults().changed(FS_LONG_ACTN=1, BATT_FS_LOW_ACT=1, BATT_LOW_VOLT=14)
+    >>> for cause in failsafe_causes(parameters, has_fence=False):
     ...     print(cause.name, cause.parameter, cause.value, cause.action)
     the pilot's RTL  0 return
     the mission's end  0 return
@@ -68,7 +68,7 @@ def failsafe_causes(
 
 
 def _remote_control_causes(parameters: ArduPilotParameters) -> list[Cause]:
-    """Return the failsafes of a lost remote control: the short one if it leaves AUTO, and the long one."""
+    """Return the long failsafe of a lost remote control, and before it the short failsafe if it leaves AUTO."""
     long_action, short_action = int(parameters.long_failsafe), int(parameters.short_failsafe)
     # THR_FAILSAFE 2 detects the loss, but starts no failsafe.
     if parameters.throttle_failsafe != 1.0:
@@ -85,7 +85,7 @@ def _remote_control_causes(parameters: ArduPilotParameters) -> list[Cause]:
 
 
 def _station_cause(parameters: ArduPilotParameters) -> Cause:
-    """Return the failsafe of a lost ground station."""
+    """Return ArduPlane's reaction to the loss of the ground station's heartbeats."""
     if parameters.station_failsafe <= 0.0:
         return Cause("station lost", "on", "FS_GCS_ENABL", 0)
     long_action = int(parameters.long_failsafe)
@@ -104,10 +104,10 @@ def link_loss_reactions(parameters: ArduPilotParameters, use: LinkUse) -> tuple[
     The short failsafe begins even if ArduPlane does not react to it in AUTO.
 
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
-    >>> made = ArduPilotParameters.defaults().changed(FS_SHORT_ACTN=1, FS_LONG_ACTN=1, FS_LONG_TIMEOUT=20)
-    >>> [(reaction.action, reaction.delay) for reaction in link_loss_reactions(made, "control")]
+    >>> parameters = ArduPilotParameters.defaults().changed(FS_SHORT_ACTN=1, FS_LONG_ACTN=1, FS_LONG_TIMEOUT=20)
+    >>> [(reaction.action, reaction.delay) for reaction in link_loss_reactions(parameters, "control")]
     [('circle', 1.5), ('return', 21.5)]
-    >>> link_loss_reactions(made, "telemetry")
+    >>> link_loss_reactions(parameters, "telemetry")
     (LinkLossReaction(action='on', delay=inf, parameter='FS_GCS_ENABL', value=0),)
     """
     long_delay = parameters["FS_LONG_TIMEOUT"]
@@ -124,14 +124,16 @@ def link_loss_reactions(parameters: ArduPilotParameters, use: LinkUse) -> tuple[
         for cause, delay in zip(causes, delays, strict=True)
         if cause.action != "on"
     ]
-    last = causes[-1]
-    return tuple(reactions) or (LinkLossReaction("on", math.inf, last.parameter, last.value),)
+    last_cause = causes[-1]
+    return tuple(reactions) or (LinkLossReaction("on", math.inf, last_cause.parameter, last_cause.value),)
 
 
 def _battery_causes(parameters: ArduPilotParameters, *, has_landing: bool) -> list[Cause]:
     """Return ArduPlane's reactions to a low and to a critical battery, for each battery monitor that is on.
 
     The reaction is "never" if there is no monitor, or no threshold that the monitor can measure.
+
+    has_landing: True if the mission has a landing sequence; without one the reaction "land" is an RTL.
     """
     monitors, causes = monitored_batteries(parameters), []
     for monitor in dict.fromkeys(["BATT", *monitors]):
@@ -157,12 +159,13 @@ def battery_failsafes(parameters: ArduPilotParameters) -> tuple[BatteryFailsafe,
     (`AP_BattMonitor_Backend::update_failsafes`, `check_failsafe_types`).
 
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
-    >>> made = ArduPilotParameters.of_text("BATT_CAPACITY 8000\nBATT_LOW_MAH 1500\nBATT_FS_LOW_ACT 1\n", "mine.param")
-    >>> [(failsafe.parameter, failsafe.used_charge) for failsafe in battery_failsafes(made)]
+    >>> text = "BATT_CAPACITY 8000\nBATT_LOW_MAH 1500\nBATT_FS_LOW_ACT 1\n"
+    >>> parameters = ArduPilotParameters.from_text(text, "mine.param")
+    >>> [(failsafe.parameter, failsafe.used_charge) for failsafe in battery_failsafes(parameters)]
     [('BATT_LOW_MAH', 6500.0)]
     """
     monitors = monitored_batteries(parameters)
-    found = []
+    failsafes = []
     for monitor in monitors:
         for level in ("LOW", "CRT"):
             action = parameters[f"{monitor}_FS_{level}_ACT"]
@@ -173,10 +176,10 @@ def battery_failsafes(parameters: ArduPilotParameters) -> tuple[BatteryFailsafe,
                 capacity_name = f"{monitor}_CAPACITY"
                 capacity = parameters[capacity_name]
                 failsafe = BatteryFailsafe(f"{monitor}_{level}_MAH", charge, capacity - charge, len(monitors) > 1)
-                found.append(failsafe._replace(capacity_parameter=capacity_name, capacity=capacity))
+                failsafes.append(failsafe._replace(capacity_parameter=capacity_name, capacity=capacity))
             if voltage > 0.0 and parameters[f"{monitor}_LOW_TIMER"] > 0.0:
-                found.append(BatteryFailsafe(f"{monitor}_{level}_VOLT", voltage))
-    return tuple(found)
+                failsafes.append(BatteryFailsafe(f"{monitor}_{level}_VOLT", voltage))
+    return tuple(failsafes)
 
 
 def monitored_batteries(parameters: ArduPilotParameters) -> list[str]:

@@ -261,7 +261,7 @@ def end_status(work: Record, ground: Record) -> int:
     """Return the code of the flight's end, a key of `flight.simulation.tick.ENDS`, or 0 if the flight continues.
 
     work: a `flight.simulation.tick.WORKSPACE` record.
-    ground: a `GROUND_STATE` record; another control law may have filled it.
+    ground: a `GROUND_STATE` record, filled by this control law or from the flight of ArduPlane's program.
     """
     state, ground_speed = work.state, math.hypot(work.true.velocity_east, work.true.velocity_north)
     is_battery_empty = work.air.energy >= work.settings.battery

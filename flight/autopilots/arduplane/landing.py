@@ -55,7 +55,8 @@ def landing_glide(height: float, distance: float, ground_speed: float, parameter
     >>> [round(number, 3) for number in glide]
     [0.095, 3.6, 70.244]
 
-    A flare entirely at TECS_LAND_SINK, 0.05 m/s, is computed with 0.1 m/s: 1 m, twice LAND_FLARE_ALT, takes 10 s.
+    The mean sink rate in the flare is at least 0.1 m/s, also with TECS_LAND_SINK 0.05 m/s. A flare of 1 m, which is
+    twice LAND_FLARE_ALT, then takes 10 s.
 
     >>> gentle = ArduPilotParameters.defaults().changed(TECS_LAND_SINK=0.05, LAND_FLARE_AIM=100.0, LAND_FLARE_ALT=0.5)
     >>> [round(landing_glide(54.0, 600.0, 20.0, gentle)[k], 3) for k in (1, 2)]

@@ -29,13 +29,14 @@ def motor_start(acceleration: float, speed: float, incline: float, parameters: A
     speed: ground speed at the end of the rail, m/s.
     incline: pitch of the nose, rad.
 
-    On a rail of 6 m the aircraft reaches 20 m/s in 0.6 s at 33 m/s^2; for 10 m/s it needs 8.3 m/s^2.
+    On a rail of 6 m an aircraft reaches 20 m/s in 0.6 s with 33 m/s^2, and 10 m/s with 8.3 m/s^2. Only the first
+    acceleration exceeds TKOFF_THR_MINACC 15:
 
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
-    >>> made = ArduPilotParameters.defaults().changed(TKOFF_THR_MINACC=15.0)
-    >>> [round(motor_start(v * v / 12.0, v, 0.2, made), 2) for v in (20.0, 10.0)]
+    >>> parameters = ArduPilotParameters.defaults().changed(TKOFF_THR_MINACC=15.0)
+    >>> [round(motor_start(v * v / 12.0, v, 0.2, parameters), 2) for v in (20.0, 10.0)]
     [-0.4, inf]
-    >>> motor_start(0.0, 0.0, 0.0, ArduPilotParameters.defaults()), motor_start(0.0, 0.0, 0.0, made)
+    >>> motor_start(0.0, 0.0, 0.0, ArduPilotParameters.defaults()), motor_start(0.0, 0.0, 0.0, parameters)
     (-inf, inf)
     """
     min_acceleration, delay = parameters.takeoff_acceleration, parameters.takeoff_delay

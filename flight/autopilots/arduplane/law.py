@@ -486,6 +486,9 @@ def control_attitude(
     """Drive roll and pitch to their demands with the lags of ArduPlane's controllers; set the throttle.
 
     Represents `Plane::stabilize_roll`, `Plane::stabilize_pitch` and `Plane::set_servos`.
+
+    eas2tas: ratio of true to equivalent airspeed.
+    dt: s.
     """
     memory.roll_demand = limited_nav_roll(
         memory.lateral_acceleration, state.pitch, state.airspeed / eas2tas, parameters

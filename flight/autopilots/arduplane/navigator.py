@@ -55,7 +55,7 @@ def turn_distance(acceptance: float, turn_angle: float, wp_radius: float, l1_dis
     acceptance: acceptance radius that the mission states, in whole metres; 0 if it states none.
     turn_angle: rad, positive.
     wp_radius: WP_RADIUS, m.
-    l1_distance: m.
+    l1_distance: L1 distance, m.
     eas2tas: ratio of true to equivalent airspeed; the distance for a turn grows as its square.
     """
     acceptance_m = math.floor(min(MAX_ACCEPTANCE_M, acceptance))
@@ -159,6 +159,9 @@ def _follow_line(
 
     end_e, end_n: end of the leg, m.
     without_crosstrack: True for a line from the aircraft itself (`Plane::verify_nav_wp` without crosstrack).
+    l1_distance: L1 distance, m.
+    ground_speed: m/s.
+    dt: s.
     """
     from_e, from_n = (estimated.east, estimated.north) if without_crosstrack else (memory.from_east, memory.from_north)
     angle, aim_angle = l1_angles(estimated, from_e, from_n, end_e, end_n, l1_distance)
@@ -254,6 +257,8 @@ def _is_leg_over(
 
     end_e, end_n: end of the leg, m, to which the aircraft flies; with a pass-by distance it lies beyond the target.
     turn_angle: turn of the route at the target, rad.
+    l1_distance: L1 distance, m.
+    eas2tas: ratio of true to equivalent airspeed.
     """
     is_past_end = is_past_finish_line(estimated, memory.from_east, memory.from_north, end_e, end_n)
     if (
@@ -288,6 +293,9 @@ def _update_loiter(
     Follows `Plane::update_loiter`.
 
     loiter: waypoint on the loiter; its loiter_radius is the radius at the altitude of the waypoint.
+    l1_distance: L1 distance, m.
+    ground_speed: m/s.
+    eas2tas: ratio of true to equivalent airspeed.
     """
     eas2tas_ratio = eas2tas / eas_to_tas_ratio(loiter.up)
     radius = abs(loiter.loiter_radius) * eas2tas_ratio * eas2tas_ratio
@@ -475,6 +483,10 @@ def _loiter_acceleration(
     The aircraft steers straight to the center until the circle demands the sharper turn; then it flies around the
     circle. From that moment the loiter counts as reached, even if a gust or too small a radius takes the aircraft
     outside the circle.
+
+    radius: radius of the circle, m.
+    l1_distance: L1 distance, m.
+    ground_speed: m/s.
     """
     direction = math.copysign(1.0, loiter.loiter_radius)
     offset_e, offset_n = estimated.east - loiter.centre_east, estimated.north - loiter.centre_north

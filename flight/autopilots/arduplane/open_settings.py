@@ -1,4 +1,4 @@
-"""List ArduPlane's settings that change a flight, are not simulated, and therefore leave the verdict open.
+"""List ArduPlane's settings that change a flight, are not simulated, and therefore leave the verdict undecided.
 
 Names, defaults and effects are from ArduPlane 4.6.3 and 4.7; docs/arduplane-branches.md lists the function of each.
 Each is read from a parameter file, and has no part in the control law.
@@ -16,7 +16,7 @@ from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.autopilots.parameter_files import read_parameter_file
 from flight.autopilots.parameter_set import AIRCRAFT_FILE
 from flight.autopilots.parts import MissionParts
-from flight.autopilots.rate_loop import RateGains, rate_gains_fault
+from flight.autopilots.rate_loop import RateGains, judge_rate_gains
 
 
 class Phase(StrEnum):
@@ -120,10 +120,10 @@ _MOTOR_OFF_THROTTLE = 0.01
 _BY_RETURN_PATH = 4.0
 # Number of airspeed sensors that ArduPlane 4.7 reads.
 _AIRSPEED_SENSORS = 6
-# How a flight without an airspeed sensor can be judged: by a program, whose simulated sensor has no other number.
+# Ways to judge a flight without an airspeed sensor: ArduPlane's own program simulates only the first sensor.
 _WITHOUT_SENSOR_TEXT = (
-    "ARSPD_USE 0 ArduPlane's own program (--sitl) flies without the sensor, with ARSPD_USE 1 the flight is simulated"
-    " with it"
+    "ARSPD_USE 1 to simulate the flight with the sensor, or ARSPD_USE 0 to fly ArduPlane's own program (--sitl) without"
+    " it"
 )
 # Values of AHRS_EKF_TYPE.
 _EKF2 = 2.0
@@ -164,10 +164,10 @@ def describe_open_settings(parameters: ArduPilotParameters, mission: MissionPart
     by_program: True if the ArduPlane program flies.
 
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
-    >>> made = ArduPilotParameters.of_text("LAND_PF_ARSPD 11\nKFF_THR2PTCH 2\n", "mine.param")
-    >>> describe_open_settings(made, MissionParts(), by_program=False)
+    >>> parameters = ArduPilotParameters.from_text("LAND_PF_ARSPD 11\nKFF_THR2PTCH 2\n", "mine.param")
+    >>> describe_open_settings(parameters, MissionParts(), by_program=False)
     ['KFF_THR2PTCH 2 affects the flight, but is not simulated']
-    >>> describe_open_settings(made, MissionParts(lands=True), by_program=False)[1]
+    >>> describe_open_settings(parameters, MissionParts(lands=True), by_program=False)[1]
     'LAND_PF_ARSPD 11 affects the landing, but is not simulated'
     """
     is_flown = {Phase.FLIGHT: True, Phase.TAKE_OFF: mission.takes_off, Phase.LANDING: mission.lands}
@@ -194,8 +194,8 @@ def _describe_dependent_settings(
     if mission.follows_terrain and parameters.terrain_spacing > _MAX_TERRAIN_SPACING_M:
         # `AP_Terrain::height_amsl` interpolates between points of that spacing.
         yield (
-            f"TERRAIN_SPACING {parameters.terrain_spacing:g} follows a coarser ground than the elevation data,"
-            " which is not simulated"
+            f"TERRAIN_SPACING {parameters.terrain_spacing:g} m makes ArduPlane's terrain coarser than the elevation"
+            " data, which is not simulated"
         )
     yield from _describe_rate_gains(parameters, mission.aircraft)
     # `Plane::set_servos_flaps` compares the demanded airspeed in whole m/s, which only a landing demands below the
@@ -205,8 +205,8 @@ def _describe_dependent_settings(
         percent, flap_speed = values[f"FLAP_{number}_PERCNT"], values[f"FLAP_{number}_SPEED"]
         if percent != 0.0 and flap_speed > 0.0 and min_airspeed <= flap_speed:
             yield (
-                f"FLAP_{number}_PERCNT {percent:g} below FLAP_{number}_SPEED {flap_speed:g}"
-                " affects the flight, but is not simulated"
+                f"FLAP_{number}_PERCNT {percent:g} moves the flaps below FLAP_{number}_SPEED {flap_speed:g} m/s,"
+                " which is not simulated"
             )
     for name in ("ARSPD_WIND_MAX",) if by_program else ("AHRS_WIND_MAX", "ARSPD_WIND_MAX"):
         if 0.0 < values[name] < mission.wind:
@@ -221,14 +221,14 @@ def _describe_dependent_settings(
             # `Plane::do_change_speed` falls through to the throttle.
             range_text = f"AIRSPEED_MIN {values['AIRSPEED_MIN']:g} to AIRSPEED_MAX {values['AIRSPEED_MAX']:g}"
             yield (
-                f"DO_CHANGE_SPEED to {airspeed:g} m/s with a throttle sets TRIM_THROTTLE outside {range_text},"
+                f"DO_CHANGE_SPEED to {airspeed:g} m/s is outside {range_text}, so that its throttle sets TRIM_THROTTLE,"
                 " which is not simulated"
             )
     free_bank_height = _FREE_BANK_HEIGHT_RATIO * parameters.takeoff_level_height
     if mission.takes_off and values["TKOFF_ALT"] < free_bank_height:
         # `Plane::takeoff_calc_roll`.
         yield (
-            f"TKOFF_ALT {values['TKOFF_ALT']:g} frees the bank of the take-off below {free_bank_height:g} m,"
+            f"TKOFF_ALT {values['TKOFF_ALT']:g} removes the bank limit of the take-off below {free_bank_height:g} m,"
             " which is not simulated"
         )
     if parameters.throttle_cruise <= _MOTOR_OFF_THROTTLE:
@@ -251,11 +251,11 @@ def _describe_airspeed_sensor(values: Mapping[str, float]) -> Iterator[str]:
     present = [number for number, prefix in prefixes.items() if values[f"{prefix}_TYPE"] != 0.0]
     if values["ARSPD_ENABLE"] == 0.0 or not present:
         name = "ARSPD_TYPE" if values["ARSPD_ENABLE"] else "ARSPD_ENABLE"
-        yield f"{name} 0 leaves no airspeed sensor, which is not simulated; with {name} 1 and {_WITHOUT_SENSOR_TEXT}"
+        yield f"{name} 0 leaves no airspeed sensor, which is not simulated; set {name} 1, and {_WITHOUT_SENSOR_TEXT}"
         return
-    use = f"{prefixes[primary if primary in present else present[0]]}_USE"
-    if values[use] != 1.0:
-        yield f"{use} {values[use]:g} affects the flight, but is not simulated; with {_WITHOUT_SENSOR_TEXT}"
+    use_name = f"{prefixes[primary if primary in present else present[0]]}_USE"
+    if values[use_name] != 1.0:
+        yield f"{use_name} {values[use_name]:g} affects the flight, but is not simulated; set {_WITHOUT_SENSOR_TEXT}"
 
 
 def _describe_position_estimate(values: Mapping[str, float]) -> Iterator[str]:
@@ -264,7 +264,8 @@ def _describe_position_estimate(values: Mapping[str, float]) -> Iterator[str]:
     if values["GPS_AUTO_SWITCH"] == 0.0:
         type_names = type_names[int(values["GPS_PRIMARY"] != 0.0) :][:1]
     if not any(values[name] for name in type_names):
-        yield f"{' and '.join(type_names)} 0 leave no GPS, and so no position, which is not simulated"
+        verb = "leave" if len(type_names) > 1 else "leaves"
+        yield f"{' and '.join(type_names)} 0 {verb} no GPS, and so no position, which is not simulated"
     estimator, height_source = values["AHRS_EKF_TYPE"], values["EK3_SRC1_POSZ"]
     # `AP_AHRS::init` replaces EKF2 by EKF3.
     enabling = {_EKF2: "", _EKF3: "EK3_ENABLE", _EXTERNAL_AHRS: "EAHRS_TYPE"}
@@ -309,7 +310,10 @@ def _describe_pitch_rates(parameters: ArduPilotParameters, values: Mapping[str, 
     }
     for name, needed_rate in needed_rates.items():
         if 0.0 < values[name] < needed_rate:
-            yield f"{name} {values[name]:g} below {needed_rate:.3g} affects the flight, but is not simulated"
+            yield (
+                f"{name} {values[name]:g} is below the {needed_rate:.3g} deg/s that the flight needs, which is not"
+                " simulated"
+            )
 
 
 def _describe_rate_gains(parameters: ArduPilotParameters, aircraft: Aircraft | None) -> Iterator[str]:
@@ -317,23 +321,24 @@ def _describe_rate_gains(parameters: ArduPilotParameters, aircraft: Aircraft | N
 
     The gains in the aircraft's file and ArduPlane's defaults are assumed to suit the aircraft.
     """
-    own: dict[str, float] = {}
+    aircraft_values: dict[str, float] = {}
     if aircraft is not None and (aircraft.folder / AIRCRAFT_FILE).exists():
-        own = {name: entry.value for name, entry in read_parameter_file(aircraft.folder / AIRCRAFT_FILE).items()}
-    stated = parameters.by_origin("file")
-    values = {name: parameters.table.by_name[name].default for name in _RATE_GAIN_NAMES} | own | stated
-    # `Plane::calc_speed_scaler`: at the speed for which the aircraft's own gains are stated.
-    scale = values["SCALING_SPEED"] / own.get("SCALING_SPEED", values["SCALING_SPEED"])
+        entries = read_parameter_file(aircraft.folder / AIRCRAFT_FILE)
+        aircraft_values = {name: entry.value for name, entry in entries.items()}
+    file_values = parameters.by_origin("file")
+    values = {name: parameters.table.by_name[name].default for name in _RATE_GAIN_NAMES} | aircraft_values | file_values
+    # `Plane::calc_speed_scaler`: scale the gains to the speed for which the aircraft's own gains are stated.
+    scale = values["SCALING_SPEED"] / aircraft_values.get("SCALING_SPEED", values["SCALING_SPEED"])
     for axis, time_constant in (("RLL", "RLL2SRV_TCONST"), ("PTCH", "PTCH2SRV_TCONST")):
         names = [f"{axis}_RATE_{gain}" for gain in ("FF", "P", "I", "D")]
-        if stated.keys().isdisjoint((*names, time_constant, "SCALING_SPEED")):
+        if file_values.keys().isdisjoint((*names, time_constant, "SCALING_SPEED")):
             continue
-        # `AP_FW_Controller::_get_rate_out`: the feed-forward counts once with the speed's ratio, the others twice.
+        # `AP_FW_Controller::_get_rate_out` scales the feed-forward with the speed ratio, the others with its square.
         feed_forward, p, i, d = (values[name] for name in names)
         gains = RateGains(feed_forward * scale, p * scale**2, i * scale**2, d * scale**2)
         default = parameters.table.by_name[names[0]].default
-        suitable = own.get(names[0]) or default
-        fault = rate_gains_fault(gains, (min(suitable, default), max(suitable, default)), values[time_constant])
+        feed_forwards = (aircraft_values.get(names[0]) or default, default)
+        fault = judge_rate_gains(gains, (min(feed_forwards), max(feed_forwards)), values[time_constant])
         if fault:
             gains_text = ", ".join(f"{name} {values[name]:g}" for name in [*names[1:], names[0], time_constant])
-            yield f"{gains_text}: gains {fault} to hold the attitude, which is not simulated"
+            yield f"{gains_text}: these gains are {fault} to hold the attitude, which is not simulated"

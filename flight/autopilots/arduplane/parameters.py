@@ -273,16 +273,16 @@ class ArduPilotParameters(ParameterSet):
     (90.0, 3.0)
     >>> default.changed(ROLL_LIMIT_DEG=30.0).roll_limit == math.radians(30.0)
     True
-    >>> ArduPilotParameters.of_text("LIM_ROLL_CD 3000\nFOO 1\n", "old.parm").unused
+    >>> ArduPilotParameters.from_text("LIM_ROLL_CD 3000\nFOO 1\n", "old.parm").unused
     ('FOO',)
-    >>> made = ArduPilotParameters.of_text("GLIDE_SLOPE_MIN 20\nCLIMB_SLOPE_HGT 30\n", "mine.param", "4.6")
-    >>> made.altitude_slope_min, made.climb_slope_height, made.unused
+    >>> parameters = ArduPilotParameters.from_text("GLIDE_SLOPE_MIN 20\nCLIMB_SLOPE_HGT 30\n", "mine.param", "4.6")
+    >>> parameters.altitude_slope_min, parameters.climb_slope_height, parameters.unused
     (20.0, 20.0, ('CLIMB_SLOPE_HGT',))
-    >>> ArduPilotParameters.of_text("TRIM_THROTTLE 60\nTHR_MAX 50", "mine.param").contradictions
+    >>> ArduPilotParameters.from_text("TRIM_THROTTLE 60\nTHR_MAX 50", "mine.param").contradictions
     ('THR_MAX 50 of the file is below TRIM_THROTTLE 60 of the file',)
-    >>> made, notes = ArduPilotParameters.of_log({"LIM_ROLL_CD": 4500.0, "WP_RADIUS": -5.0}, "a.BIN")
-    >>> made.by_origin("file"), notes
-    ({'ROLL_LIMIT_DEG': 45.0}, ('WP_RADIUS -5 of the log is not allowed: the default is used',))
+    >>> parameters, notes = ArduPilotParameters.from_log({"LIM_ROLL_CD": 4500.0, "WP_RADIUS": -5.0}, "a.BIN")
+    >>> parameters.by_origin("file"), notes
+    ({'ROLL_LIMIT_DEG': 45.0}, ('WP_RADIUS -5 in the log is outside 0..32767: the default is used',))
 
     navl1_period: period of the L1 controller, s.
     navl1_xtrack_i: gain of the cross-track integrator, 1/s.
@@ -493,16 +493,18 @@ class ArduPilotParameters(ParameterSet):
         if not fields or fields[0] != "4.6":
             return sources, ()
         stated_names = [name for origin, values in sources for name in values if origin == "file"]
-        known: list[Stated] = [
+        known_sources: list[Stated] = [
             (origin, {name: value for name, value in values.items() if name not in _FIXED_IN_4_6})
             for origin, values in sources
         ]
-        return [*known, ("default", _FIXED_IN_4_6)], tuple(name for name in stated_names if name in _FIXED_IN_4_6)
+        return [*known_sources, ("default", _FIXED_IN_4_6)], tuple(
+            name for name in stated_names if name in _FIXED_IN_4_6
+        )
 
-    def in_release(self, version: ArduPlaneVersion) -> Self:
+    def with_release(self, version: ArduPlaneVersion) -> Self:
         """Return the same parameters for another ArduPlane release.
 
-        >>> ArduPilotParameters.defaults().in_release("4.6").climb_slope_height
+        >>> ArduPilotParameters.defaults().with_release("4.6").climb_slope_height
         20.0
         """
         sources: list[Stated] = [(origin, self.by_origin(origin)) for origin in ("file", "assumed", "aircraft")]
@@ -552,10 +554,10 @@ class ArduPilotParameters(ParameterSet):
         that of RTL_RADIUS unless RTL_RADIUS is 0. Follows `ModeRTL::navigate` in ArduPlane/mode_rtl.cpp and
         `Plane::update_loiter` in navigation.cpp.
 
-        >>> made = ArduPilotParameters.defaults()
-        >>> [made.changed(RTL_RADIUS=m, WP_LOITER_RAD=-80.0).return_radius for m in (0.0, -150.0, 1.0)]
+        >>> parameters = ArduPilotParameters.defaults()
+        >>> [parameters.changed(RTL_RADIUS=m, WP_LOITER_RAD=-80.0).return_radius for m in (0.0, -150.0, 1.0)]
         [-80.0, -150.0, 80.0]
-        >>> made.return_radius, made.changed(WP_LOITER_RAD=-1.0).return_radius
+        >>> parameters.return_radius, parameters.changed(WP_LOITER_RAD=-1.0).return_radius
         (60.0, -60.0)
         """
         abs_radius = next((abs(radius) for radius in (self.rtl_radius, self.wp_loiter_rad) if abs(radius) > 1.0), None)

@@ -32,8 +32,8 @@ def simulated_release(program: str) -> ArduPlaneVersion:
     >>> [simulated_release(program) for program in programs]
     ['4.6', '4.6', '4.7', '4.7']
     """
-    found = _PROGRAM_RELEASE.search(program)
-    return NEWEST_ARDUPLANE if found is None else nearest_release(_VERSIONS, (int(found[1]), int(found[2])))
+    match = _PROGRAM_RELEASE.search(program)
+    return NEWEST_ARDUPLANE if match is None else nearest_release(_VERSIONS, (int(match[1]), int(match[2])))
 
 
 def release_note(program: str) -> str:
@@ -44,10 +44,10 @@ def release_note(program: str) -> str:
     >>> release_note("ArduPlane V4.5.7"), release_note("ArduPlane V4.7.3")
     ('flown by ArduPlane 4.5, but simulated with 4.6', '')
     """
-    found = _PROGRAM_RELEASE.search(program)
-    if found is None or f"{int(found[1])}.{int(found[2])}" == simulated_release(program):
+    match = _PROGRAM_RELEASE.search(program)
+    if match is None or f"{int(match[1])}.{int(match[2])}" == simulated_release(program):
         return ""
-    return f"flown by ArduPlane {int(found[1])}.{int(found[2])}, but simulated with {simulated_release(program)}"
+    return f"flown by ArduPlane {int(match[1])}.{int(match[2])}, but simulated with {simulated_release(program)}"
 
 
 def file_release(text: str, names: Iterable[str]) -> FileRelease | None:
@@ -65,9 +65,9 @@ def file_release(text: str, names: Iterable[str]) -> FileRelease | None:
     """
     if (commented := commented_release(text, "ArduPlane")) is not None:
         return commented
-    stated = list(names)
-    newer = [name for name in stated if name in NAMES_SINCE_4_7]
-    older = [name for name in stated if name in NAMES_BEFORE_4_7]
+    file_names = list(names)
+    newer = [name for name in file_names if name in NAMES_SINCE_4_7]
+    older = [name for name in file_names if name in NAMES_BEFORE_4_7]
     if bool(newer) == bool(older):
         return None
     return FileRelease("4.7", newer[0]) if newer else FileRelease("4.6", older[0])
@@ -80,20 +80,20 @@ class ReleaseChoice(NamedTuple):
     notes: tuple[str, ...] = ()
 
 
-def choose_release(stated: ArduPlaneVersion | None, params: str | None) -> ReleaseChoice:
-    """Return the release to simulate: the stated one, the release of the parameter file, or the newest.
+def choose_release(requested_version: ArduPlaneVersion | None, params: str | None) -> ReleaseChoice:
+    """Return the release to simulate: the requested one, the release of the parameter file, or the newest.
 
     The result has a note if parameters of the file have another name in this release.
 
     params: path of the parameter file.  Raises ParameterError if it cannot be read.
     """
     if params is None:
-        return ReleaseChoice(stated or NEWEST_ARDUPLANE)
+        return ReleaseChoice(requested_version or NEWEST_ARDUPLANE)
     file = Path(params)
     text = utf8_text(read_small_file(file, MAX_BYTES, "parameter", ParameterError), file, ParameterError)
     names = list(parse_parameters(text, params))
-    found = file_release(text, names)
-    version, notes = choose_release_for_file(_VERSIONS, stated, found, params, "ArduPlane")
+    writer_release = file_release(text, names)
+    version, notes = choose_release_for_file(_VERSIONS, requested_version, writer_release, params, "ArduPlane")
     if renamed := describe_renamed(names, TABLE.by_any_name, version):
         notes = (*notes, f"{params}: {renamed}")
     return ReleaseChoice(version, notes)

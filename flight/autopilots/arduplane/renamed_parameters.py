@@ -75,7 +75,7 @@ def name_in_release(name: str, version: ArduPlaneVersion) -> str:
         if release <= version:
             name = new_names.get(name, name)
         else:
-            name = next((old for old, new in new_names.items() if new == name), name)
+            name = next((old_name for old_name, new_name in new_names.items() if new_name == name), name)
     return name
 
 
@@ -86,14 +86,17 @@ def describe_renamed(names: Iterable[str], used: Iterable[str], version: ArduPla
 
     >>> describe_renamed(["GLIDE_SLOPE_MIN", "WP_RADIUS"], ["GLIDE_SLOPE_MIN"], "4.7")
     'GLIDE_SLOPE_MIN is read as ALT_SLOPE_MIN, its name in ArduPlane 4.7'
-    >>> describe_renamed(["SR0_ADSB", "SR1_ADSB", "LIM_ROLL_CD"], ["LIM_ROLL_CD"], "4.7")
-    'LIM_ROLL_CD is read as ROLL_LIMIT_DEG, its name in ArduPlane 4.7; not used: SR0_ADSB (MAV1_ADSB), +1 more renamed'
+    >>> describe_renamed(["SR0_ADSB", "SR1_ADSB"], [], "4.7")
+    'not used: SR0_ADSB (now MAV1_ADSB), +1 more renamed'
     """
     used_names = set(used)
-    renamed = {name: new for name in names if (new := name_in_release(name, version)) != name}
+    renamed = {name: new_name for name in names if (new_name := name_in_release(name, version)) != name}
     texts = []
-    if read := [f"{name} is read as {new}" for name, new in renamed.items() if name in used_names]:
-        texts.append(f"{', '.join(read)}, its name in ArduPlane {version}")
-    if unused := [f"{name} ({new})" for name, new in renamed.items() if name not in used_names]:
-        texts.append(f"not used: {unused[0]}" + (f", +{len(unused) - 1} more renamed" if len(unused) > 1 else ""))
+    if read_texts := [f"{name} is read as {new_name}" for name, new_name in renamed.items() if name in used_names]:
+        texts.append(f"{', '.join(read_texts)}, its name in ArduPlane {version}")
+    if unused_texts := [f"{name} (now {new_name})" for name, new_name in renamed.items() if name not in used_names]:
+        texts.append(
+            f"not used: {unused_texts[0]}"
+            + (f", +{len(unused_texts) - 1} more renamed" if len(unused_texts) > 1 else "")
+        )
     return "; ".join(texts)

@@ -174,9 +174,15 @@ def _make_stages(
     stages: Records = np.zeros((target is not None) + len(stops), WAYPOINT)
     stages["airspeed"], stages["min_ground_speed"] = aircraft.record.airspeed, parameters.ground_speed_min
     if target is not None:
-        first = stages[0]
-        first.centre_east, first.centre_north, first.up, first.loiter_radius, first.slope_base = target
-        first.east, first.north, first.is_rtl = target.east, target.north, True
+        first_stage = stages[0]
+        (
+            first_stage.centre_east,
+            first_stage.centre_north,
+            first_stage.up,
+            first_stage.loiter_radius,
+            first_stage.slope_base,
+        ) = target
+        first_stage.east, first_stage.north, first_stage.is_rtl = target.east, target.north, True
     for stage, stop in zip(stages[len(stages) - len(stops) :], stops, strict=True):
         fill_stage(stage, stop, parameters)
         # The first leg of an RTL to a landing sequence follows no line, as after any mode change.
@@ -210,11 +216,11 @@ _STRAIGHT_LEG_LENGTH_M = 10_000.0
 
 def waypoint_ahead(start: Record) -> Records:
     """Return a waypoint far ahead on the present course and slope, as one `WAYPOINT` record, (1,)."""
-    ahead: Records = np.zeros(1, WAYPOINT)
+    waypoint: Records = np.zeros(1, WAYPOINT)
     ground_speed = max(1.0, math.hypot(start["velocity_east"], start["velocity_north"]))
     for axis, velocity in (("east", "velocity_east"), ("north", "velocity_north"), ("up", "velocity_up")):
-        ahead[axis] = start[axis] + _STRAIGHT_LEG_LENGTH_M * start[velocity] / ground_speed
-    return ahead
+        waypoint[axis] = start[axis] + _STRAIGHT_LEG_LENGTH_M * start[velocity] / ground_speed
+    return waypoint
 
 
 def rtl_timeout(start: Record, stages: Records, aircraft: PointMass) -> float:
@@ -258,9 +264,9 @@ def fly_stages(
     """Simulate the flight from stage to stage for up to ``timeout`` s; fill the `RETURN_RESULT` ``result``.
 
     stages: successive targets, (n,) of `flight.guidance.lateral_reference_laws.WAYPOINT`; the last loiter is flown on.
-    climb_parameters: control parameters during the climb at the start, which the `CLIMB` record ``climb`` describes.
+    climb, climb_parameters: the climb at the start and its parameters. engine_out: True if the engine failed there.
     min_clearance, min_distance: height above ground and distance outside spheres, m, below which the flight is aborted.
-    positions: array (t, 3), m, to fill with one position per second until it is full.
+    positions: array (t, 3), m, to fill, one position a second. excesses, power, field: tables of a `PointMass`.
     """
     spaced, progress_records = np.zeros(6, WAYPOINT), np.zeros(1, LOITER_PROGRESS)  # Spaced as in `waypoint_column`.
     waypoints, loiter = spaced[::2], progress_records[0]
@@ -431,7 +437,8 @@ def _load_stage(stages: Records, index: int, waypoints: Records, estimated: Reco
     """Start the leg to the stage with the given index.
 
     The leg starts at the previous stage. It starts at the aircraft if there is no previous stage, or if the aircraft is
-    already past the leg's end. Waypoints 1 and 2 both become a copy of the stage.
+    already past the leg's end. Waypoints 1 and 2 both become a copy of the stage: once `navigate_legs` begins the leg
+    to waypoint 2, the stage is reached.
     """
     stage, is_previous_reached = stages[index], memory.leg > 0
     for k in range(1, 3):
@@ -510,7 +517,12 @@ def _update_demands(
     is_gliding: bool,
     dt: float,
 ) -> None:
-    """Update the demands for bank, altitude, throttle and pitch on the leg to ``waypoints[1]``."""
+    """Update the demands for bank, altitude, throttle and pitch on the leg to ``waypoints[1]``.
+
+    excess_table: specific excess power, see `flight.autopilots.point_mass.PointMass`.
+    eas2tas: ratio of true to equivalent airspeed.
+    is_gliding: True while the aircraft flies its RTL without an engine.
+    """
     target = waypoints[1]
     navigate_legs(estimated, waypoints[: 2 if target.loiter_radius != 0.0 else 3], parameters, memory, eas2tas, dt)
     if memory.reached_loiter_target and not target.is_rtl:
@@ -544,6 +556,8 @@ def _demand_throttle_and_pitch(
     In six of eight ArduPlane flights, the aircraft held its airspeed in this way and lost 55 m in the turn back. In the
     other two, which had been sinking before, it held its altitude, slowed down, and lost half as much. The worse case
     is simulated.
+
+    is_gliding: True while the aircraft flies its RTL without an engine.
     """
     seb_integrator, ske_integrator = memory.seb_integrator, memory.ske_integrator
     update_tecs(state, estimated, parameters, memory, airspeed_demand * eas2tas, eas2tas, dt)

@@ -142,6 +142,10 @@ def _measure_corners(
 
     For each corner, search for the acceptance radius with the smallest excursion. With ``fly_over`` there is nothing to
     choose, and one turn is simulated.
+
+    airspeed: equivalent airspeed, m/s.
+    turn_angles: rad.
+    ground_speeds: m/s.
     """
     for i in range(turn_angles.size):
         for j in range(ground_speeds.size):
@@ -181,6 +185,8 @@ def _fly_corner(
 
     The excursion is the maximum distance from the nearer leg. The settling distance is measured along the second leg;
     beyond it the aircraft stays close to the leg. The first leg leads north to the origin; the turn is a right turn.
+
+    airspeed (equivalent), ground_speed: m/s. turn_angle: rad. acceptance: acceptance radius, m.
     """
     motions, memories = np.zeros(1, MOTION), np.zeros(1, ARDUPILOT_MEMORY)
     estimated, memory = motions[0], memories[0]
@@ -196,10 +202,8 @@ def _fly_corner(
     decay = math.exp(-NAVIGATION_TICK_S / lag)
     course, lateral_acceleration, time, excursion, settled_distance, distance_along = 0.0, 0.0, 0.0, 0.0, 0.0, -1.0
     while distance_along < 0.75 * _LEG_LENGTH_M and time < 120.0:
-        estimated.velocity_east, estimated.velocity_north = (
-            ground_speed * math.sin(course),
-            ground_speed * math.cos(course),
-        )
+        estimated.velocity_east = ground_speed * math.sin(course)
+        estimated.velocity_north = ground_speed * math.cos(course)
         navigate_legs(estimated, waypoints, parameters, memory, 1.0, NAVIGATION_TICK_S)
         acceleration_demand = GRAVITY * math.tan(
             limited_nav_roll(memory.lateral_acceleration, 0.0, airspeed, parameters)

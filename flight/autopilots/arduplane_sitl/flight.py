@@ -24,7 +24,7 @@ from flight.autopilots.arduplane_sitl.process import (
 from flight.autopilots.autopilot import AutopilotProgram
 from flight.autopilots.parts import Tick
 from flight.autopilots.program import ProgramAutopilot
-from flight.autopilots.sitl.conversation import Talk
+from flight.autopilots.sitl.conversation import ConversationStep
 from flight.autopilots.sitl.flight import SitlFlight
 from flight.autopilots.sitl.link import AutopilotLink, TcpLink
 from flight.autopilots.sitl.process import AutopilotProcess, check_binary
@@ -61,7 +61,7 @@ class AutopilotFlight(SitlFlight):
             setup, aircraft, servos, load_user_parameters(setup) if user_parameters is None else user_parameters
         )
         super().__init__(setup, aircraft, binary)
-        with contextlib.ExitStack() as stack, self._errors_name_program():
+        with contextlib.ExitStack() as stack, self._name_program_in_errors():
             port = stack.enter_context(contextlib.closing(PhysicsPort()))
             self._link = stack.enter_context(contextlib.closing(TcpLink()))
             heading = math.degrees(self._rail.yaw) % 360.0
@@ -73,7 +73,7 @@ class AutopilotFlight(SitlFlight):
             self._apply_gnss_error()
             self._hold_during(self._preflight.identify(flight_parameters.values))
             program = _reported_program(self._link, digest, flight_parameters)
-            flown_autopilot = autopilot.in_release(simulated_release(program.version))
+            flown_autopilot = autopilot.with_release(simulated_release(program.version))
             self.setup = replace(setup, autopilot=replace(flown_autopilot, program=program))
             self._stack = stack.pop_all()
 
@@ -93,7 +93,7 @@ class AutopilotFlight(SitlFlight):
         self._hold_during(self._wait_for_thrust())
         self._push()
 
-    def _wait_for_thrust(self) -> Talk:
+    def _wait_for_thrust(self) -> ConversationStep:
         """Wait until the motor has full thrust, if ArduPlane starts the motor before the launch."""
         take_off = self._ground_phases.take_off
         parameters = self.setup.autopilot.parameters
@@ -107,18 +107,22 @@ class AutopilotFlight(SitlFlight):
 
 
 def _reported_program(link: AutopilotLink, digest: str, parameters: ArduPlaneFlightParameters) -> AutopilotProgram:
-    """Return the description of the program that flew, from its messages."""
+    """Return version, checksum and parameters of the program that flew, from the messages that it sent.
+
+    digest: SHA-256 of the program's file.
+    parameters: parameters that the program was started with.
+    """
     reported = link.reported
-    known = {RENAMED_IN_4_7.get(name, name) for name in reported.parameters}
-    unknown = parameters.changed.keys() - known
+    known_names = {RENAMED_IN_4_7.get(name, name) for name in reported.parameters}
+    unknown_names = parameters.changed.keys() - known_names
     return AutopilotProgram(
         version=version_text(reported.texts, reported.version),
         sha256=digest,
         parameters={
             name: reported.parameters[name] for name in sorted(parameters.values) if name in reported.parameters
         },
-        changed={name: value for name, value in sorted(parameters.changed.items()) if name not in unknown},
-        unused=tuple(sorted({*parameters.unused, *unknown})),
+        changed={name: value for name, value in sorted(parameters.changed.items()) if name not in unknown_names},
+        unused=tuple(sorted({*parameters.unused, *unknown_names})),
     )
 
 
@@ -141,5 +145,5 @@ def fly_autopilot(
         flight.prepare()
         simulated = fly_to_end(flight)
         if log is not None:
-            flight.keep_log(log)
+            flight.save_log(log)
         return simulated, flight.setup

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from flight.autopilots.sitl.conversation import REPLY_TIMEOUT_S, Awaited, Conversation, Talk
+from flight.autopilots.sitl.conversation import REPLY_TIMEOUT_S, Awaited, Conversation, ConversationStep
 from flight.autopilots.sitl.mission import UploadedMission
 from flight.live.mission_server import MissionType
 from flight.mission.items import Command, Frame, Home, MissionItem
@@ -23,14 +23,14 @@ _FORCE_ARMING = 21196
 class Preflight(Conversation):
     """Conversation with one running ArduPlane."""
 
-    def identify(self, parameters: Iterable[str]) -> Talk:
+    def identify(self, parameters: Iterable[str]) -> ConversationStep:
         """Identify the autopilot, and read the named parameters; skip parameters that it lacks.
 
         Raises FlightError if the vehicle is not a fixed wing.
         """
         yield from self._identify("ArduPlane", _MESSAGE_INTERVALS_US, parameters)
 
-    def prepare(self, mission: UploadedMission) -> Talk:
+    def prepare(self, mission: UploadedMission) -> ConversationStep:
         """Wait until ArduPlane has a position, upload the mission, arm ArduPlane, and start AUTO.
 
         Raises FlightError if ArduPlane finds no position, or refuses one of the other steps.

@@ -123,9 +123,11 @@ def collect_arduplane_parameters(
     base = SIMULATION | battery | servos.parameters() | load_aircraft_parameters(aircraft)
     base["AIRSPEED_CRUISE"] = setup.airspeed
     flight_values = {name: value for name, value in user_parameters.items() if name.startswith(FLYING)}
-    changed = {name: value for name, value in flight_values.items() if base.get(name) != value}
+    changed_values = {name: value for name, value in flight_values.items() if base.get(name) != value}
     return ArduPlaneFlightParameters(
-        with_names_of_4_6(base | flight_values), changed, tuple(sorted(user_parameters.keys() - flight_values.keys()))
+        with_names_of_4_6(base | flight_values),
+        changed_values,
+        tuple(sorted(user_parameters.keys() - flight_values.keys())),
     )
 
 

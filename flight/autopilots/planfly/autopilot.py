@@ -5,7 +5,7 @@ from typing import ClassVar, Self
 
 from aircraft.catalog import Aircraft
 from flight.autopilots.autopilot import AnswerName, Autopilot, StoredAutopilot
-from flight.autopilots.gust_height import height_in_gusts
+from flight.autopilots.gust_height import gust_displacement
 from flight.autopilots.parts import ControlLaw, Deviations, TurnRules
 from flight.autopilots.planfly.law import LAWS, planfly_loop, planfly_tick
 from flight.guidance.gains import GAINS_FILE, load_gains
@@ -33,10 +33,7 @@ class PlanflyGuidance(Autopilot):
 
     @classmethod
     def load(cls, table: FlightTable, aircraft: Aircraft, scenario: str) -> Self:
-        """Return the guidance that a [flight] table describes.
-
-        A table with parameters describes another autopilot.
-        """
+        """Return the guidance with the lateral law that a [flight] table states."""
         return cls(table.steering.guidance)
 
     @classmethod
@@ -54,7 +51,7 @@ class PlanflyGuidance(Autopilot):
         if (aircraft.folder / GAINS_FILE).exists():
             load_gains(aircraft)
             return []
-        return [f"{aircraft.folder / GAINS_FILE}: missing; {aircraft.name} does not fly without gains"]
+        return [f"{aircraft.folder / GAINS_FILE}: missing; planfly's guidance needs the gains of {aircraft.name}"]
 
     @property
     def control_law(self) -> ControlLaw:
@@ -80,4 +77,4 @@ class PlanflyGuidance(Autopilot):
 
         In updrafts the guidance dives and flies faster, so it gains no altitude.
         """
-        return Deviations(gust_sink=height_in_gusts)
+        return Deviations(gust_sink=gust_displacement)

@@ -17,7 +17,7 @@ from flight.guidance.inner_loops import follow_roll, steer_elevator, step_roll_m
 from flight.guidance.lateral_reference_laws import (
     DEFAULT_ACCEPTANCE_RADIUS_M,
     field_course,
-    has_l1_reached,
+    has_reached_leg_end,
     l1_acceleration,
     l1_angles,
     l1_integrate,
@@ -292,6 +292,9 @@ def _unexplained_acceleration(
     """Return the smoothed acceleration to the right that is caused neither by lift nor by ailerons, m/s^2.
 
     The estimate starts at the second tick, because it needs the previous velocity.
+
+    speed: ground speed, m/s.
+    crab: cosine of the angle between heading and ground course.
     """
     if memory.last_velocity_east != 0.0 or memory.last_velocity_north != 0.0:
         change_east = estimated.velocity_east - memory.last_velocity_east
@@ -318,7 +321,7 @@ def _l1_bank_command(
     leg = memory.l1_leg
     start, end = waypoints[leg], waypoints[leg + 1]
     turn_distance = end.acceptance if end.acceptance > 0.0 else DEFAULT_ACCEPTANCE_RADIUS_M
-    if leg + 2 < waypoints.shape[0] and has_l1_reached(estimated, start, end, l1_distance, turn_distance):
+    if leg + 2 < waypoints.shape[0] and has_reached_leg_end(estimated, start, end, l1_distance, turn_distance):
         leg += 1
         memory.l1_leg = leg
     start, end = waypoints[leg], waypoints[leg + 1]
@@ -415,6 +418,9 @@ def _max_upward_acceleration(
     slowly, or descend, to regain speed. Near the stall the measured airspeed, gusts included, replaces the filtered
     airspeed, because a gust can stall the aircraft within a second. In a steep turn this protection starts at a higher
     airspeed, because the stall speed grows with the square root of the load factor.
+
+    airspeed: m/s.
+    rate_gain: acceleration per error of the climb rate, 1/s.
     """
     climb_rate = estimated.velocity_up
     if memory.last_airspeed < 0.0:

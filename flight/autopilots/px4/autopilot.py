@@ -11,7 +11,7 @@ from aircraft.catalog import Aircraft
 from aircraft.tracking import TrackingError
 from flight.autopilots.autopilot import Autopilot, Origin, StoredAutopilot, StoredParameters
 from flight.autopilots.file_releases import choose_release_for_file, commented_release
-from flight.autopilots.gust_height import height_in_updrafts
+from flight.autopilots.gust_height import updraft_altitude_gain
 from flight.autopilots.parameter_files import MAX_BYTES
 from flight.autopilots.parts import (
     BatteryFailsafe,
@@ -108,12 +108,12 @@ _NEUTRAL = {
 }
 # Part of an RTL that is not simulated, by RTL_TYPE.
 _RTL_TYPES_NOT_FLOWN = {
-    2: "RTL_TYPE 2, a return along the mission to its landing or in reverse to home, is not simulated; RTL_TYPE 1 is "
-    "simulated instead, to the nearest rally point or home",
-    3: "RTL_TYPE 3, a return to the nearest of home, rally points and the mission's landing, is not simulated; "
-    "RTL_TYPE 0 is simulated instead, without the landing",
-    4: "RTL_TYPE 4, a return along the mission to its landing or in reverse to home, is not simulated; RTL_TYPE 1 is "
-    "simulated instead, to the nearest rally point or home",
+    2: "RTL_TYPE 2 (return along the mission to its landing, or in reverse to home) is not simulated: the return is "
+    "simulated with RTL_TYPE 1, to the nearest rally point or home",
+    3: "RTL_TYPE 3 (return to the nearest of home, rally points and the mission's landing) is not simulated: the "
+    "return is simulated with RTL_TYPE 0, which ignores the landing",
+    4: "RTL_TYPE 4 (return along the mission to its landing, or in reverse to home) is not simulated: the return is "
+    "simulated with RTL_TYPE 1, to the nearest rally point or home",
 }
 
 # Values of RTL_TYPE for an RTL along the mission.
@@ -161,9 +161,8 @@ _LEG_FIELDS = (
 class Px4(Autopilot):
     """Simulated PX4 for fixed wing: NPFG along the legs, TECS for altitude and airspeed.
 
-    >>> made = Px4(Px4Parameters.defaults("1.16"))
-    >>> made.turns.acceptance_radius, Px4(Px4Parameters.defaults("1.17")).turns.acceptance_radius
-    (33.6, 10.0)
+    >>> [Px4(Px4Parameters.defaults(release)).turns.acceptance_radius for release in ("1.16", "1.17")]
+    [33.6, 10.0]
     """
 
     name: ClassVar = "px4"
@@ -177,12 +176,12 @@ class Px4(Autopilot):
         The simulated release is the first known of: the release that the table states, the release that wrote the file,
         the newest release.
         """
-        found = None
+        writer_release = None
         if table.params is not None:
             file = Path(table.params)
             text = utf8_text(read_small_file(file, MAX_BYTES, "parameter", ParameterError), file, ParameterError)
-            found = commented_release(text, "PX4")
-        version, notes = choose_release_for_file(_VERSIONS, table.px4_version, found, str(table.params), "PX4")
+            writer_release = commented_release(text, "PX4")
+        version, notes = choose_release_for_file(_VERSIONS, table.px4_version, writer_release, str(table.params), "PX4")
         return cls(Px4Parameters.load(aircraft, table.params, version, notes))
 
     @classmethod
@@ -199,7 +198,7 @@ class Px4(Autopilot):
         stored = StoredParameters(parameters.values, parameters.unused, parameters.source)
         return StoredAutopilot(parameters=stored, version=parameters.version)
 
-    def in_release(self, version: Px4Version) -> Self:
+    def with_release(self, version: Px4Version) -> Self:
         """Return the same autopilot with the controllers of another PX4 release."""
         return replace(self, parameters=replace(self.parameters, version=version))
 
@@ -258,12 +257,12 @@ class Px4(Autopilot):
 
         by_program: True for a flight with the PX4 program, in which more settings have an effect.
         """
-        # `FeasibilityChecker` refuses a mission beyond GF_MAX_*, whatever GF_ACTION is.
+        # `FeasibilityChecker` refuses a mission beyond GF_MAX_* with any GF_ACTION.
         parameters, ending_names = self.parameters, ["COM_FLT_TIME_MAX", "GF_MAX_HOR_DIST", "GF_MAX_VER_DIST"]
         if parameters["COM_WIND_MAX_ACT"] > _WARN_OF_WIND and parameters["COM_WIND_MAX"] < mission.wind:
             ending_names += ["COM_WIND_MAX"]
         ending_texts = [
-            f"{name} {parameters[name]:g} ends a mission and is not judged"
+            f"{name} {parameters[name]:g} may end the mission, which is not judged"
             for name in ending_names
             if parameters[name] > 0.0
         ]
@@ -280,12 +279,14 @@ class Px4(Autopilot):
         """Describe settings that matter only for some missions or releases."""
         parameters = self.parameters
         if parameters["NPFG_EN_MIN_GSP"] == 0.0 and self.version == "1.16":
-            yield "NPFG_EN_MIN_GSP 0 keeps no minimum ground speed, which is not simulated"
+            yield "NPFG_EN_MIN_GSP 0 disables the minimum ground speed, which is not simulated"
         if mission.moves_payload and parameters["MIS_COMMAND_TOUT"] > 0.0:
-            yield f"MIS_COMMAND_TOUT {parameters['MIS_COMMAND_TOUT']:g} waits for the payload, which is not simulated"
+            wait_text = f"MIS_COMMAND_TOUT {parameters['MIS_COMMAND_TOUT']:g} s"
+            yield f"{wait_text} makes PX4 wait for the payload, which is not simulated"
         if parameters["FW_T_THR_LOW_HGT"] >= 0.0 and parameters["FW_LND_THRTC_SC"] != 1.0:
             scale_text = f"FW_LND_THRTC_SC {parameters['FW_LND_THRTC_SC']:g}"
-            yield f"{scale_text} below FW_T_THR_LOW_HGT {parameters['FW_T_THR_LOW_HGT']:g} m is not simulated"
+            height_text = f"FW_T_THR_LOW_HGT {parameters['FW_T_THR_LOW_HGT']:g} m"
+            yield f"{scale_text} changes the altitude control below {height_text}, which is not simulated"
         if mission.loiters_to_land and parameters["FW_LND_EARLYCFG"] != 0.0:
             yield "FW_LND_EARLYCFG 1 affects the loiter before the landing, but is not simulated"
         if not mission.returns:
@@ -306,13 +307,13 @@ class Px4(Autopilot):
         if return_type in _ALONG_THE_MISSION:
             yield f"RTL_TYPE {return_type:g} returns along the mission, which is not simulated"
         if return_type == _TO_RALLY_POINT and math.isinf(rally_distance):
-            yield f"RTL_TYPE {return_type:g} without a rally point loiters where it begins, which is not simulated"
+            yield f"RTL_TYPE {return_type:g} without a rally point loiters where the RTL begins, which is not simulated"
 
     def _unjudged_return_texts(self, rally_distance: float) -> Iterator[str]:
         """Describe settings with which a part of an RTL is not simulated; see `_unsimulated_return_texts`."""
         parameters = self.parameters
         if parameters["RTL_TYPE"] != _TO_RALLY_POINT and rally_distance <= _RALLY_HOME_DISTANCE_M:
-            yield "PX4 ignores a rally point within 10 m of home, to which the return is simulated"
+            yield "PX4 ignores a rally point within 10 m of home, but the simulated return goes to it"
         if parameters["RTL_LAND_DELAY"] >= 0.0:
             yield f"RTL_LAND_DELAY {parameters['RTL_LAND_DELAY']:g} lands after the return, which is not simulated"
 
@@ -321,14 +322,15 @@ class Px4(Autopilot):
         parameters = self.parameters
         if mission.fence_at_home and parameters["GF_ACTION"] > 0.0:
             # `GeofenceChecks::checkAndReport`.
-            yield f"GF_ACTION {parameters['GF_ACTION']:g} prevents arming at home, which is {mission.fence_at_home}"
+            yield f"GF_ACTION {parameters['GF_ACTION']:g} prevents arming, because home is {mission.fence_at_home}"
         if mission.has_fence and parameters["GF_PREDICT"] > 0.0 and parameters["GF_ACTION"] > _WARN_OF_FENCE:
             yield "GF_PREDICT 1 leaves the mission before its fence is reached, which is not simulated"
         if parameters["CBRK_FLIGHTTERM"] != _NO_TERMINATION:
             limits = {"FD_FAIL_R": "FW_R_LIM", "FD_FAIL_P": "FW_P_LIM_MAX"}
             for name, limit in limits.items():
                 if 0.0 < parameters[name] <= round(math.degrees(parameters[limit]), 6):
-                    yield f"{name} {parameters[name]:g} terminates a flight within {limit}, which is not simulated"
+                    allowed_text = f"an angle that {limit} allows"
+                    yield f"{name} {parameters[name]:g} terminates a flight at {allowed_text}, which is not simulated"
 
     def _battery_failsafes(self) -> tuple[BatteryFailsafe, ...]:
         """Return the battery failsafe that ends a mission first; the PX4 program flies without it.
@@ -336,8 +338,8 @@ class Px4(Autopilot):
         COM_LOW_BAT_ACT sets PX4's reaction at BAT_CRIT_THR and at BAT_EMERGEN_THR. `Battery::determineWarning` tests
         BAT_EMERGEN_THR first.
 
-        >>> made = Px4Parameters.defaults().changed(COM_LOW_BAT_ACT=3.0, BAT1_CAPACITY=5000.0, BAT_CRIT_THR=0.1)
-        >>> Px4(made).checks.battery_failsafes[0].used_charge
+        >>> parameters = Px4Parameters.defaults().changed(COM_LOW_BAT_ACT=3.0, BAT1_CAPACITY=5000.0, BAT_CRIT_THR=0.1)
+        >>> Px4(parameters).checks.battery_failsafes[0].used_charge
         4500.0
         """
         parameters = self.parameters
@@ -431,8 +433,8 @@ class Px4(Autopilot):
         )
 
     def _rate_limit(self, *names: str) -> RateLimit:
-        """Return the rate limit of the smallest of some parameters."""
-        return RateLimit.of_parameters(**{name: self.parameters[name] for name in names})
+        """Return the rate limit that the smallest of the named parameters sets."""
+        return RateLimit.from_parameters(**{name: self.parameters[name] for name in names})
 
     @property
     def returns(self) -> ReturnBehaviour:
@@ -452,10 +454,12 @@ class Px4(Autopilot):
     @property
     def _return_trials(self) -> ReturnTrials:
         """Parameter changes to try for a safer RTL: RTL_RETURN_ALT, RTL_DESCEND_ALT, and RTL_TYPE."""
-        first, last = ({name: self.parameters[name]} for name in ("RTL_RETURN_ALT", "RTL_DESCEND_ALT"))
+        return_altitude, descend_altitude = (
+            {name: self.parameters[name]} for name in ("RTL_RETURN_ALT", "RTL_DESCEND_ALT")
+        )
         other_types = sorted({0.0, 1.0, 3.0} - {self.parameters["RTL_TYPE"]})
         return ReturnTrials(
-            (first, last | first),
+            (return_altitude, descend_altitude | return_altitude),
             tuple({"RTL_TYPE": value} for value in other_types),
             "RTL_RETURN_ALT, RTL_DESCEND_ALT, RTL_TYPE",
         )
@@ -492,7 +496,10 @@ class Px4(Autopilot):
         return failsafe_causes(self.parameters, has_fence=mission.has_fence)
 
     def _unsimulated_returns(self, mission: ReturnMission) -> str:
-        """Return the reason why no RTL of a mission is simulated; "" if RTLs are simulated."""
+        """Return the reason why no RTL of a mission is simulated; "" if RTLs are simulated.
+
+        The reason "landing" means that the landing sequence begins with the landing itself.
+        """
         begins_with_landing = bool(mission.landings) and mission.landings[0].is_landing
         if begins_with_landing and self.parameters["RTL_TYPE"] in _TO_LANDING:
             return "landing"
@@ -512,9 +519,9 @@ class Px4(Autopilot):
         return_type = parameters["RTL_TYPE"]
         first_height, last_height = f"{parameters['RTL_RETURN_ALT']:g} m", f"{parameters['RTL_DESCEND_ALT']:g} m"
         return (
-            f"RTL_TYPE {return_type:g}: a return goes to {_DESTINATION_TEXTS[int(return_type)]}. Below RTL_RETURN_ALT"
-            f" ({first_height} above its destination) it first climbs to that height in a loiter. Then it flies level;"
-            f" over home or a rally point it descends in a loiter to RTL_DESCEND_ALT ({last_height})"
+            f"RTL_TYPE {return_type:g}: a return goes to {_DESTINATION_TEXTS[int(return_type)]}. An aircraft below"
+            f" RTL_RETURN_ALT ({first_height} above the destination) first climbs to this height in a loiter. Then it"
+            f" flies level. Over home or a rally point it descends in a loiter to RTL_DESCEND_ALT ({last_height})"
         )
 
     @property
@@ -573,7 +580,7 @@ class Px4(Autopilot):
         """
         return Deviations(
             tracking_error=self._tracking_error,
-            gust_rise=height_in_updrafts,
+            gust_rise=updraft_altitude_gain,
             altitude_miss_probability=partial(altitude_miss_probability, self.parameters["NAV_FW_ALT_RAD"]),
             altitude_parameter="NAV_FW_ALT_RAD",
             altitude_candidates=(*self._climb_candidates, *HEIGHT_CANDIDATES),
@@ -594,7 +601,7 @@ class Px4(Autopilot):
     def _tracking_error(
         self, airspeed: float, nav: Navigation, *, fly_over: bool = False, turbulence: Turbulence = "none"
     ) -> TrackingError | None:
-        """Return PX4's deviations from a plan; ``fly_over`` has no effect, because PX4 flies over no waypoint."""
+        """Return PX4's deviations from a plan; ``fly_over`` has no effect, because PX4 turns before each waypoint."""
         return tracking_error(self.parameters, airspeed, nav, turbulence=turbulence)
 
     def with_parameters(self, origin: Origin = "file", /, **values: float) -> "Px4":

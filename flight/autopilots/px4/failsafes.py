@@ -65,7 +65,7 @@ def failsafe_causes(parameters: Px4Parameters, *, has_fence: bool) -> tuple[Caus
 
 
 def _link_cause(parameters: Px4Parameters, use: LinkUse) -> Cause:
-    """Return the failsafe of a lost radio link."""
+    """Return PX4's reaction to the loss of a radio link; for ``use`` see `link_loss_reactions`."""
     if use == "telemetry":
         name, parameter, exceptions = "station lost", "NAV_DLL_ACT", "COM_DLL_EXCEPT"
     else:
@@ -87,10 +87,10 @@ def link_loss_reactions(parameters: Px4Parameters, use: LinkUse) -> tuple[LinkLo
 
     use: "telemetry" for the ground station's link, "control" for the remote control.
 
-    >>> made = Px4Parameters.defaults().changed(NAV_DLL_ACT=2)
-    >>> [(reaction.action, reaction.delay) for reaction in link_loss_reactions(made, "telemetry")]
+    >>> parameters = Px4Parameters.defaults().changed(NAV_DLL_ACT=2)
+    >>> [(reaction.action, reaction.delay) for reaction in link_loss_reactions(parameters, "telemetry")]
     [('circle', 10.0), ('return', 15.0)]
-    >>> [(reaction.action, reaction.delay) for reaction in link_loss_reactions(made, "control")]
+    >>> [(reaction.action, reaction.delay) for reaction in link_loss_reactions(parameters, "control")]
     [('circle', 0.5), ('return', 5.5)]
     """
     _, action, parameter, value = _link_cause(parameters, use)

@@ -93,6 +93,7 @@ def adapted_period(
     curvature: curvature of the track, 1/m.
     track_feasibility: feasibility of the track's course, 0..1; see `bearing_feasibility`.
     track_proximity: 0 far from the track, 1 on the track.
+    airspeed, wind_speed: m/s.
     """
     # Without wind or curvature the period is that of a straight track.
     wind_factor = 2.0 * (1.0 - math.sqrt(1.0 - min(1.0, wind_speed / max(0.1, airspeed))))
@@ -126,6 +127,8 @@ def reference_air_velocity(
     If the wind is too strong for the course, the ground course of the result is as close to the course as possible.
 
     bearing_east, bearing_north: unit vector of the course.
+    wind_east, wind_north: velocity of the air, m/s.
+    airspeed: m/s.
     """
     wind_cross_bearing = wind_east * bearing_north - wind_north * bearing_east
     wind_dot_bearing = wind_east * bearing_east + wind_north * bearing_north
@@ -144,6 +147,9 @@ def heading_error_sine(air_east: float, air_north: float, reference_east: float,
     """Return the sine of the angle from the air velocity to its reference, positive to the right.
 
     Beyond 90 degrees the result is 1 or -1.
+
+    air_east, air_north: velocity through the air, m/s.
+    reference_east, reference_north: reference of this velocity, m/s.
     """
     speed_product = max(1e-6, math.hypot(air_east, air_north) * math.hypot(reference_east, reference_north))
     sine = (air_north * reference_east - air_east * reference_north) / speed_product

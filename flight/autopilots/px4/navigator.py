@@ -144,6 +144,8 @@ def _navigate_waypoint(
 
     If the aircraft is too high or too low at the waypoint, it loiters there first. At the last waypoint of a mission it
     loiters without end: about the waypoint, or up to 1.16 about the position at which it reached the waypoint.
+    target_index: index of the waypoint.
+    Other arguments as for `navigate`.
     """
     target = waypoints[target_index]
     ground_speed = math.hypot(estimated.velocity_east, estimated.velocity_north)
@@ -204,6 +206,7 @@ def _navigate_loiter(
     """Fly to a loiter and around it until the loiter's end condition is met, then begin the next leg.
 
     loiter: waypoint on the loiter.
+    Other arguments as for `navigate`.
     """
     ground_speed = math.hypot(estimated.velocity_east, estimated.velocity_north)
     distance = math.hypot(loiter.centre_east - estimated.east, loiter.centre_north - estimated.north)
@@ -295,6 +298,7 @@ def climb_before_return(
     position at which the climb ended. ``memory.from_up`` always is the altitude at which the RTL began.
 
     lowest_return_altitude: return altitude of an RTL that begins lower, m AMSL.
+    Other arguments as for `navigate`.
     """
     if not memory.is_in_rtl:
         memory.is_in_rtl, memory.is_loitering = True, False
@@ -336,6 +340,9 @@ def _navigate_rtl(
     Follows PX4's `src/modules/navigator/rtl.cpp` and `rtl_direct.cpp`. The return altitude is RTL_RETURN_ALT above the
     destination, or the altitude at the start of the RTL if that is higher. The aircraft does not descend on the way.
     Over its target it descends to RTL_DESCEND_ALT.
+
+    rtl: waypoint of the RTL's loiter.
+    Other arguments as for `navigate`.
     """
     # The target is RTL_DESCEND_ALT above the destination, but no higher than the return altitude.
     lowest_return_altitude = rtl.up + max(0.0, parameters.rtl_altitude - parameters.rtl_descend_altitude)
@@ -406,6 +413,8 @@ def foh_altitude(end_east: float, end_north: float, end_up: float, lead_distance
     The slope ends ``lead_distance`` m before the end of the leg. The setpoint depends on the minimum horizontal
     distance to the end so far. On a leg no longer than ``lead_distance``, the setpoint is the altitude of the leg's
     end.
+
+    end_east, end_north, end_up: end of the leg, m.
     """
     leg_length = math.hypot(end_east - memory.from_east, end_north - memory.from_north)
     min_distance = min(memory.min_distance_to_end, leg_length)

@@ -10,7 +10,7 @@ from aircraft.catalog import Aircraft
 from flight.autopilots.parameter_files import read_parameter_file
 from flight.autopilots.parameter_set import AIRCRAFT_FILE
 from flight.autopilots.px4.parameters import OUTPUT_FUNCTION_NAMES, SLEW_NAMES, Px4Parameters
-from flight.autopilots.rate_loop import RateGains, rate_gains_fault
+from flight.autopilots.rate_loop import RateGains, judge_rate_gains
 
 # Bits of EKF2_GPS_CTRL: position and altitude.
 _GPS_POSITION_BIT = 1 << 0
@@ -79,18 +79,20 @@ def _describe_control_allocation(parameters: Px4Parameters) -> Iterator[str]:
     It is for another airframe, or it lacks ailerons, elevator or motor. Parameters without control allocation
     (SYS_CTRL_ALLOC 0) state no airframe.
     """
-    stated = parameters.by_origin("file")
+    file_values = parameters.by_origin("file")
     if parameters["CA_AIRFRAME"] != _FIXED_WING:
-        if "CA_AIRFRAME" in stated and parameters["SYS_CTRL_ALLOC"] != 0.0:
-            yield f"CA_AIRFRAME {parameters['CA_AIRFRAME']:g} moves no surfaces of a fixed wing, which is not simulated"
+        if "CA_AIRFRAME" in file_values and parameters["SYS_CTRL_ALLOC"] != 0.0:
+            yield f"CA_AIRFRAME {parameters['CA_AIRFRAME']:g} is not a fixed wing, which is not simulated"
         return
-    if stated.get("CA_ROTOR_COUNT", 1.0) == 0.0:
+    if file_values.get("CA_ROTOR_COUNT", 1.0) == 0.0:
         yield "CA_ROTOR_COUNT 0 leaves no motor, which is not simulated"
-    names = [f"CA_SV_CS{surface}_TYPE" for surface in range(int(stated.get("CA_SV_CS_COUNT", 0.0)))]
-    if "CA_SV_CS_COUNT" in stated and stated.keys() >= set(names):
+    names = [f"CA_SV_CS{surface}_TYPE" for surface in range(int(file_values.get("CA_SV_CS_COUNT", 0.0)))]
+    if "CA_SV_CS_COUNT" in file_values and file_values.keys() >= set(names):
         for part, types in _SURFACES_BY_PART.items():
             torque = _TORQUE_BY_PART[part]
-            moved_types = {stated[name] for name in names if stated.get(name.replace("TYPE", torque), 1.0) != 0.0}
+            moved_types = {
+                file_values[name] for name in names if file_values.get(name.replace("TYPE", torque), 1.0) != 0.0
+            }
             if moved_types.isdisjoint(types):
                 yield f"CA_SV_CS_COUNT {len(names)} and CA_SV_CS*_TYPE leave no {part}, which is not simulated"
 
@@ -100,20 +102,20 @@ def _describe_slew_rates(parameters: Px4Parameters) -> Iterator[str]:
 
     Follows `ControlAllocation::applySlewRateLimit`.
     """
-    stated = parameters.by_origin("file")
+    file_values = parameters.by_origin("file")
     for name in SLEW_NAMES:
-        if (value := stated.get(name, 0.0)) > 0.0:
-            yield f"{name} {value:g} slows an output, which is not simulated"
+        if (value := file_values.get(name, 0.0)) > 0.0:
+            yield f"{name} {value:g} s slows an actuator output, which is not simulated"
 
 
 def _describe_connections(parameters: Px4Parameters) -> Iterator[str]:
     """Describe output functions in the user's file that lack a motor or any control surface."""
-    stated = parameters.by_origin("file")
-    functions = {stated[name] for name in OUTPUT_FUNCTION_NAMES if name in stated}
+    file_values = parameters.by_origin("file")
+    functions = {file_values[name] for name in OUTPUT_FUNCTION_NAMES if name in file_values}
     if not functions:
         return
-    for part, (first, last) in _OUTPUT_FUNCTIONS_BY_PART.items():
-        if not any(first <= function <= last for function in functions):
+    for part, (first_function, last_function) in _OUTPUT_FUNCTIONS_BY_PART.items():
+        if not any(first_function <= function <= last_function for function in functions):
             yield f"the output functions (PWM_MAIN_FUNC1 and others) connect no {part}, which is not simulated"
 
 
@@ -122,22 +124,23 @@ def _describe_rate_gains(parameters: Px4Parameters, aircraft: Aircraft | None) -
 
     The gains in the aircraft's file for ArduPlane, and PX4's defaults, are assumed to suit the aircraft.
     """
-    own = {} if aircraft is None or not (aircraft.folder / AIRCRAFT_FILE).exists() else rate_gains(aircraft)
-    stated = parameters.by_origin("file")
+    has_aircraft_gains = aircraft is not None and (aircraft.folder / AIRCRAFT_FILE).exists()
+    aircraft_gains = rate_gains(aircraft) if aircraft is not None and has_aircraft_gains else {}
+    file_values = parameters.by_origin("file")
     for axis, time_constant in (("FW_RR", "FW_R_TC"), ("FW_PR", "FW_P_TC")):
         names = [f"{axis}_{gain}" for gain in ("FF", "P", "I", "D")]
-        if stated.keys().isdisjoint((*names, time_constant)):
+        if file_values.keys().isdisjoint((*names, time_constant)):
             continue
         default = parameters.table.by_name[names[0]].default
-        suitable = own.get(names[0]) or default
-        fault = rate_gains_fault(
+        feed_forwards = (aircraft_gains.get(names[0]) or default, default)
+        fault = judge_rate_gains(
             RateGains(*(parameters[name] for name in names)),
-            (min(suitable, default), max(suitable, default)),
+            (min(feed_forwards), max(feed_forwards)),
             parameters[time_constant],
         )
         if fault:
             gains_text = ", ".join(f"{name} {parameters[name]:g}" for name in [*names, time_constant])
-            yield f"{gains_text}: gains {fault} to hold the attitude, which is not simulated"
+            yield f"{gains_text}: these gains are {fault} to hold the attitude, which is not simulated"
 
 
 def rate_gains(aircraft: Aircraft) -> dict[str, float]:

@@ -245,15 +245,15 @@ class Px4Parameters(ParameterSet):
     (0.873, 10.0, True)
     >>> default.changed(NAV_ACC_RAD=56.0)["NAV_ACC_RAD"]
     56.0
-    >>> Px4Parameters.of_text("1\t1\tNAV_ACC_RAD\t30.0\t9\n1\t1\tBAT1_N_CELLS\t3\t6\n", "mine.params").unused
+    >>> Px4Parameters.from_text("1\t1\tNAV_ACC_RAD\t30.0\t9\n1\t1\tBAT1_N_CELLS\t3\t6\n", "mine.params").unused
     ('BAT1_N_CELLS',)
-    >>> Px4Parameters.of_text("FW_R_LIM 30", "mine.params").outside_documented_ranges
+    >>> Px4Parameters.from_text("FW_R_LIM 30", "mine.params").outside_documented_ranges
     ('FW_R_LIM 30 (35..75)',)
-    >>> Px4Parameters.of_text("FW_AIRSPD_TRIM 25", "mine.params").contradictions
+    >>> Px4Parameters.from_text("FW_AIRSPD_TRIM 25", "mine.params").contradictions
     ('FW_AIRSPD_TRIM 25 of the file is above FW_AIRSPD_MAX 20 of the defaults',)
-    >>> made, notes = Px4Parameters.of_log({"NAV_ACC_RAD": -5.0, "FW_R_LIM": 45.0}, "a.ulg", "1.16")
-    >>> made.by_origin("file"), notes
-    ({'FW_R_LIM': 45.0}, ('NAV_ACC_RAD -5 of the log is not allowed: the default is used',))
+    >>> parameters, notes = Px4Parameters.from_log({"NAV_ACC_RAD": -5.0, "FW_R_LIM": 45.0}, "a.ulg", "1.16")
+    >>> parameters.by_origin("file"), notes
+    ({'FW_R_LIM': 45.0}, ('NAV_ACC_RAD -5 in the log is outside 0.05..10000: the default is used',))
     """
 
     table: ClassVar[ParameterTable] = TABLE

@@ -153,17 +153,21 @@ def _make_route(start: Record, target: ReturnTarget, parameters: Px4Parameters) 
     route = waypoint_column(2 if target.landing is None else len(stops) + 2)
     route["airspeed"], route["stop"] = parameters["FW_AIRSPD_TRIM"], np.arange(len(route))
     route[0].east, route[0].north, route[0].up = start["east"], start["north"], start["up"]
-    last = route[-1]
+    last_waypoint = route[-1]
     if target.landing is None:
-        last.centre_east, last.centre_north, last.up = last.east, last.north, last.up = target.position
-        last.loiter_radius, last.is_rtl = parameters["RTL_LOITER_RAD"], True
+        last_waypoint.centre_east, last_waypoint.centre_north, last_waypoint.up = (
+            last_waypoint.east,
+            last_waypoint.north,
+            last_waypoint.up,
+        ) = target.position
+        last_waypoint.loiter_radius, last_waypoint.is_rtl = parameters["RTL_LOITER_RAD"], True
         return route
     for waypoint, stop in zip(route[1:-1], stops, strict=True):
         _fill_stop(waypoint, stop, parameters)
         # A waypoint of a landing is reached at any altitude (`MissionBase::isLanding`), except the first one.
         waypoint.ignores_altitude = not stop.to_altitude and stop is not target.landing
     route[-2].precedes_landing = True
-    last.east, last.north, last.up = target.landing.landing or target.position
+    last_waypoint.east, last_waypoint.north, last_waypoint.up = target.landing.landing or target.position
     return route
 
 
@@ -216,11 +220,11 @@ def fly_rtl(
 ) -> None:
     """Simulate an RTL for up to ``timeout`` s, and fill the `RETURN_RESULT` ``result``.
 
-    waypoints: start of the RTL, then the loiter at its end; or the start, the stops of a landing sequence, and the
-        landing.
+    waypoints: the start, then the loiter at the RTL's end, or the stops of a landing sequence and the landing.
     transit_altitude: altitude to which an RTL to a landing sequence climbs first, m AMSL.
     min_clearance, min_distance: height above ground and distance outside spheres, m, below which the RTL is aborted.
     positions: array (t, 3), m, to fill with one position per second until it is full.
+    excesses, power, field: tables of a `flight.autopilots.point_mass.PointMass`.
     """
     motions, states, memories = np.zeros(1, MOTION), np.zeros(1, STATE), np.zeros(1, PX4_MEMORY)
     progress_records = np.zeros(1, LOITER_PROGRESS)
@@ -272,6 +276,9 @@ def _update_arrival(
     An RTL to a loiter arrives over its destination; an RTL to a landing arrives when it begins the leg to the landing.
 
     radius: distance from the loiter's center within which the aircraft has arrived, m.
+    lands: True for an RTL to a landing sequence.
+    has_begun_sequence: True once the aircraft flies this sequence.
+    time: time since the start, s.
     """
     if lands:
         has_arrived = has_begun_sequence and memory.leg + 2 >= waypoints.shape[0]
@@ -299,6 +306,10 @@ def _steer(
     """Set the setpoints of bank, pitch and throttle for one tick.
 
     Return True once an RTL to a landing flies the landing sequence instead of the climb before it.
+
+    transit_altitude: altitude to which an RTL to a landing sequence climbs first, m AMSL.
+    lands: True for an RTL to a landing sequence.
+    has_begun_sequence: True once the aircraft flies this sequence.
     """
     wind_east, wind_north = state.wind_east, state.wind_north
     eas_to_tas = eas_to_tas_ratio(estimated.up)
@@ -330,6 +341,8 @@ def _begin_sequence(
 
     After a climb the leg begins at the center of the loiter in which the aircraft climbed. Without a climb PX4 has no
     previous setpoint. The leg then begins at the aircraft's position, and at the altitude of the leg's end.
+
+    transit_altitude: altitude to which the RTL climbs first, m AMSL.
     """
     begin, first_stop = waypoints[0], waypoints[1]
     has_climbed = begin.up < transit_altitude - parameters.altitude_acceptance_radius

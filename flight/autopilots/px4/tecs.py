@@ -154,6 +154,7 @@ def _calc_pitch_control(
 
     altitude_rate_setpoint: m/s.
     ske_rate_setpoint: rate of the kinetic energy, m^2/s^3.
+    underspeed_ratio: see `detect_underspeed`.
     """
     tas = memory.tas
     speed_weight = parameters.pitch_speed_weight * (1.0 - underspeed_ratio) + 2.0 * underspeed_ratio
@@ -200,6 +201,8 @@ def _calc_throttle_control(
     altitude_rate_setpoint: m/s.
     ske_rate_setpoint: rate of the kinetic energy, m^2/s^3.
     min_sink_rate: sink rate at idle throttle, m/s.
+    underspeed_ratio: see `detect_underspeed`.
+    eas_to_tas: ratio of true to equivalent airspeed.
     """
     ste_rate_max, ste_rate_min = GRAVITY * parameters.max_climb_rate, -GRAVITY * min_sink_rate
     load_factor_correction = parameters.load_factor_correction * (1.0 / max(0.1, math.cos(state.roll)) - 1.0)

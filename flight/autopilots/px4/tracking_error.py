@@ -79,7 +79,6 @@ def tracking_error(
     """
     acceptance, excursion, before, after = _corner_tables(parameters, airspeed)
     navigation_error = _NAVIGATION_SIGMAS * ERRORS[nav][0]
-    values = parameters
     return TrackingError(
         airspeed=airspeed,
         acceptance=acceptance,
@@ -88,10 +87,10 @@ def tracking_error(
         after=after,
         across=math.hypot(_CROSS_TRACK_M, navigation_error),
         up=math.hypot(_ALTITUDE_ERROR_M, navigation_error),
-        lag=(1.0 - values["FW_T_HRATE_FF"]) * values["FW_T_ALT_TC"],
+        lag=(1.0 - parameters["FW_T_HRATE_FF"]) * parameters["FW_T_ALT_TC"],
         step=0.0,
-        climb_rate=_RATE_FRACTIONS[turbulence] * min(values["FW_T_CLMB_R_SP"], values["FW_T_CLMB_MAX"]),
-        sink_rate=_RATE_FRACTIONS[turbulence] * min(values["FW_T_SINK_R_SP"], values["FW_T_SINK_MAX"]),
+        climb_rate=_RATE_FRACTIONS[turbulence] * min(parameters["FW_T_CLMB_R_SP"], parameters["FW_T_CLMB_MAX"]),
+        sink_rate=_RATE_FRACTIONS[turbulence] * min(parameters["FW_T_SINK_R_SP"], parameters["FW_T_SINK_MAX"]),
         own_climb_share=_OWN_RATE_FRACTIONS[turbulence],
         own_sink_share=_OWN_RATE_FRACTIONS[turbulence],
     )
@@ -158,7 +157,12 @@ def _measure_corners(
     corners: Records,
     waypoints: Records,
 ) -> None:
-    """Fill the `CORNER_TRACKING` record of each corner, by turn angle (rows) and ground speed (columns)."""
+    """Fill the `CORNER_TRACKING` record of each corner, by turn angle (rows) and ground speed (columns).
+
+    airspeed: equivalent airspeed, m/s.
+    turn_angles: rad.
+    ground_speeds: m/s.
+    """
     for i in range(turn_angles.size):
         for j in range(ground_speeds.size):
             corner = corners[i, j]
@@ -181,6 +185,7 @@ def _fly_corner(
 
     turn: rad, to the right.
     speed: ground speed, m/s.
+    airspeed: equivalent airspeed, m/s.
     """
     motions, memories = np.zeros(1, MOTION), np.zeros(1, PX4_MEMORY)
     estimated, memory = motions[0], memories[0]

@@ -42,7 +42,7 @@ class Px4Flight(SitlFlight):
     autopilot: autopilot that flies the setup instead of the setup's own; it has PX4's parameters and the program's
         file, with the start-up files next to it.
 
-    Its MAVLink port (UDP) is open on every interface of this machine, since PX4 has no setting for it.
+    Its MAVLink port (UDP) is open on every interface of this machine, because PX4 has no setting to restrict it.
     """
 
     def __init__(self, setup: FlightSetup, aircraft: Aircraft, autopilot: ProgramAutopilot) -> None:
@@ -55,7 +55,7 @@ class Px4Flight(SitlFlight):
         flight_parameters = collect_px4_parameters(setup, aircraft, parameters)
         super().__init__(setup, aircraft, binary)
         self._mode_start: Iterator[None] = iter(())
-        with contextlib.ExitStack() as stack, self._errors_name_program():
+        with contextlib.ExitStack() as stack, self._name_program_in_errors():
             port = stack.enter_context(contextlib.closing(SimulatorPort()))
             link = stack.enter_context(contextlib.closing(UdpLink()))
             self._link = link
@@ -75,7 +75,7 @@ class Px4Flight(SitlFlight):
                 else NEWEST_PX4
             )
             flown_autopilot = replace(
-                autopilot.in_release(version), program=_reported_program(link, digest, flight_parameters)
+                autopilot.with_release(version), program=_reported_program(link, digest, flight_parameters)
             )
             self.setup = replace(setup, autopilot=flown_autopilot)
             self._stack = stack.pop_all()
@@ -94,13 +94,13 @@ class Px4Flight(SitlFlight):
         ends_in_circle = self._workspace.path["waypoint"]["is_mission_end"][self.setup.route.legs]
         return self._link.reported.reached >= self.last_item if ends_in_circle else super()._is_ending
 
-    def keep_log(self, target: Path) -> bool:
+    def save_log(self, target: Path) -> bool:
         """Make PX4 close its log (.ulg), end the program, and move the log; return True if there was a log."""
         self._preflight.disarm()
         for _ in range(round(_LOG_CLOSING_TIME_S * FRAME_HZ)):
             if not self._answer_frame():
                 break
-        return super().keep_log(target)
+        return super().save_log(target)
 
     def _prepare_program(self) -> None:
         """Upload the mission, push the aircraft along the rail, and start the mission meanwhile."""
@@ -123,15 +123,19 @@ def _has_started(process: AutopilotProcess) -> bool:
 
 
 def _reported_program(link: AutopilotLink, digest: str, parameters: Px4FlightParameters) -> AutopilotProgram:
-    """Return the description of the program that flew, from its messages."""
+    """Return version, checksum and parameters of the program that flew, from the messages that it sent.
+
+    digest: SHA-256 of the program's file.
+    parameters: parameters that the program was started with.
+    """
     reported = link.reported
-    unknown = parameters.changed.keys() - reported.parameters.keys()
+    unknown_names = parameters.changed.keys() - reported.parameters.keys()
     return AutopilotProgram(
         version=version_text(reported.version),
         sha256=digest,
         parameters={
             name: reported.parameters[name] for name in sorted(parameters.values) if name in reported.parameters
         },
-        changed={name: value for name, value in sorted(parameters.changed.items()) if name not in unknown},
-        unused=tuple(sorted({*parameters.unused, *unknown})),
+        changed={name: value for name, value in sorted(parameters.changed.items()) if name not in unknown_names},
+        unused=tuple(sorted({*parameters.unused, *unknown_names})),
     )

@@ -95,5 +95,7 @@ def collect_px4_parameters(
         for name, value in user_values.items()
         if name.startswith(FLYING) and name not in SIMULATION and len(name) <= LONGEST_NAME
     }
-    changed = {name: value for name, value in flight_values.items() if base.get(name) != value}
-    return Px4FlightParameters(base | flight_values, changed, tuple(sorted(user_values.keys() - flight_values.keys())))
+    changed_values = {name: value for name, value in flight_values.items() if base.get(name) != value}
+    return Px4FlightParameters(
+        base | flight_values, changed_values, tuple(sorted(user_values.keys() - flight_values.keys()))
+    )

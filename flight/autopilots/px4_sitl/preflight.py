@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from flight.autopilots.sitl.conversation import REPLY_TIMEOUT_S, SYSTEM, Awaited, Conversation, Talk
+from flight.autopilots.sitl.conversation import REPLY_TIMEOUT_S, SYSTEM, Awaited, Conversation, ConversationStep
 from flight.autopilots.sitl.mission import UploadedMission
 from flight.live.mission_server import MissionType
 from flight.mission.items import Command, MissionItem
@@ -33,7 +33,7 @@ _VERSION_TYPES = {0: " (development)", 64: " (alpha)", 128: " (beta)", 192: " (r
 class Px4Preflight(Conversation):
     """Conversation with one running PX4."""
 
-    def identify(self, parameters: Iterable[str]) -> Talk:
+    def identify(self, parameters: Iterable[str]) -> ConversationStep:
         """Identify the autopilot, and read the named parameters; skip parameters that it lacks.
 
         Raises FlightError if the autopilot is not PX4.
@@ -44,7 +44,7 @@ class Px4Preflight(Conversation):
             message = f"is not PX4: its heartbeat states autopilot {autopilot}; {allowed}"
             raise FlightError(message, field="autopilot", value=autopilot, allowed=allowed)
 
-    def prepare(self, mission: UploadedMission) -> Talk:
+    def prepare(self, mission: UploadedMission) -> ConversationStep:
         """Wait until PX4 has a position, upload the mission, and arm PX4 in MANUAL.
 
         PX4 must be in MANUAL because its TECS would otherwise integrate errors on the rail. Raises FlightError if PX4
@@ -52,7 +52,7 @@ class Px4Preflight(Conversation):
         """
         estimator = mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS
         yield from self._wait_for_position(estimator, _MESSAGE_INTERVALS_US[estimator])
-        yield from self._upload(counted_from_0(mission.items), MissionType.MISSION)
+        yield from self._upload(number_from_zero(mission.items), MissionType.MISSION)
         if mission.rally:
             yield from self._upload(list(mission.rally), MissionType.RALLY)
         yield from self._send_until_accepted(Command.DO_SET_HOME, lambda: self._set_home(mission.home), "home")
@@ -63,7 +63,7 @@ class Px4Preflight(Conversation):
             "arming",
         )
 
-    def start_mission(self) -> Talk:
+    def start_mission(self) -> ConversationStep:
         """Switch PX4 to mission mode.  Raises FlightError if PX4 refuses."""
         yield from self._send_until_accepted(Command.DO_SET_MODE, lambda: self._set_mode(_AUTO, _MISSION), "MISSION")
         mission_mode = Awaited("MISSION", REPLY_TIMEOUT_S, "did not change to mission mode, armed,")
@@ -86,13 +86,13 @@ class Px4Preflight(Conversation):
         self._send_command(Command.DO_SET_MODE, mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, main_mode, sub_mode)
 
 
-def counted_from_0(items: Iterable[MissionItem]) -> list[MissionItem]:
-    """Return a mission's items numbered from 0, as PX4 numbers them.
+def number_from_zero(items: Iterable[MissionItem]) -> list[MissionItem]:
+    """Return a mission's items, which planfly numbers from 1, with PX4's numbers from 0.
 
-    PX4 stores home separately. ArduPlane numbers items from 1, because item 0 is home.
+    PX4 stores home separately. ArduPlane numbers items from 1, because its item 0 is home.
 
     >>> jump = MissionItem(3, Command.DO_JUMP, 2, (1.0, 2.0, 0.0, 0.0), 0.0, 0.0, 0.0)
-    >>> counted_from_0([jump])[0].seq, counted_from_0([jump])[0].params[:2]
+    >>> number_from_zero([jump])[0].seq, number_from_zero([jump])[0].params[:2]
     (2, (0.0, 2.0))
     """
     return [

@@ -16,7 +16,7 @@ _STARTUP_SCRIPT = Path("init.d-posix", "rcS")
 _AIRFRAME_ID = 22000
 # Last line of PX4's start-up script.
 STARTED = "Startup script returned successfully"
-# Folder of PX4's temporary files, whatever the system's setting.
+# Folder of PX4's temporary files, which does not depend on the system's settings.
 _TEMPORARY_FOLDER = Path("/tmp")
 # Prefixes of these files, before the number of the instance.
 _TEMPORARY_PREFIXES = ("px4_lock-", "px4-sock-")
@@ -63,8 +63,8 @@ def px4_launch(
         _write(scripts / "px4-rc.mavlink", f"mavlink start -x -u {own_port} -o {link_port} -t {LOOPBACK} -r 4000000 -f")
         environment = {"PX4_SYS_AUTOSTART": str(_AIRFRAME_ID), "PX4_SIM_MODEL": "planfly"}
         # Each instance of PX4 on a machine needs its own number: the port number is unique.
-        leaves = tuple(_TEMPORARY_FOLDER / f"{name}{simulator_port}" for name in _TEMPORARY_PREFIXES)
-        return Launch(("-d", "-i", str(simulator_port), "-w", str(folder)), environment, "log/**/*.ulg", leaves)
+        leftover_files = tuple(_TEMPORARY_FOLDER / f"{name}{simulator_port}" for name in _TEMPORARY_PREFIXES)
+        return Launch(("-d", "-i", str(simulator_port), "-w", str(folder)), environment, "log/**/*.ulg", leftover_files)
 
     return prepare
 

@@ -15,8 +15,8 @@ from flight.live.mission_server import MissionType, to_message
 from flight.mission.items import Command, Frame, Home, MissionItem, command_name
 from world.errors import FlightError
 
-# Part of a conversation; it is resumed after each interval of the exchange, until it returns.
-Talk = Generator[None, None, None]
+# Step of a conversation; it is resumed after each interval of the exchange, until it returns.
+ConversationStep = Generator[None, None, None]
 
 # MAVLink system id of the autopilot.
 SYSTEM = 1
@@ -76,7 +76,7 @@ class Awaited(NamedTuple):
 
 
 class Conversation:
-    """The conversation with one autopilot.
+    """MAVLink conversation with one autopilot before its flight.
 
     link: connection to the autopilot.
     now: function for the autopilot's time, s.
@@ -89,8 +89,8 @@ class Conversation:
         self._link, self._now, self._clock = link, now, clock
         self._reported = link.reported
 
-    def _identify(self, kind: str, message_intervals: dict[int, int], parameters: Iterable[str]) -> Talk:
-        """Wait for the autopilot's heartbeat, request messages, and read parameters.
+    def _identify(self, kind: str, message_intervals: dict[int, int], parameters: Iterable[str]) -> ConversationStep:
+        """Wait for the autopilot's heartbeat, request periodic messages, and read parameters.
 
         kind: name of the expected autopilot.
         message_intervals: interval of each requested message by its number, microseconds.
@@ -116,7 +116,7 @@ class Conversation:
         for first in range(0, len(names), _PARAMETERS_PER_REQUEST):
             yield from self._read_parameters(names[first : first + _PARAMETERS_PER_REQUEST])
 
-    def _wait_for_position(self, message: int, interval: int, excluding_flags: int = 0) -> Talk:
+    def _wait_for_position(self, message: int, interval: int, excluding_flags: int = 0) -> ConversationStep:
         """Wait until the autopilot's estimator has a position.  Raises FlightError after a timeout.
 
         message, interval: number of the message that reports the estimator's state, and its interval, microseconds.
@@ -131,7 +131,7 @@ class Conversation:
 
     def _wait_until(
         self, is_done: Callable[[], bool], awaited: Awaited, request: Callable[[], None] | None = None
-    ) -> Talk:
+    ) -> ConversationStep:
         """Wait until a condition is true, and repeat a request every second.
 
         Raises FlightError after a timeout.
@@ -188,7 +188,7 @@ class Conversation:
             )
         )
 
-    def _send_until_accepted(self, command: int, request: Callable[[], None], name: str) -> Talk:
+    def _send_until_accepted(self, command: int, request: Callable[[], None], name: str) -> ConversationStep:
         """Send a command every second until the autopilot accepts it.
 
         request: function that sends the command.
@@ -204,7 +204,7 @@ class Conversation:
             request,
         )
 
-    def _read_parameters(self, names: list[str]) -> Talk:
+    def _read_parameters(self, names: list[str]) -> ConversationStep:
         """Request parameters, and wait up to a second for the values.
 
         The wait is limited because the autopilot does not answer for a parameter that it lacks.
@@ -215,7 +215,7 @@ class Conversation:
         while not (parameters.keys() >= set(names) or stopwatch.has_passed(RETRY_INTERVAL_S)):
             yield
 
-    def _upload(self, items: list[MissionItem], kind: MissionType) -> Talk:
+    def _upload(self, items: list[MissionItem], kind: MissionType) -> ConversationStep:
         """Upload a mission or rally points (MAVLink mission protocol).
 
         Retry for up to `UPLOAD_TIMEOUT_S` while the autopilot reports that it has no space.  Raises FlightError if the
@@ -240,7 +240,7 @@ class Conversation:
                 raise FlightError(message, field=list_name, value=result_name)
             yield from self._wait(RETRY_INTERVAL_S)
 
-    def _send_items(self, items: list[MissionItem], kind: MissionType) -> Talk:
+    def _send_items(self, items: list[MissionItem], kind: MissionType) -> ConversationStep:
         """Send the number of items and each item that is requested, until an acknowledgment or a timeout."""
         reported, link = self._reported, self._link
         reported.requested = reported.mission_result = None
@@ -255,7 +255,7 @@ class Conversation:
                     link.send(to_message(items[last_item], target_component=COMPONENT, seq=last_item))
             yield
 
-    def _wait(self, seconds: float) -> Talk:
+    def _wait(self, seconds: float) -> ConversationStep:
         """Wait for a number of seconds by the autopilot's clock."""
         start = self._now()
         while self._now() - start < seconds:

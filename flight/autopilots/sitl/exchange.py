@@ -153,7 +153,7 @@ def rail_end(state: Record, wind: tuple[float, float, float]) -> RailEnd:
 
 
 def motion_on_rail(end: RailEnd, time: float, push_duration: float, origin: tuple[float, float, float]) -> BodyMotion:
-    """Return the motion on the rail ``push_duration`` s after the push began.
+    """Return the aircraft's motion on the rail ``push_duration`` s after the push along the rail began.
 
     With ``push_duration`` 0 or less the aircraft is at rest at the start of the rail. After the push it stays at the
     end of the rail.
@@ -369,12 +369,12 @@ class Lockstep(ABC):
         return fly
 
     def serve(self) -> None:
-        """Run one more frame: apply the autopilot's commands, and send it the motion."""
+        """Run one more frame at the end of a flight: apply the autopilot's commands, and send the motion to it."""
         self._fdm.write(self._receive_commands())
         self.step()
 
     def _next_time(self) -> float:
-        """Count a frame, poll the MAVLink connection if it is due, and return the time of the exchange, s."""
+        """Start the next frame: poll the MAVLink connection if due, and return the time of the exchange, s."""
         self._frame += 1
         if self._frame % POLL_INTERVAL_FRAMES == 0:
             self._poll()

@@ -15,7 +15,7 @@ from aircraft.catalog import Aircraft
 from aircraft.contacts import find_contacts
 from flight.autopilots.parts import Tick
 from flight.autopilots.program import ProgramFlight
-from flight.autopilots.sitl.conversation import Talk
+from flight.autopilots.sitl.conversation import ConversationStep
 from flight.autopilots.sitl.exchange import (
     FRAME_HZ,
     POLL_INTERVAL_FRAMES,
@@ -25,7 +25,7 @@ from flight.autopilots.sitl.exchange import (
     rail_end,
 )
 from flight.autopilots.sitl.link import AutopilotLink
-from flight.autopilots.sitl.mission import uploaded_mission
+from flight.autopilots.sitl.mission import make_uploaded_mission
 from flight.autopilots.sitl.process import AutopilotProcess
 from flight.guidance.gains import load_gains
 from flight.guidance.path import profile_at, project
@@ -78,19 +78,19 @@ def autopilot_tick(block: Floats, heights: Heights) -> int:
         return NOT_A_NUMBER
     place_on_path(work.true, path.piece[: settings.pieces], path.node[: settings.nodes], memory)
     memory.speed_command = path.waypoint[memory.leg].airspeed
-    last = path.waypoint[settings.waypoints - 1]
-    previous = path.waypoint[settings.waypoints - 2]
-    if last.is_rtl and settings.on_last_leg:
-        update_rtl_loiter(work.true, last, memory, work.timing.dt)
-    elif settings.on_last_leg and previous.loiter_radius != 0.0 and previous.loiter_time == math.inf:
-        update_endless_loiter(work.true, previous, memory, work.timing.dt)
-    elif settings.on_last_leg and last.is_mission_end:
+    last_waypoint = path.waypoint[settings.waypoints - 1]
+    previous_waypoint = path.waypoint[settings.waypoints - 2]
+    if last_waypoint.is_rtl and settings.on_last_leg:
+        update_rtl_loiter(work.true, last_waypoint, memory, work.timing.dt)
+    elif settings.on_last_leg and previous_waypoint.loiter_radius != 0.0 and previous_waypoint.loiter_time == math.inf:
+        update_endless_loiter(work.true, previous_waypoint, memory, work.timing.dt)
+    elif settings.on_last_leg and last_waypoint.is_mission_end:
         update_end_loiter(work.true, memory, work.timing.dt)
     elif settings.on_last_leg:
         cross_track, distance_past = distances_from_route_end(work.true, path.waypoint[: settings.waypoints])
         memory.is_finished = distance_past >= 0.0
-        # An aircraft that loiters at the mission's end, however wide, has not missed the route.
-        memory.is_in_rtl = previous.loiter_radius != 0.0 and previous.stop == last.stop
+        # An aircraft that loiters at the mission's end has not missed the route, at any distance from the center.
+        memory.is_in_rtl = previous_waypoint.loiter_radius != 0.0 and previous_waypoint.stop == last_waypoint.stop
         if memory.is_finished:
             memory.cross_track = cross_track
     return end_tick(work, block)
@@ -152,7 +152,7 @@ def update_endless_loiter(true: Record, corner: Record, memory: Record, dt: floa
     ):
         memory.loiter_time += dt
         memory.loiter_angle += tangential_speed / distance * dt
-    # An aircraft that loiters at the mission's end, however wide, has not missed it.
+    # An aircraft that loiters at the mission's end has not missed the route, at any distance from the center.
     memory.is_in_rtl = True
     memory.is_finished = memory.loiter_time > ENDLESS_LOITER_TIME_S and memory.loiter_angle >= 2.0 * math.pi
 
@@ -182,7 +182,7 @@ _RUN_IN_TIMEOUT_S = 40.0
 
 
 def launch_rail(release_state: Release, take_off: TakeOff) -> RailEnd:
-    """Return the rail of a launch; for a runway, a rail without length, because the aircraft starts at rest."""
+    """Return the rail of a launch; for a runway, a rail of length 0, because the aircraft starts at rest."""
     north, east, _ = release_state.velocity
     roll, pitch, yaw = release_state.attitude
     lat, lon = (math.radians(value) for value in release_state.position[:2])
@@ -234,7 +234,7 @@ class SitlFlight(ProgramFlight):
         self._release: Release | None = None
         self._rail = self._trim_on_rail(setup)
         self._start_disturbances(setup)
-        self._mission = uploaded_mission(setup)
+        self._mission = make_uploaded_mission(setup)
         if self._law is not None:
             self.max_ticks += int(GROUND_TIME_ALLOWANCE_S / self.dt)
             self._law.initialise(self.guidance_memory, self._workspace.law_record)
@@ -282,9 +282,9 @@ class SitlFlight(ProgramFlight):
 
         Raises FlightError, see the class.
         """
-        with self._errors_name_program():
+        with self._name_program_in_errors():
             self._prepare_program()
-        with self._errors_name_program(CrashError):
+        with self._name_program_in_errors(CrashError):
             if self._release is None:
                 self._fly_to_first_waypoint()
             else:
@@ -296,13 +296,13 @@ class SitlFlight(ProgramFlight):
         for k in range(math.ceil(start_fraction * frames) + 1, math.ceil(end_fraction * frames) + 1):
             self._lockstep.hold(self._rail, k / FRAME_HZ)
 
-    def keep_log(self, target: Path) -> bool:
+    def save_log(self, target: Path) -> bool:
         """End the program cleanly and move its log to a file; return True if there was a log."""
         self._process.end(self._answer_frame)
-        return self._process.keep_log(target)
+        return self._process.save_log(target)
 
     @contextlib.contextmanager
-    def _errors_name_program(self, error_class: type[FlightError] = FlightError) -> Iterator[None]:
+    def _name_program_in_errors(self, error_class: type[FlightError] = FlightError) -> Iterator[None]:
         """Convert each FlightError in this context to an ``error_class`` that names the program's file."""
         try:
             yield
@@ -330,13 +330,13 @@ class SitlFlight(ProgramFlight):
         self._start_trimmed(setup.mission.source, release_start)
         return rail_end(self.fdm.read(), start.wind)
 
-    def _hold_during(self, talk: Talk) -> None:
-        """Hold the aircraft at rest on the rail while ``talk`` exchanges messages with the program."""
+    def _hold_during(self, step: ConversationStep) -> None:
+        """Hold the aircraft at rest on the rail during a step of the conversation with the program."""
         while True:
             for _ in range(POLL_INTERVAL_FRAMES):
                 self._lockstep.hold(self._rail)
             try:
-                next(talk)
+                next(step)
             except StopIteration:
                 return
 
@@ -401,7 +401,7 @@ class SitlFlight(ProgramFlight):
         self._make_loop(autopilot_tick)
 
     def _tick(self, tick: "partial[int]", has_gnss_error: bool) -> int:
-        """Run one tick, and set the GNSS error after it."""
+        """Run one tick; if there is a GNSS error, update the error of the next frames. Return the end code or 0."""
         status = tick()
         if has_gnss_error:
             east, north, up, velocity_east, velocity_north, velocity_up = self._workspace.navigation_error()
@@ -410,7 +410,7 @@ class SitlFlight(ProgramFlight):
 
     def _fly_ticks(self, count: int) -> int:
         """Fly up to ``count`` ticks; errors of the program name its file."""
-        with self._errors_name_program(CrashError):
+        with self._name_program_in_errors(CrashError):
             return self._loop(count)
 
     def _answer_frame(self) -> bool:

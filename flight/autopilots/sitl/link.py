@@ -120,7 +120,7 @@ class AutopilotLink(ABC):
         self._transmit(data)
 
     def _on_heartbeat(self, message: Any) -> None:
-        """Store the vehicle and the autopilot that a HEARTBEAT states."""
+        """Store the vehicle type, autopilot, mode and arming state that a HEARTBEAT of the autopilot states."""
         if message.get_srcComponent() != mavlink.MAV_COMP_ID_AUTOPILOT1:
             return
         self.reported.vehicle, self.reported.autopilot = int(message.type), int(message.autopilot)

@@ -3,9 +3,9 @@
 Items that a flight from air to air cannot contain, a take-off or a landing, become waypoints where the route has them.
 An extra waypoint, 1 km straight on after the last, keeps the autopilot on its course to the route's end: it accepts a
 waypoint a radius early, and returns to launch after the last one.  A mission that ends with an RTL has the RTL at its
-end, or before the landing sequence that follows it, and its rally points are uploaded too.  A mission that ends with a
-loiter without end has that loiter, of which the flight's own clock flies a minute.  An autopilot that loiters without
-end about the last waypoint gets no extra waypoint either.
+end, or before the landing sequence that follows it, and its rally points are uploaded too.  A loiter without end at the
+mission's end is uploaded unchanged; planfly ends the flight after a minute and one lap of it.  An autopilot that
+loiters without end about the last waypoint gets no extra waypoint either.
 """
 
 import math
@@ -48,13 +48,13 @@ class UploadedMission:
     last: int = 0
 
 
-def uploaded_mission(setup: FlightSetup) -> UploadedMission:
-    """Return the mission to upload for a setup; altitudes are AMSL, except at rally points.
+def make_uploaded_mission(setup: FlightSetup) -> UploadedMission:
+    """Build the mission that is uploaded for a setup; its altitudes are AMSL, except at rally points.
 
     A mission that begins and ends on the ground is uploaded unchanged.
     """
     if setup.ground_phases:
-        return _unchanged_mission(setup, setup.ground_phases)
+        return _make_unchanged_mission(setup, setup.ground_phases)
     route, origin = setup.route, setup.scenario.origin
     items: list[MissionItem] = []
     has_landing = route.rtl_start is not None and route.rtl_end <= route.legs
@@ -78,7 +78,7 @@ def uploaded_mission(setup: FlightSetup) -> UploadedMission:
     return UploadedMission(_home_for_upload(setup), _renumber(items), setup.mission.rally if has_landing else ())
 
 
-def _unchanged_mission(setup: FlightSetup, ground_phases: GroundPhases) -> UploadedMission:
+def _make_unchanged_mission(setup: FlightSetup, ground_phases: GroundPhases) -> UploadedMission:
     """Return the mission as in its file; a home without an altitude gets the altitude of the ground.
 
     Raises ValueError without a home, a take-off or a landing.
@@ -92,18 +92,22 @@ def _unchanged_mission(setup: FlightSetup, ground_phases: GroundPhases) -> Uploa
     for item in mission.items:
         p1, p2, p3, p4 = (0.0 if math.isnan(value) else value for value in item.params)
         items.append(replace(item, params=(p1, p2, p3, p4)))
-    last = next(number for number, item in enumerate(items, 1) if item.seq == ground_phases.approach.item)
-    return UploadedMission(home, _renumber(items), mission.rally, last)
+    last_number = next(number for number, item in enumerate(items, 1) if item.seq == ground_phases.approach.item)
+    return UploadedMission(home, _renumber(items), mission.rally, last_number)
 
 
 def _item_with_position(
-    item: MissionItem, route: Route, waypoint_indices: NDArray[np.intp], origin: GeoOrigin, earlier: list[MissionItem]
+    item: MissionItem,
+    route: Route,
+    waypoint_indices: NDArray[np.intp],
+    origin: GeoOrigin,
+    earlier_items: list[MissionItem],
 ) -> MissionItem:
     """Return a navigation item for the upload; a loiter keeps its parameters, other items become waypoints.
 
     waypoint_indices: waypoints of the route that belong to the item.
-    earlier: items that are uploaded before this item; a loiter without a position is placed at the last of their
-        positions.
+    earlier_items: items that are uploaded before this item; a loiter without a position is placed at the last position
+        of these items.
     """
     position = route.positions[waypoint_indices[-1]]
     loiter = stated_loiter(item)
@@ -117,7 +121,11 @@ def _item_with_position(
         return replace(waypoint, params=(hold, waypoint.params[1], pass_by, yaw))
     lat, lon = item.lat_deg, item.lon_deg
     if not item.has_position:
-        center_item = next(other for other in reversed(earlier) if other.has_position and is_navigation(other.command))
+        center_item = next(
+            earlier_item
+            for earlier_item in reversed(earlier_items)
+            if earlier_item.has_position and is_navigation(earlier_item.command)
+        )
         lat, lon = center_item.lat_deg, center_item.lon_deg
     p1, p2, p3, p4 = (0.0 if math.isnan(value) else value for value in item.params)
     return MissionItem(item.seq, int(item.command), int(Frame.GLOBAL), (p1, p2, p3, p4), lat, lon, float(position[2]))
@@ -165,7 +173,7 @@ def _renumber(items_in_order: list[MissionItem]) -> tuple[MissionItem, ...]:
         params = item.params
         if item.command == Command.DO_JUMP:
             target = next(
-                (candidate for candidate, other in enumerate(items_in_order, 1) if other.seq >= params[0]),
+                (candidate for candidate, later_item in enumerate(items_in_order, 1) if later_item.seq >= params[0]),
                 len(items_in_order),
             )
             params = (float(target), *params[1:])

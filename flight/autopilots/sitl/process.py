@@ -56,13 +56,13 @@ class Launch:
     arguments: arguments after the program's name.
     environment: variables in addition to this process's environment.
     logs: pattern of the program's own logs, relative to its folder.
-    leaves: files that the program leaves behind outside its folder.
+    leftover_files: files that the program leaves behind outside its folder.
     """
 
     arguments: tuple[str, ...]
     environment: Mapping[str, str] = field(default_factory=dict)
     logs: str = "logs/*.BIN"
-    leaves: tuple[Path, ...] = ()
+    leftover_files: tuple[Path, ...] = ()
 
 
 class AutopilotProcess:
@@ -86,7 +86,7 @@ class AutopilotProcess:
             self._folder = self._resources.enter_context(temporary_folder("planfly-autopilot-"))
             guard.register_folder(self._folder)
             self._launch = prepare(self._folder)
-            for file in self._launch.leaves:
+            for file in self._launch.leftover_files:
                 guard.register_file(file)
                 self._resources.callback(file.unlink, missing_ok=True)
             self._process = self._spawn(guard)
@@ -162,7 +162,7 @@ class AutopilotProcess:
                     time.sleep(0.001)
         self._kill()
 
-    def keep_log(self, target: Path) -> bool:
+    def save_log(self, target: Path) -> bool:
         """Move the program's last log to a file; return True if there was a log."""
         logs = sorted(self._folder.glob(self._launch.logs))
         if not logs:

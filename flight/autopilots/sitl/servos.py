@@ -63,9 +63,9 @@ class ServoOutput:
         >>> ServoOutput(2, (1100.0, 1500.0, 1900.0), (0.5, 0.0, -0.5)).value_at_fraction(0.5)
         -0.25
         """
-        first, last = self.pulses[0], self.pulses[-1]
-        center = self.center_pulse if len(self.pulses) > 2 else 0.5 * (first + last)
-        return self.value(center + fraction * (last - center if fraction > 0.0 else center - first))
+        first_pulse, last_pulse = self.pulses[0], self.pulses[-1]
+        center = self.center_pulse if len(self.pulses) > 2 else 0.5 * (first_pulse + last_pulse)
+        return self.value(center + fraction * (last_pulse - center if fraction > 0.0 else center - first_pulse))
 
 
 @dataclass(frozen=True, slots=True)

@@ -77,14 +77,14 @@ def flown_legs(setup: FlightSetup, track: Track, stretch: MissionStretch) -> Flo
     part_aligned = align_track(part_requirements, leg_track)
     if part_aligned is None:
         return None
-    # A log or a stretch that ends a few metres before the waypoint does not show that it was passed.
+    # A log or a stretch that ends a few metres before the last waypoint does not show that the waypoint was passed.
     return FlownLegs(
         stretch, first, end, is_partial or not bool(part_aligned.passed[-1]), part_requirements, part_aligned
     )
 
 
 def gaps_between(legs: FlownLegs, start: float, end: float) -> list[Gap]:
-    """Return the pauses of the log between two times, s."""
+    """Return the gaps of the log that overlap the time from `start` to `end`, s."""
     imported_log = legs.requirements.setup.imported_log
     return [] if imported_log is None else [gap for gap in imported_log.gaps if gap.start < end and gap.end > start]
 
@@ -101,10 +101,11 @@ def stretch_end_text(stretch: MissionStretch) -> str:
 def _earliest_lap(
     setup: FlightSetup, rows: Track, aligned: AlignedTrack, waypoint_indices: NDArray[np.intp]
 ) -> tuple[AlignedTrack, NDArray[np.intp]]:
-    """Align a track with the earliest laps of a repeated route that explain the flight.
+    """Align a track with the earliest matching laps of a repeated route.
 
-    Without this step, a flight that ended within a lap could be matched to any later lap, because all laps have the
-    same waypoints.  Return `aligned` and `waypoint_indices` unchanged if no shorter route explains the flight.
+    Return the aligned track and the indices of the passed waypoints.
+    All laps have the same waypoints, so a flight that ended within a lap could otherwise be matched to any later lap.
+    Return `aligned` and `waypoint_indices` unchanged if no shorter route matches the track.
     """
     items, last = setup.route.items, int(waypoint_indices[-1])
     if len(waypoint_indices) == last - waypoint_indices[0] + 1:
@@ -115,14 +116,14 @@ def _earliest_lap(
         requirements = route_requirements(replace(setup, route=part_of_route(setup.route, 0, end)))
         lap_aligned = align_track(requirements, rows)
         lap_indices = waypoint_indices if lap_aligned is None else identified_waypoints(requirements, lap_aligned)
-        # Count each item once: a position that was passed once is near the item's waypoints of all laps.
+        # Each item counts once, because a single pass is near the item's waypoints of all laps.
         if lap_aligned is not None and len(np.unique(items[lap_indices])) >= len(np.unique(items[waypoint_indices])):
             return lap_aligned, lap_indices
     return aligned, waypoint_indices
 
 
 def rows_between(track: Track, start: float, end: float) -> Track:
-    """Return the rows of a track between two times, s."""
+    """Return the part of a track between two times, s, both included."""
     first_row, end_row = np.searchsorted(track.time, [start, end + 1e-6])
     return track.rows(int(first_row), int(end_row))
 
@@ -148,7 +149,7 @@ _MAX_NAMED = 6
 
 @dataclass(frozen=True, slots=True)
 class PlanMismatch:
-    """The reason why a flight did not follow a plan.
+    """Reason why a flight did not follow a plan.
 
     kind: "place" if it came near none of the plan's waypoints, "order" if it passed them in another order.
     distance: for "place", the minimum distance of the flight from a waypoint, m.
@@ -212,7 +213,11 @@ def plan_mismatch(setup: FlightSetup, track: Track) -> PlanMismatch | None:
 
 
 def _closest_distances(points: Floats, tracks: list[Track]) -> tuple[Floats, Floats]:
-    """Return each waypoint's smallest horizontal distance from the flight, m, and its time, s, (w,) each."""
+    """Return each waypoint's minimum horizontal distance from the flight (m) and its time (s), (w,) each.
+
+    points: waypoints, m, (w, 3).
+    tracks: parts of the flight.
+    """
     min_distances, times = np.full(len(points), np.inf), np.zeros(len(points))
     for rows in tracks:
         for k, point in enumerate(points):

@@ -53,9 +53,10 @@ def imported_lines(
     flown_stretches: Sequence[FlownLegs],
     conditions: Conditions,
 ) -> tuple[str, ...]:
-    """Return the lines of the summary, the headline first.
+    """Return the lines of the summary on an imported flight, the headline first.
 
     own_answer: answer of the verdict at its own level, with the headline.
+    flown_stretches: legs flown in each judged stretch of the log.
     """
     imported_log = setup.imported_log
     if imported_log is None:
@@ -140,8 +141,9 @@ def heights_text(imported_log: ImportedLog) -> str:
 
 
 def row_faults_text(faults: RowFaults, gaps: int) -> str:
-    """Describe the faults of a log's rows by their numbers.  gaps: number of pauses between the rows.
+    """List the numbers of a log's gaps and faulty rows, such as duplicates and clock jumps.
 
+    gaps: number of pauses between the rows.
     >>> row_faults_text(RowFaults(doubled=2, clock_jumps=(12.5,)), 1)
     '1 gap, 2 duplicates, 1 clock jump (at 12.5 s)'
     >>> row_faults_text(RowFaults(), 0)
@@ -221,7 +223,7 @@ def damage_text(damage: Damage) -> str:
 
 
 def _start_time_text(imported_log: ImportedLog) -> str:
-    """Describe the date and time at which the log's time is 0; return "" if the log states no plausible date."""
+    """Return a clause on the date and time at the log's time 0; "" without a plausible date."""
     if not isfinite(imported_log.utc_start) or not 0.0 <= imported_log.utc_start < 4.1e9:
         return ""
     return f", time 0 s is {datetime.fromtimestamp(imported_log.utc_start, UTC):%Y-%m-%d %H:%M:%S} UTC"
@@ -237,7 +239,7 @@ _QUANTITY_LABELS: dict[DataKind, str] = {
     "throttle": "throttle",
     "velocity": "velocity",
 }
-# Track columns of quantities.
+# Column of the track with the values of each quantity.
 _TRACK_COLUMNS: dict[DataKind, str] = {"airspeed": "airspeed", "attitude": "attitude", "battery": "energy"}
 _DATUM_REASONS = {
     "ellipsoid": "the log's heights are above the ellipsoid, but the plan's heights are above mean sea level",
@@ -248,7 +250,7 @@ _UNNAMED_TEXT = "no aircraft was named; name it with --aircraft"
 
 
 def judge_imported_flight(setup: FlightSetup, track: Track, *, log_complete: bool) -> Verdict:
-    """Judge the stretches of an imported flight that followed its mission; the verdict has the level "flown".
+    """Judge the stretches of an imported flight that followed its mission, at the level "flown".
 
     Raises ValueError for a flight that was not imported.
 
@@ -338,13 +340,13 @@ def _undecided_part_text(findings: Sequence[Finding]) -> str:
 
 
 def _stretch_findings(setup: FlightSetup, legs: FlownLegs) -> list[Finding]:
-    """Judge one stretch; number the legs and waypoints in its findings as in the whole route."""
+    """Judge one stretch; its findings number legs and waypoints as in the whole route."""
     findings = []
     for finding in track_findings(legs.requirements, legs.aligned):
         checked_finding = _unjudge_with_gaps(_unjudge_without_data(setup, legs, finding), legs)
         if legs.partial:
             checked_finding = _unjudge_if_unreached(checked_finding, legs)
-        findings.append(_renumber_place(checked_finding, legs.first, setup))
+        findings.append(_renumber_place(checked_finding, legs.first))
     return [*findings, *_findings_without_data(setup, {finding.rule for finding in findings})]
 
 
@@ -370,7 +372,7 @@ def _findings_without_data(setup: FlightSetup, judged_rules: set[str]) -> list[F
 
 
 def _unjudge_without_data(setup: FlightSetup, legs: FlownLegs, finding: Finding) -> Finding:
-    """Mark a finding as not judged if the log lacks data that its rule needs."""
+    """Return the finding, marked as not judged if the log lacks data that its rule needs."""
     imported_log = setup.imported_log
     if imported_log is None:
         return finding
@@ -409,7 +411,7 @@ def _missing_values_text(legs: FlownLegs, quantity: DataKind) -> str:
 
 
 def _mark_unjudged(finding: Finding, cause: str, *, keep_measurements: bool = False) -> Finding:
-    """Return a copy of a finding that is not judged because of ``cause``.
+    """Return a copy of a finding that is marked as not judged, with `cause` as its reason.
 
     keep_measurements: True to keep the finding's reason and facts.
     """
@@ -419,7 +421,10 @@ def _mark_unjudged(finding: Finding, cause: str, *, keep_measurements: bool = Fa
 
 
 def _unjudge_with_gaps(finding: Finding, legs: FlownLegs) -> Finding:
-    """Mark a passed finding as not judged if the log has a pause on its leg, or on the legs at its waypoint."""
+    """Return the finding; mark a passed one as not judged if the log has a gap on its leg or waypoint.
+
+    At a waypoint, only rules with `LogNeeds.needs_no_gap` are affected.
+    """
     if finding.ok is not True or finding.place.index is None or finding.place.kind not in ("leg", "waypoint"):
         return finding
     track, rows = legs.aligned.track, legs.aligned.rows
@@ -434,10 +439,10 @@ def _unjudge_with_gaps(finding: Finding, legs: FlownLegs) -> Finding:
 
 
 def _unjudge_if_unreached(finding: Finding, legs: FlownLegs) -> Finding:
-    """Mark a finding as not judged if it concerns a last waypoint that was not reached, or its leg.
+    """Return the finding; mark it as not judged if it concerns the unreached end of a stretch.
 
-    On the leg to that waypoint, only findings of rules that need the whole leg are marked.  A failed finding stays
-    failed.
+    The end is the stretch's last waypoint, or the leg to this waypoint.
+    On this leg, only findings of rules that need the whole leg are marked, unless they failed.
     """
     leg, waypoint = legs.requirements.legs - 1, legs.requirements.legs
     is_unreached = finding.place.kind == "waypoint" and finding.place.index == waypoint
@@ -453,7 +458,7 @@ def _unjudge_if_unreached(finding: Finding, legs: FlownLegs) -> Finding:
     return finding
 
 
-def _renumber_place(finding: Finding, first: int, setup: FlightSetup) -> Finding:
+def _renumber_place(finding: Finding, first: int) -> Finding:
     """Return a finding of a stretch with its place numbered in the whole route.
 
     first: number of the stretch's first waypoint in the route.
@@ -466,7 +471,10 @@ def _renumber_place(finding: Finding, first: int, setup: FlightSetup) -> Finding
 
 
 def _merge_findings(findings_by_stretch: Sequence[Sequence[Finding]]) -> tuple[Finding, ...]:
-    """Merge the findings of all stretches; for each rule, place and check keep a failure rather than a pass."""
+    """Merge the findings of all stretches: for each rule, place and check, a failure replaces a pass.
+
+    A pass replaces an unjudged finding.
+    """
     merged: dict[tuple[str, Place, str], Finding] = {}
     for findings in findings_by_stretch:
         for finding in findings:
@@ -479,12 +487,15 @@ def _merge_findings(findings_by_stretch: Sequence[Sequence[Finding]]) -> tuple[F
 
 
 def _merge_precedence(finding: Finding) -> int:
-    """Return a finding's precedence in a merge: 2 for a failed, 1 for a passed and 0 for an unjudged finding."""
+    """Return a finding's precedence in a merge: 2 if failed, 1 if passed, 0 if unjudged."""
     return {False: 2, True: 1, None: 0}[finding.ok]
 
 
 def _leg_ends(setup: FlightSetup, flown_stretches: Sequence[FlownLegs]) -> tuple[float, ...]:
-    """Return the end time of each leg but the last, s, never decreasing; inf from the first unreached leg on."""
+    """Return the end time of each leg except the last, s; inf from the first unreached leg on.
+
+    The times never decrease.
+    """
     end_times = np.full(len(setup.route.points), np.inf)
     for legs in flown_stretches:
         times = legs.aligned.track.time[legs.aligned.rows]

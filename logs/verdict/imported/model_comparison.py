@@ -47,7 +47,7 @@ class Profile:
 
 @dataclass(frozen=True, slots=True)
 class LegPair:
-    """One leg as flown and as simulated, each a pair of numbers; NaN if a flight has none.
+    """Comparison of one leg; each pair is the flown and the simulated value, NaN if unknown.
 
     leg: index in the whole route.
     cross_track, height_error: signed value with the largest absolute value, m.
@@ -66,7 +66,7 @@ class LegPair:
 
 @dataclass(frozen=True, slots=True)
 class TurnPair:
-    """One turn as flown and as simulated.
+    """Comparison of one turn; each pair is the flown and the simulated value, NaN if unknown.
 
     waypoint: index in the whole route.
     turn: planned course change, deg.
@@ -203,7 +203,7 @@ def _flight_profile(
             continue
         rows = aligned.leg_rows(leg)
         distance_along, lateral_offset = project_onto_leg(requirements, leg, track.position[rows])
-        # If a flight goes back, as on a loiter, the first pass applies.
+        # If the flight passes a point several times, as on a loiter, the first pass is taken.
         is_forward = np.concatenate([[True], distance_along[1:] > np.maximum.accumulate(distance_along)[:-1]])
         line_altitude = requirements.points[leg, 2] + distance_along * math.tan(requirements.slopes[leg])
         height_error = track.position[rows, 2] - line_altitude
@@ -231,7 +231,9 @@ def _flight_profile(
 def _leg_pair(leg: int, rows: slice, profiles: Sequence[Profile]) -> LegPair:
     """Compare one leg of the flown profile with the same leg of the simulated profile.
 
-    leg: number of the leg in the whole route.  rows: points of the profiles on the leg.
+    leg: number of the leg in the whole route.
+    rows: range of the profiles' points on the leg.
+    profiles: profiles of the flown and of the simulated flight.
     """
 
     def pair(name: str, reduce: str) -> tuple[float, float]:
@@ -251,10 +253,10 @@ def _leg_pair(leg: int, rows: slice, profiles: Sequence[Profile]) -> LegPair:
 
 
 def _reduce_values(values: Floats, reduce: str) -> float:
-    """Reduce the finite values to one number, NaN if there are none.
+    """Reduce the finite values to one number; NaN if there are none.
 
-    reduce: "mean"; "span", the last value less the first; "size", the largest absolute value; or "farthest", the value
-        with the largest absolute value.
+    reduce: "mean", "span" (last value minus first), "size" (largest absolute value), or "farthest" (the value with the
+        largest absolute value).
     """
     known_values = values[np.isfinite(values)]
     if not known_values.size:
@@ -275,9 +277,11 @@ def _turn_pair(
     pairs: Sequence[tuple[RouteRequirements, AlignedTrack]],
     corners: Sequence[Sequence[CornerPass]],
 ) -> TurnPair:
-    """Compare the turn at waypoint k of the stretch as flown and as simulated.
+    """Compare the flown and the simulated turn at waypoint `k` of the stretch.
 
     first: number of the stretch's first waypoint in the whole route.
+    pairs: requirements and aligned track of the flown and of the simulated flight.
+    corners: passes of the waypoints in the flown and in the simulated flight.
     """
     flown_turn, model_turn = (measure_turn(requirements, aligned, k) for requirements, aligned in pairs)
     flown_pass, model_pass = (passes[k] for passes in corners)

@@ -48,25 +48,25 @@ class AcceptanceCondition:
     tolerance: float
 
 
-def acceptance_condition(requirements: RouteRequirements, i: int) -> AcceptanceCondition:
-    """Return the distance within which waypoint i is reached, and its source.
+def acceptance_condition(requirements: RouteRequirements, waypoint: int) -> AcceptanceCondition:
+    """Return the distance within which a waypoint is reached, and its source.
 
     The radius of the mission item applies, or else the autopilot's radius.  ArduPlane turns to the next leg at
-    WP_RADIUS if the corner is a right angle or sharper, and at a fraction of WP_RADIUS if the corner is gentler.  The
-    full WP_RADIUS is allowed at the mission's end and where a return to launch begins.
+    WP_RADIUS before a corner of 90 degrees or more, and at a fraction of WP_RADIUS before a gentler corner.  The full
+    WP_RADIUS is allowed at the mission's end and where a return to launch begins.
     """
-    setup, path_radius = requirements.setup, float(requirements.fly_by_offset[i]) + WAYPOINT_PASS_MARGIN_M
-    mission_radius = float(setup.route.points["acceptance_radius"][i])
+    setup, path_radius = requirements.setup, float(requirements.fly_by_offset[waypoint]) + WAYPOINT_PASS_MARGIN_M
+    mission_radius = float(setup.route.points["acceptance_radius"][waypoint])
     tolerance = position_error(setup) + CORNER_CUT_TOLERANCE_M[setup.scenario.wind.turbulence]
     if mission_radius > 0.0:
         return AcceptanceCondition(mission_radius, "mission", tolerance)
     if not setup.autopilot.turns.follows_path:
-        is_inner = 0 < i < requirements.legs and i != setup.route.rtl_start
-        turn = abs(float(requirements.turns[i])) if is_inner else math.pi
+        is_inner = 0 < waypoint < requirements.legs and waypoint != setup.route.rtl_start
+        turn = abs(float(requirements.turns[waypoint])) if is_inner else math.pi
         return AcceptanceCondition(
-            setup.autopilot.turns.distance(turn, float(requirements.points[i, 2])), "autopilot", tolerance
+            setup.autopilot.turns.distance(turn, float(requirements.points[waypoint, 2])), "autopilot", tolerance
         )
-    return AcceptanceCondition(path_radius, "fly-over" if setup.route.fly_over[i] else "fly-by path", 0.0)
+    return AcceptanceCondition(path_radius, "fly-over" if setup.route.fly_over[waypoint] else "fly-by path", 0.0)
 
 
 def position_error(setup: FlightSetup) -> float:
@@ -89,8 +89,8 @@ def corner_depths(requirements: RouteRequirements, leg: int) -> Floats:
 def corridor_limit(requirements: RouteRequirements, leg: int) -> tuple[float, str]:
     """Return the half width (m) of the corridor along a leg, and the name of its source.
 
-    A corridor that the scenario does not state is wide enough for the planned turns at the leg's ends.  At a loiter
-    that the autopilot joins and leaves by its center, the corridor includes the whole loiter and a turn back next to
+    Without a corridor in the scenario, the half width allows the planned turns at the leg's ends.  If the autopilot
+    steers to the center of a loiter at the leg's end, the corridor includes the whole loiter and a turn back next to
     it.
     """
     half_width = requirements.setup.corridor
@@ -110,7 +110,7 @@ def corridor_limit(requirements: RouteRequirements, leg: int) -> tuple[float, st
         arcs = requirements.setup.route.arc_radii[ends]
         tightest = requirements.min_radius[ends]
         turn_radius = float(np.where(np.isfinite(tightest), tightest, 0.0).max())
-        # A loiter too tight for the bank is as wide as the bank limit makes the aircraft swing, whatever its radius.
+        # In a loiter that is too tight for the bank limit, the aircraft swings as widely as the bank limit demands.
         loiter_radius = float(arcs.max())
         loiter_width = (
             loiter_radius
@@ -127,7 +127,8 @@ def corridor_limit(requirements: RouteRequirements, leg: int) -> tuple[float, st
 def farthest_from_legs(points: Floats, legs: Floats) -> tuple[float, int]:
     """Return the maximum horizontal distance (m) of any point from its nearest leg, and the point's row.
 
-    points: (n, 3).  legs: (k + 1, 3), the ends of k consecutive legs.
+    points: m, (n, 3).
+    legs: ends of k consecutive legs, m, (k + 1, 3).
 
     >>> legs = np.array([[0.0, 0.0, 0.0], [0.0, 100.0, 0.0], [100.0, 100.0, 0.0]])
     >>> farthest_from_legs(np.array([[5.0, 50.0, 0.0], [30.0, 60.0, 0.0], [50.0, 93.0, 0.0]]), legs)
@@ -146,18 +147,19 @@ def farthest_from_legs(points: Floats, legs: Floats) -> tuple[float, int]:
 # ----------------------------------------------------------------------
 # Corners and steps that no aircraft has to fly as drawn, because a path without them is practically the same.
 #
-# A sidestep of a few metres has two right angles and no room for either; the straight path past it is within metres of
-# both.  A step of a few metres in a level path is a cliff; a climb that begins a little early is within its height.
+# A sidestep of a few metres has two right angles without room for a turn, but a straight path passes within metres of
+# both.  A step of a few metres in altitude is a vertical leg, but a climb that begins a little early misses it only by
+# its height.
 
 
-def negligible_kink_distance(requirements: RouteRequirements, i: int) -> float | None:
-    """Return the distance of a flyable shortcut from the farthest waypoint that it omits, m.
+def negligible_kink_distance(requirements: RouteRequirements, waypoint: int) -> float | None:
+    """Return the largest distance of a flyable shortcut from the waypoints that it omits, m.
 
-    The shortcut omits waypoint i and up to `KINK_WAYPOINT_COUNT` - 1 of its neighbours.  Return None if there is no
+    The shortcut omits the waypoint and up to `KINK_WAYPOINT_COUNT` - 1 of its neighbours.  Return None if there is no
     such shortcut.
     """
     for count in range(1, KINK_WAYPOINT_COUNT + 1):
-        for first in range(max(1, i - count + 1), min(i, requirements.legs - count) + 1):
+        for first in range(max(1, waypoint - count + 1), min(waypoint, requirements.legs - count) + 1):
             ends = first, first + count - 1
             if ends not in requirements.shortcuts:
                 requirements.shortcuts[ends] = shortcut_distance(requirements, *ends)
@@ -167,8 +169,9 @@ def negligible_kink_distance(requirements: RouteRequirements, i: int) -> float |
 
 
 def shortcut_distance(requirements: RouteRequirements, first: int, last: int) -> float | None:
-    """Return the largest distance (m) of the waypoints first..last from the straight path that omits them.
+    """Return the distance of waypoints `first` to `last` from a straight path without them, m.
 
+    The distance is the largest one of these waypoints.
     Return None if the distance exceeds `KINK_FRACTION` of the corridor's half width, if a waypoint belongs to a loiter,
     if the path is vertical, or if there is no room for the turns at its ends.
     """
@@ -198,7 +201,7 @@ def _distance_from_leg(point: list[float], start: list[float], end: list[float])
 
 
 def _gap_has_room(requirements: RouteRequirements, first: int, last: int) -> bool:
-    """Return True if the route without the waypoints first..last has room for the turns at the gap."""
+    """Return True if the route without waypoints `first` to `last` has room for the turns around the gap."""
     previous_corner, next_corner = first - 1, last + 1
     if not (
         _turn_fits_alone(requirements, previous_corner - 1, previous_corner, next_corner)
@@ -219,9 +222,11 @@ def _gap_has_room(requirements: RouteRequirements, first: int, last: int) -> boo
 
 
 def _turn_fits_alone(requirements: RouteRequirements, before: int, corner: int, after: int) -> bool:
-    """Return True if the turn at a corner between two other waypoints fits their legs, without neighbouring turns.
+    """Return True if a turn between straight legs from and to two other waypoints fits these legs.
 
-    This necessary condition is ten times faster than `_gap_has_room`.  The first and last waypoint have no turn.
+    Neighbouring turns are ignored.  This necessary condition is ten times faster than the full check of
+    `_gap_has_room`.  The first and the last waypoint of the route have no turn.
+    before, corner, after: waypoints.
     """
     route = requirements.setup.route
     if not 0 < corner < requirements.legs:
@@ -249,7 +254,7 @@ def _turn_fits_alone(requirements: RouteRequirements, before: int, corner: int, 
 def _reduced_route(route: Route, waypoints: NDArray[np.int64]) -> Route:
     """Return the route reduced to some waypoints.
 
-    Each leg keeps the speed of the original leg that begins at the same waypoint.
+    Each new leg has the airspeed of the original leg that begins at the same waypoint.
     """
     points = route.points[waypoints]
     points["airspeed"][1:] = route.leg_airspeeds[waypoints[:-1]]
@@ -257,10 +262,11 @@ def _reduced_route(route: Route, waypoints: NDArray[np.int64]) -> Route:
 
 
 def step_height(requirements: RouteRequirements, leg: int) -> float | None:
-    """Return the height of a leg's step, m, positive, or None if it exceeds `NEGLIGIBLE_STEP_M`.
+    """Return the negligible altitude change of a leg beyond its slope limit, m; None if it is too large.
 
-    Call this for a leg that exceeds its slope limit.  If the leg is part of a sequence of legs that is too steep
-    overall, the sequence counts as one step, with the height of the whole sequence.
+    The change is positive, up or down.
+    A change up to `NEGLIGIBLE_STEP_M` is negligible.  If a sequence of legs around the leg is too steep overall, the
+    altitude change of the whole sequence counts.
     """
     limit, _ = slope_limit(requirements, leg)
     sign = 1.0 if requirements.slopes[leg] >= 0.0 else -1.0

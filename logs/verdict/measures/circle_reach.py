@@ -21,8 +21,7 @@ from world.arrays import Floats
 from world.kernels import Records
 from world.threats import threat_label
 
-# Minimum number of rings along which a disc is checked.  Between the minimum and the maximum, the distance of two rings
-# is the spacing of the terrain raster.
+# Minimum number of rings along which a disc is checked.  With more rings, their distance is the terrain's spacing.
 _MIN_RINGS = 24
 # Maximum number of rings along which a disc is checked.
 _MAX_RINGS = 120
@@ -35,7 +34,7 @@ _MAX_LEVELS = 12
 def find_hazards(
     requirements: RouteRequirements, center: Floats, min_altitude: float, max_altitude: float, reach: float
 ) -> list[str]:
-    """Describe the hazards within a distance of a center.
+    """Describe ground, missiles, zones and area edges within a distance of a center; [] without hazards.
 
     center: east and north, m, (2,).
     min_altitude, max_altitude: minimum and maximum altitude of the flight, m AMSL.
@@ -52,9 +51,8 @@ def find_hazards(
 def end_loiter_hazards(requirements: RouteRequirements) -> tuple[float, list[str]] | None:
     """Return the reach (m) of the loiter after the last waypoint, and texts on the hazards within reach.
 
-    The reach is the aircraft's maximum distance from that waypoint; it is infinite if the wind is too strong for the
-    loiter.  Return None if the autopilot does not loiter at the last waypoint, or if the mission does not end at a
-    plain waypoint.
+    The reach is the aircraft's maximum distance from that waypoint; inf if the wind is too strong for a loiter.  Return
+    None if the mission does not end at a plain waypoint, or if the autopilot does not loiter there.
     """
     setup, rules = requirements.setup, requirements.setup.autopilot.loiters
     if not rules.ends_in_circle or not ends_at_plain_waypoint(setup.route, setup.mission):
@@ -77,8 +75,9 @@ def _ground_hazards(
 
     Return [] without terrain.
 
-    center: center of the reach (east, north), m.  min_altitude, max_altitude: altitudes of the flight, m AMSL.
-    reach: maximum distance from the center, m.
+    center: east and north, m, (2,).
+    min_altitude, max_altitude: altitudes of the flight, m AMSL.
+    reach: maximum horizontal distance from the center, m.
     """
     terrain, limits = requirements.setup.scenario.terrain, requirements.setup.scenario.limits
     if terrain is None:
@@ -86,7 +85,7 @@ def _ground_hazards(
     rings = _ring_points(center, reach, terrain.spacing)
     clearances, _ = path_clearance(terrain.heights, terrain.to_pixel.record, _points_at_altitude(rings, min_altitude))
     hazards = []
-    # Points outside the known terrain are NaN.
+    # The clearance of segments over unknown ground is NaN.
     if np.isnan(clearances).any():
         hazards.append("the terrain is unknown")
     min_clearance = float(np.nanmin(clearances, initial=math.inf))
@@ -94,7 +93,7 @@ def _ground_hazards(
         ground_text = f"only {min_clearance:.0f} m below" if min_clearance >= 0.0 else f"{-min_clearance:.0f} m above"
         hazards.append(f"the ground is {ground_text} ({requirements.limits.min_clearance:.0f} m are required)")
     if limits.max_height_m is not None:
-        # The greatest height above ground is the least height above ground of the same world upside down.
+        # With ground and path turned upside down, the minimum clearance is the maximum height above ground.
         inverted_clearances, _ = path_clearance(
             -terrain.heights, terrain.to_pixel.record, _points_at_altitude(rings, -max_altitude)
         )
@@ -107,9 +106,11 @@ def _ground_hazards(
 def _missile_hazards(
     requirements: RouteRequirements, center: Floats, min_altitude: float, max_altitude: float, reach: float
 ) -> list[str]:
-    """Describe the missiles whose sphere overlaps the disc of radius `reach` between the two altitudes.
+    """Describe the missiles whose sphere overlaps a disc between two altitudes (m AMSL).
 
-    Return [] for an external mission, whose file contains no threats.
+    The disc has the radius `reach`, m.
+    Return [] for a mission without a scenario, because its threats are unknown.
+    center: east and north, m, (2,).
     """
     scenario = requirements.setup.scenario
     if scenario.external:
@@ -126,7 +127,11 @@ def _missile_hazards(
 def _zone_hazards(
     requirements: RouteRequirements, center: Floats, min_altitude: float, max_altitude: float, reach: float
 ) -> list[str]:
-    """Describe the zones that a flight within reach may violate, checked along rings at several altitudes."""
+    """Describe the zones that a flight within `reach` (m) of a center may violate.
+
+    The zones are checked along rings at several altitudes between two limits (m AMSL).
+    center: east and north, m, (2,).
+    """
     airspace = requirements.airspace
     if not airspace.zones:
         return []
@@ -163,9 +168,9 @@ def _area_hazards(requirements: RouteRequirements, center: Floats, reach: float)
 
 
 def _ring_points(center: Floats, reach: float, spacing: float) -> Floats:
-    """Return points on concentric rings that cover the circle of radius ``reach`` around a center, m, (n, 2).
+    """Return points on concentric rings that cover the disc of radius `reach` around a center, m, (n, 2).
 
-    spacing: desired distance between rings, m; the number of rings is clamped to `_MIN_RINGS`..`_MAX_RINGS`, and a
+    spacing: desired distance between rings, m.  The number of rings is limited to `_MIN_RINGS` to `_MAX_RINGS`; a
         spacing of 0 gives `_MIN_RINGS`.
     """
     count = min(_MAX_RINGS, max(_MIN_RINGS, math.ceil(reach / spacing) if spacing > 0.0 else _MIN_RINGS))
@@ -180,7 +185,7 @@ def _points_at_altitude(positions: Floats, altitude: float) -> Floats:
 
 
 def _straight_moves(points: Floats) -> Records:
-    """Return the n - 1 straight moves (dtype `MOVE`) between n consecutive points; each move lasts one second."""
+    """Return the n - 1 straight moves (dtype `MOVE`) between n points; each move lasts one second."""
     steps = np.diff(points, axis=0)
     lengths = np.hypot(steps[:, 0], steps[:, 1])
     moves: Records = np.zeros(len(steps), MOVE)

@@ -14,7 +14,7 @@ MAX_ENERGY_RATIO = 2.0
 
 
 def predicted_energy(requirements: RouteRequirements) -> tuple[float, float]:
-    """Predict the energy (Wh) and peak current (A) of steady flight along a route; NaN if the power is not known.
+    """Predict the energy (Wh) and peak current (A) of steady flight along a route; NaN without power data.
 
     Each leg is flown at its commanded airspeed, its slope over the ground in the mean wind, and its mean altitude.  The
     prediction leaves out turns and gusts, which take a few per cent more.
@@ -25,12 +25,15 @@ def predicted_energy(requirements: RouteRequirements) -> tuple[float, float]:
 
 
 def leg_energies(requirements: RouteRequirements) -> tuple[list[float], float]:
-    """Predict the energy (Wh) of steady flight on each leg, and the peak power (W); NaN if the power is not known."""
+    """Predict the energy of steady flight on each leg (Wh), and the peak power (W).
+
+    Both are NaN without power data.
+    """
     envelope, route = requirements.setup.envelope, requirements.route
     if not np.isfinite(requirements.ground_speed).all():
         return [math.nan] * requirements.legs, math.nan
     energies, peak_power = [], 0.0
-    # The legs of a loiter's laps are equal: compute the power of each only once.
+    # The laps of a loiter have equal legs, so each power is computed only once.
     power_at = cache(envelope.power)
     leg_durations = np.bincount(
         requirements.path.legs, weights=np.diff(requirements.path.times), minlength=requirements.legs
@@ -74,5 +77,7 @@ def reason_not_to_start(requirements: RouteRequirements) -> str:
         return ""
     energy_ratio = predicted_energy(requirements)[0] / setup.battery
     return (
-        f"not started: it takes {energy_ratio:.0f} times the energy carried" if energy_ratio > MAX_ENERGY_RATIO else ""
+        f"not started: the mission needs {energy_ratio:.0f} times the energy carried"
+        if energy_ratio > MAX_ENERGY_RATIO
+        else ""
     )

@@ -15,8 +15,8 @@ class GroundSlope(NamedTuple):
     """Part of a leg on which the ground that it follows rises more steeply than a limit.
 
     slope: mean slope of the part, rad.
-    length: m.
-    excess: height by which an aircraft that climbs at the limit is below the demand at the end of the part, m.
+    length: horizontal length of the part, m.
+    excess: height that an aircraft climbing at the limit lacks at the end of the part, m.
     """
 
     slope: float
@@ -32,7 +32,10 @@ def follows_ground(requirements: RouteRequirements, leg: int) -> bool:
 
 
 def mean_ground_slope(requirements: RouteRequirements, leg: int) -> float:
-    """Return the mean slope of the ground under a leg that follows it, rad; NaN for another leg or unknown ground."""
+    """Return the mean slope of the ground under a leg that follows it, rad; NaN for any other leg.
+
+    The slope is also NaN for unknown ground.
+    """
     terrain = requirements.setup.scenario.terrain
     if terrain is None or not follows_ground(requirements, leg):
         return math.nan
@@ -44,10 +47,9 @@ def mean_ground_slope(requirements: RouteRequirements, leg: int) -> float:
 def demanded_altitudes(requirements: RouteRequirements, leg: int, positions: Floats) -> Floats:
     """Return the altitudes demanded at positions on a leg that follows the ground, m AMSL, (n,).
 
-    The height above ground changes linearly along the leg, as in `flight.guidance.path.fly_by_path`.  The altitude is
-    NaN where the ground is unknown.
-
-    positions: (n, 2) or more columns, m.
+    The demanded height above ground changes linearly along the leg, as in `flight.guidance.path.fly_by_path`.  The
+    altitude is NaN where the ground is unknown.
+    positions: east and north, m, (n, 2); further columns are ignored.
     """
     terrain = requirements.setup.scenario.terrain
     if terrain is None:
@@ -63,10 +65,11 @@ def demanded_altitudes(requirements: RouteRequirements, leg: int, positions: Flo
 
 
 def steepest_ground(requirements: RouteRequirements, leg: int, limit: float) -> GroundSlope | None:
-    """Find where an aircraft limited to a climb slope (rad) falls furthest below a ground-following leg.
+    """Find the part of a ground-following leg on which an aircraft with a limited climb gets lowest.
 
-    The ground is sampled at steps of `GROUND_STEP_M`, as ArduPlane's terrain data.  Return None if every part of the
-    leg is within the limit, or if the ground or the limit is unknown.
+    The ground is sampled in steps of `GROUND_STEP_M`, like ArduPlane's terrain data.  Return None if no part of the leg
+    exceeds the limit, or if the ground or the limit is unknown.
+    limit: limit of the climb slope, rad.
     """
     start = requirements.points[leg, :2]
     unit = requirements.leg_unit(leg)
@@ -77,7 +80,7 @@ def steepest_ground(requirements: RouteRequirements, leg: int, limit: float) -> 
     distance, altitude = distance[is_known], altitude[is_known]
     if len(distance) < 2 or not math.isfinite(limit):
         return None
-    # Height above a path at the limit: its largest rise is the excess.
+    # Height of the leg above a climb at the limit.  Its largest rise is the height that the aircraft lacks.
     height = altitude - distance * math.tan(limit)
     rise = height - np.minimum.accumulate(height)
     end = int(np.argmax(rise))

@@ -28,7 +28,11 @@ _PIECE_LENGTH_M = 100.0
 
 
 class GroundPath(NamedTuple):
-    """Path of n points, m, (n, 3), and the horizontal distance to each point along the path, m, (n,)."""
+    """Path from or to the ground.
+
+    points: east, north and up, m, (n, 3).
+    distance: horizontal distance of each point along the path, m, (n,).
+    """
 
     points: Floats
     distance: Floats
@@ -68,7 +72,7 @@ def min_path_clearance(terrain: Terrain, path: GroundPath) -> tuple[float, float
     points = np.stack([np.interp(distances, path.distance, path.points[:, k]) for k in range(3)], axis=1)
     clearances = [terrain.clearance(*points[k : k + 2]) for k in range(len(distances) - 1)]
     heights = np.array([clearance for clearance, _ in clearances])
-    # A NaN takes precedence, unless the path hits known ground.
+    # `argmin` returns the first NaN if there is one, so unknown ground takes precedence.
     k = int(np.nanargmin(heights)) if (heights < 0.0).any() else int(np.argmin(heights))
     return float(heights[k]), float(distances[k] + clearances[k][1] * (distances[k + 1] - distances[k]))
 
@@ -113,7 +117,7 @@ def has_ground_paths(requirements: RouteRequirements) -> bool:
 
 
 def takeoff_item(requirements: RouteRequirements) -> tuple[int, MissionItem | None]:
-    """Return the first waypoint with a mission item, and this item if it is a take-off, otherwise None."""
+    """Return the first waypoint that has a mission item, and this item if it is a take-off, else None."""
     route = requirements.setup.route
     first = next((k for k, seq in enumerate(route.items.tolist()) if seq >= 0), 0)
     items = [item for item in requirements.setup.mission.items if item.seq == int(route.items[first])]

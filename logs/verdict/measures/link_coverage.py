@@ -14,9 +14,9 @@ _CELLS = 150
 
 @dataclass(frozen=True, slots=True)
 class FlightHeight:
-    """Height of a flight, at which its link is mapped.
+    """Height at which the radio link of a flight is mapped.
 
-    value: m.
+    value: height or altitude, m.
     is_above_ground: True for a height above ground, False for an altitude above mean sea level.
     """
 
@@ -75,7 +75,7 @@ def link_coverage(
 ) -> LinkCoverage:
     """Compute the margin of a radio link in every cell of a map.
 
-    In the ground and above unknown ground there is no margin (NaN).
+    The margin is NaN where the ground is unknown or above the aircraft.
 
     antenna: position of the station's antenna, m, (3,).
     extent: east and north range of the map, m.
@@ -88,8 +88,8 @@ def link_coverage(
     ground = terrain.height(grid_east, grid_north)
     altitudes = ground + height.value if height.is_above_ground else np.full(ground.shape, height.value)
     is_in_ground = altitudes <= ground
-    is_open = np.isfinite(ground) & ~is_in_ground
+    is_in_air = np.isfinite(ground) & ~is_in_ground
     margin = np.full(ground.shape, np.nan)
-    positions = np.column_stack([grid_east[is_open], grid_north[is_open], altitudes[is_open]])
-    margin[is_open] = link_margins(link, terrain, antenna, positions)
+    positions = np.column_stack([grid_east[is_in_air], grid_north[is_in_air], altitudes[is_in_air]])
+    margin[is_in_air] = link_margins(link, terrain, antenna, positions)
     return LinkCoverage(west, south, side, height, margin, is_in_ground)

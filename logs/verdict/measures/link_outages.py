@@ -17,7 +17,10 @@ LINK_INTERVAL_S = 1.0
 
 @dataclass(frozen=True, slots=True)
 class Outage:
-    """Period in which the link is below the fade margin.  start, end: s."""
+    """Period in which the link is below the fade margin.
+
+    start, end: s.
+    """
 
     start: float
     end: float

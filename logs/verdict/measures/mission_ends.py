@@ -40,7 +40,7 @@ def _last_seq(setup: FlightSetup) -> int:
 
 
 def _distance_to_destination(setup: FlightSetup) -> float:
-    """Return the distance from the end of a mission to the destination of its scenario, m."""
+    """Return the distance from the mission's last item on the route to the scenario's destination, m."""
     route = setup.route
     return math.dist(route.positions[route.items.tolist().index(_last_seq(setup))], setup.scenario.destination)
 
@@ -63,14 +63,14 @@ def unjudged_return_text(setup: FlightSetup) -> str:
 
 
 def missing_home_text(setup: FlightSetup) -> str:
-    """Explain that a missing home leaves the return after the last item unjudged; "" if it does not."""
+    """Explain that a return after the last item is not judged for lack of a home; otherwise ""."""
     if setup.mission.home is not None or not judges_return_after_last_item(setup):
         return ""
     return f"the mission has no home, to which {setup.autopilot.title} returns by itself after the last item"
 
 
 def judged_return_text(setup: FlightSetup) -> str:
-    """Explain why a return after the last item is judged, and how to end a mission without one."""
+    """Explain why a return after the last item is judged, and how to avoid this return."""
     remedy = "a landing or NAV_LOITER_UNLIM at the end prevents it"
     if setup.scenario.external:
         return f"{setup.autopilot.title} returns by itself after the last item; {remedy}"
@@ -106,6 +106,6 @@ def missing_ends_text(mission: Mission, limits: FeasibilityLimits) -> str:
 
 
 def _present_ends(has_takeoff: bool, has_landing: bool) -> str:
-    """Name which of take-off and landing a mission has, such as "a takeoff and a landing"."""
+    """Describe whether a mission has a take-off and a landing, such as "a takeoff and a landing"."""
     present = [name for name, is_present in (("a takeoff", has_takeoff), ("a landing", has_landing)) if is_present]
     return " and ".join(present) or "neither a takeoff nor a landing"

@@ -55,7 +55,7 @@ def move_point(move: Record, fraction: float) -> tuple[float, float, float]:
 def planned_moves(requirements: RouteRequirements, first: int = 0, last: int | None = None) -> Records:
     """Return the moves of a route's fly-by path, flown at each leg's ground speed.
 
-    If a leg has no ground speed, its airspeed is used.
+    The airspeed replaces the ground speed on a leg whose course cannot be held in the wind.
 
     first, last: first and last leg to return; by default all legs.
     """
@@ -151,7 +151,7 @@ def straight_moves(points: Floats, time: Floats) -> Records:
 
 
 # ----------------------------------------------------------------------
-# Blocks of consecutive moves, compiled: the moves of a block that stays clear of a zone need not be checked.
+# Blocks of consecutive moves, compiled.  If a block stays clear of a zone, its moves need not be checked.
 
 
 # Bounding box of a block on the map, its minimum and maximum altitude, and the steepest ground below it, m per m.
@@ -189,7 +189,7 @@ def move_blocks(
 
 @inner
 def _steepest_ground(block: Record, heights: Heights, to_pixel: PolyMapRecord, spacing: float) -> float:
-    """Return an upper bound on the slope of the bilinearly interpolated ground below a block, m per m; ignore NaN."""
+    """Return an upper bound on the slope of the interpolated ground below a block, m per m; ignore NaN."""
     rows, cols = heights.shape
     west, south = polymap(to_pixel, block.west, block.south)
     east, north = polymap(to_pixel, block.east, block.north)

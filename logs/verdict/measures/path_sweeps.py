@@ -19,14 +19,15 @@ from world.terrain import Terrain, path_clearances, segment_clearance
 
 # Number of segments that share one bounding box.
 _BLOCK_SEGMENTS = 256
-# Number of segments that are joined to one if their block is far (`SPHERE_FAR_DIAGONALS`) from a sphere's center.
+# Number of segments that are treated as one if their block is far (`SPHERE_FAR_DIAGONALS`) from a sphere's center.
 _JOINED_SEGMENTS = 16
 
 
 def path_clearance(heights: Heights, to_pixel: PolyMapRecord, points: Floats) -> tuple[Floats, Floats]:
-    """Return each segment's minimum height above ground (m), and where it occurs, (n - 1,) each.
+    """Return each segment's minimum height above ground (m) and its place, (n - 1,) each.
 
-    The place is a fraction of the segment.  Both are NaN if a segment leaves the raster or its data.
+    The place is a fraction of the segment.
+    The height is NaN if a segment leaves the terrain data; the fraction is then the place where it first does.
 
     points: ends of the segments, m, (n, 3).
     """
@@ -228,10 +229,10 @@ class Passage:
 
 
 def segment_clearances(terrain: Terrain, position: Floats) -> tuple[Floats, Floats]:
-    """Return each track segment's minimum height above ground (m), and where it occurs, (t - 1,) each.
+    """Return each track segment's minimum height above ground (m) and its place, (t - 1,) each.
 
-    The place is a fraction of the segment.  The height is NaN if the segment leaves the terrain data or has an
-    implausible end.
+    The place is a fraction of the segment.
+    The height is NaN if the segment leaves the terrain data or has an implausible end.
 
     position: m, (t, 3).
     """
@@ -281,7 +282,7 @@ def _is_plausible(position: Floats, k: int) -> bool:
 def _plausible_clearances(
     heights: Heights, to_pixel: PolyMapRecord, position: Floats
 ) -> tuple[Floats, Floats]:  # pragma: no cover
-    """Return each segment's clearance like `_path_clearances`, but NaN if an end is implausible."""
+    """Compute clearances like `_path_clearances`, but NaN for segments with an implausible end."""
     count = max(0, position.shape[0] - 1)
     clearance = np.full(count, math.nan)
     fraction = np.zeros(count)
@@ -295,10 +296,10 @@ def _plausible_clearances(
 def _sphere_windows(
     position: Floats, centre: Floats, radius: float
 ) -> tuple[Floats, Floats, Floats]:  # pragma: no cover
-    """Return each segment's minimum distance (m) from a center, and where it enters and leaves a sphere.
+    """Return each segment's minimum distance from a sphere's center (m), and its entry and exit.
 
-    The places are fractions of the segment.  For a segment with an implausible end, the distance is inf and both
-    fractions are 0.
+    Entry and exit are fractions of the segment, (t - 1,) each.  For a segment with an implausible end, the distance is
+    inf and both fractions are 0.
     """
     count = position.shape[0] - 1
     closest = np.full(count, math.inf)

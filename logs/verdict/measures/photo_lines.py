@@ -68,12 +68,12 @@ class LineMeasure:
 
     @property
     def ok(self) -> bool | None:
-        """True if enough of the line is usable, False if too much is lost, None if that depends on unknown ground."""
+        """True if enough of the line is usable, False if not, None if unknown ground decides."""
         return is_covered(self.usable, self.unknown)
 
 
 def is_covered(usable: float, unknown: float) -> bool | None:
-    """Return True if enough of a photo line is usable, False if not, None if that depends on unknown parts.
+    """Return True if enough of a photo line is usable, False if not, None if unknown parts decide.
 
     usable, unknown: fractions of the length of the line.
 
@@ -92,11 +92,15 @@ def lateral_tolerance(requirements: RouteRequirements, survey: Survey) -> float:
 
 @dataclass(frozen=True, slots=True)
 class _LineRows:
-    """Rows on which a line may have been flown.
+    """Rows of the track on which a photo line may have been flown.
 
-    position: (n, 3) m.  along, across: relative to the line, m.  is_ahead: True for each row that flies along it.
-    height_error, height_tolerance: error from the planned height above ground, and its tolerance, m.
-    conditions: for each cause of loss, True for each row that is free of it.
+    axis: the line.
+    track_rows: range of the n rows in the track.
+    position: m, (n, 3).
+    along, across: distance along the line and to its side, m, (n,).
+    is_ahead: True for each row that flies along the line, (n,).
+    height_error, height_tolerance: error from the planned height above ground, and its tolerance, m, (n,).
+    conditions: for each cause of loss, a mask (n,) that is True for the rows without this cause.
     """
 
     axis: LineAxis
@@ -113,7 +117,7 @@ class _LineRows:
 def _line_rows(
     requirements: RouteRequirements, aligned: AlignedTrack, survey: Survey, line: PhotoLine
 ) -> _LineRows | None:
-    """Return the rows on which a photo line may have been flown; None if it was not reached or has only one row."""
+    """Return the rows on which a photo line may have been flown; None for fewer than two rows."""
     axis = LineAxis(requirements.points[line.first : line.last + 1])
     window = _row_window(requirements, aligned, line)
     if window.stop - window.start < 2 or not aligned.passed[line.begins]:
@@ -126,7 +130,7 @@ def _line_rows(
     conditions = {
         "off_line": np.abs(across) <= lateral_tolerance(requirements, survey),
         "banked": np.abs(aligned.track.attitude[window, ROLL]) <= MAX_PHOTO_BANK_RAD,
-        # An unknown height error is not too large.
+        # An unknown height error (NaN) does not count as too large; the condition "unknown" handles it.
         "off_height": ~(np.abs(height_error) > height_tolerance),
         "camera_off": _camera_on_rows(requirements, line, axis, position, is_ahead),
         "unknown": np.isfinite(height_error),
@@ -137,7 +141,7 @@ def _line_rows(
 def measure_line(
     requirements: RouteRequirements, aligned: AlignedTrack, survey: Survey, line: PhotoLine
 ) -> LineMeasure | None:
-    """Measure a photo line on a flown track; return None if not reached, or with fewer than two rows."""
+    """Measure a photo line on a flown track; return None if it was not reached or has one row."""
     rows = _line_rows(requirements, aligned, survey, line)
     if rows is None:
         return None
@@ -147,7 +151,7 @@ def measure_line(
         meets_conditions, is_kept = meets_conditions & is_met, is_good
         is_good = _line_steps(along, meets_conditions, length)
         lost_fractions[name] = float(is_kept.mean()) - float(is_good.mean())
-    # `is_kept`: steps that are usable, or unknown.
+    # `is_kept` now marks the steps that are usable or unknown, because the last condition is "unknown".
     kept_steps = np.flatnonzero(is_kept)
     step = length / len(is_good)
     is_on_line = is_ahead & (along >= 0.0) & (along <= length)
@@ -187,7 +191,7 @@ def _runs_of_set_steps(is_set: Flags, step_length: float) -> tuple[tuple[float, 
 
 
 def _row_window(requirements: RouteRequirements, aligned: AlignedTrack, line: PhotoLine) -> slice:
-    """Return the rows from the waypoint before the line's straight run to the waypoint after it."""
+    """Return the rows from the waypoint before a photo line and its leads to the waypoint after them."""
     first, last = max(0, line.begins - 1), min(requirements.legs, line.ends + 1)
     return slice(int(aligned.rows[first]), int(aligned.rows[last]) + 1)
 
@@ -195,7 +199,11 @@ def _row_window(requirements: RouteRequirements, aligned: AlignedTrack, line: Ph
 def _height_errors(
     requirements: RouteRequirements, axis: LineAxis, position: Floats, along: Floats
 ) -> tuple[Floats, Floats]:
-    """Return each row's error from the planned height above ground, and its tolerance, m."""
+    """Return each row's error from the planned height above ground, and its tolerance, m, (n,) each.
+
+    position: m, (n, 3).
+    along: distance of each row along the line, m, (n,).
+    """
     planned_height = heights_over_ground(requirements, axis.points_at(along))
     tolerance = np.maximum(MIN_PHOTO_HEIGHT_ERROR_M, PHOTO_HEIGHT_FRACTION * planned_height)
     return heights_over_ground(requirements, position) - planned_height, tolerance
@@ -256,10 +264,12 @@ def _is_gate(requirements: RouteRequirements, waypoint: int) -> bool:
 
 
 def _line_steps(along: Floats, is_set: Flags, length: float) -> Flags:
-    """Return a mask of a photo line's steps: True for steps that the track touches between two set rows.
+    """Convert a mask of the track's rows to a mask of a photo line's steps of about `PHOTO_STEP_M`.
 
-    along: distance of each row along the line, m.
-    is_set: mask of the rows; only consecutive set rows count.
+    A step is True if the track touches it between two consecutive rows for which `is_set` is True.
+    along: distance of each row along the line, m, (n,).
+    is_set: mask of the rows, (n,).
+    length: length of the line, m.
     """
     count = max(1, math.ceil(length / PHOTO_STEP_M))
     in_both = is_set[:-1] & is_set[1:] & (np.diff(along) > 0.0)
@@ -285,7 +295,7 @@ def _count_photos(line: PhotoLine, is_taken: Flags, length: float, spacing: Floa
         return 0, 0
     count, step_count = int(length / line.photo) + 1, len(is_taken)
     photos_before_edge = np.concatenate([[0.0], np.cumsum(length / step_count / spacing)])
-    # A millionth of a photo is rounding.
+    # A deficit of a millionth of a photo is rounding.
     numbers = np.arange(int(photos_before_edge[-1] + 1e-6) + 1)
     steps = np.minimum(np.interp(numbers, photos_before_edge, np.arange(step_count + 1)).astype(int), step_count - 1)
     return count, count - int(np.count_nonzero(is_taken[steps]))
@@ -303,10 +313,10 @@ def _photo_spacing(mission: Mission, photo_spacing: float, speeds: Floats) -> Fl
 
 
 def _switch_row(requirements: RouteRequirements, aligned: AlignedTrack, waypoint: int) -> int:
-    """Return the row at which the items after a waypoint switch the camera.
+    """Return the row in which the items after a waypoint switch the camera.
 
-    At a gate it is the first row behind its plane.  Otherwise it is the row of the waypoint's passage, if no earlier
-    row is within the switching distance.
+    At a gate it is the first row behind the gate's plane.  Otherwise it is the first row within the switching distance,
+    or the row that passes the waypoint if there is none.
     """
     first, last = int(aligned.rows[max(0, waypoint - 1)]), int(aligned.rows[waypoint]) + 1
     offsets = aligned.track.position[first:last, :2] - requirements.points[waypoint, :2]
@@ -326,7 +336,7 @@ def count_flight_photos(requirements: RouteRequirements, aligned: AlignedTrack) 
 def _count_taken_photos(
     requirements: RouteRequirements, aligned: AlignedTrack, line: PhotoLine, rows: _LineRows
 ) -> int:
-    """Return the number of a flight's photos that are taken on a photo line, up to `PHOTO_STEP_M` beyond its ends."""
+    """Return the number of photos taken on a photo line, up to `PHOTO_STEP_M` beyond its ends."""
     photo_rows = _photo_rows(requirements, aligned, range(line.first, line.last)) - rows.track_rows.start
     photo_rows = photo_rows[(photo_rows >= 0) & (photo_rows < len(rows.along))]
     is_between_ends = (rows.along >= -PHOTO_STEP_M) & (rows.along <= rows.axis.length + PHOTO_STEP_M)
@@ -344,7 +354,7 @@ def _photo_rows(requirements: RouteRequirements, aligned: AlignedTrack, legs: ra
     spacings = camera_spacing(setup.mission, setup.route)[:-1].tolist()
     for spacing, group in itertools.groupby(range(len(spacings)), spacings.__getitem__):
         group_legs = list(group)
-        # A distance of NaN is not positive.
+        # The comparison is also False for a distance of NaN.
         if not spacing > 0.0 or not aligned.passed[group_legs[0]] or set(legs).isdisjoint(group_legs):
             continue
         rows = slice(
@@ -355,7 +365,7 @@ def _photo_rows(requirements: RouteRequirements, aligned: AlignedTrack, legs: ra
         lengths = np.hypot(*np.diff(track.position[rows, :2], axis=0).T)
         speeds = np.hypot(*track.velocity[rows, :2].T)[1:]
         photos_before_row = np.cumsum(lengths / _photo_spacing(setup.mission, spacing, speeds))
-        # A millionth of a photo is rounding.
+        # A deficit of a millionth of a photo is rounding.
         numbers = np.arange(int(photos_before_row[-1] + 1e-6) + 1)
         photo_rows.append(rows.start + np.searchsorted(np.concatenate([[0.0], photos_before_row]), numbers - 1e-6))
     return np.concatenate(photo_rows)
@@ -368,7 +378,7 @@ def _photo_rows(requirements: RouteRequirements, aligned: AlignedTrack, legs: ra
 
 @dataclass(frozen=True, slots=True)
 class OverlapMeasure:
-    """Minimum overlap of a survey's usable photos, as fractions of a photo; 0 if there is a gap between them.
+    """Minimum overlap of a survey's usable photos, as fractions of a photo; 0 for a gap between them.
 
     camera: the camera that takes them.
     front: overlap with the next photo on the line; None if the distance between photos is not stated, or none is
@@ -441,7 +451,10 @@ _SAME_POSITION_SPACINGS = 0.2
 class _Strip(NamedTuple):
     """Points of a photo line, with a flag for usable points.
 
-    positions: (n, 3) m.  heights: above ground, (n,) m.  speeds: over ground, (n,) m/s.
+    positions: m, (n, 3).
+    heights: heights above ground, m, (n,).
+    speeds: ground speeds, m/s, (n,).
+    is_usable: True for usable points, (n,).
     usable_fraction, unknown_fraction: fractions of the line's length with usable points, and over unknown ground.
     """
 
@@ -483,7 +496,7 @@ def measure_overlap(
         measure = replace(measure, min_height=float(heights.min()), max_height=float(heights.max()))
     measure = _with_side_overlap(measure, requirements, survey, kept_strips)
     if measure.side is None:
-        # No two lines that are not lost are neighbours: the usable parts of lost lines tell more than nothing.
+        # No two sufficiently usable lines are neighbours: use the usable parts of all lines.
         measure = _with_side_overlap(measure, requirements, survey, strips)
     return _with_front_overlap(measure, survey, strips)
 
@@ -524,7 +537,7 @@ def _line_strip(
 
 
 def _with_front_overlap(measure: OverlapMeasure, survey: Survey, strips: Sequence[_Strip | None]) -> OverlapMeasure:
-    """Return the measure with the minimum overlap along the lines."""
+    """Return a copy of the measure with the minimum front overlap, between successive photos on a line."""
     camera, lowest_overlap = measure.camera, math.inf
     for number, (line, strip) in enumerate(zip(survey.lines, strips, strict=True)):
         if strip is None or line.photo <= 0.0 or not strip.is_usable.any():
@@ -549,10 +562,10 @@ def _with_front_overlap(measure: OverlapMeasure, survey: Survey, strips: Sequenc
 
 
 def _overlaps(distances: Floats, width: float, heights: Floats) -> Floats:
-    """Return the overlap of photos at distances from each other, as fractions of a photo, (n,); negative for a gap.
+    """Return the overlaps of neighbouring photos as fractions of a photo, (n,); negative for a gap.
 
-    distances: m, (n,).
-    width: width of a photo in units of the height.
+    distances: distances between the photos, m, (n,).
+    width: width of a photo as a multiple of the height.
     heights: heights above ground, m, (n,); a photo from the ground shows nothing.
     """
     return 1.0 - distances / (width * np.maximum(heights, 1e-9))
@@ -561,7 +574,7 @@ def _overlaps(distances: Floats, width: float, heights: Floats) -> Floats:
 def _with_side_overlap(
     measure: OverlapMeasure, requirements: RouteRequirements, survey: Survey, strips: Sequence[_Strip | None]
 ) -> OverlapMeasure:
-    """Return the measure with the minimum overlap between neighbouring lines.
+    """Return a copy of the measure with the minimum side overlap, between photos of neighbouring lines.
 
     Two lines are neighbours if they run side by side, no other line lies between them (even one that was lost), and
     their distance is close to the survey's spacing.  A much larger distance spans a notch in the survey's area.
@@ -617,7 +630,10 @@ def _with_side_overlap(
 
 
 def _lateral_ranks(survey: Survey) -> NDArray[np.int64]:
-    """Return each line's rank by lateral offset, (n,); lines at the same offset share a rank."""
+    """Return each photo line's rank from one side of the survey to the other, (n,).
+
+    Lines at about the same offset share a rank.
+    """
     order, ranks = np.argsort(survey.offsets), np.zeros(len(survey.lines), dtype=np.int64)
     gaps = np.diff(np.array(survey.offsets)[order])
     ranks[order[1:]] = np.cumsum(gaps > _SAME_POSITION_SPACINGS * survey.spacing)

@@ -20,12 +20,14 @@ _MAH_PER_AH = 1000.0
 def longest_return_time(requirements: RouteRequirements, failsafe: ReturnTimeFailsafe) -> float:
     """Return an upper bound of the time of a return from anywhere on the mission, s.
 
-    The bound is the sum of four times: the delay of the failsafe; the path from the farthest place to the farthest
-    destination and through the longest landing sequence, against the strongest wind; the climb from the lowest place;
-    and the descent to the lowest destination.  A failsafe that follows the mission adds the length of the mission to
-    the path.
-
     Return inf if there is no destination, or if the wind is as fast as the aircraft.
+
+    The bound is the sum of four times:
+    - the delay of the failsafe;
+    - the longest path to a destination and through a landing sequence, against the strongest wind; a failsafe that
+      follows the mission adds the length of the mission;
+    - the climb from the lowest place;
+    - the descent to the lowest destination.
     """
     setup = requirements.setup
     whole_requirements = requirements if requirements.ground_phases is None else requirements.ground_phases.whole_route
@@ -39,7 +41,7 @@ def longest_return_time(requirements: RouteRequirements, failsafe: ReturnTimeFai
     speed = failsafe.airspeed - max(wind.max_speed_at(places[:, 2]) for wind in winds)
     if not home_and_rally or speed <= 0.0:
         return math.inf
-    # A landing without a DO_LAND_START is the last place.
+    # The last place covers a landing without DO_LAND_START.
     destinations = np.array(
         [*[end[:3] for end in home_and_rally], *[stop for stops in sequences for stop in stops], places[-1]]
     )
@@ -60,10 +62,10 @@ def _path_length(places: Floats) -> float:
 def remaining_time(
     requirements: RouteRequirements, failsafe: ReturnTimeFailsafe, energy: float, power_factor: float
 ) -> float:
-    """Return a lower bound of the battery time that the autopilot estimates, s; NaN if unknown.
+    """Return a lower bound of the remaining battery time that the autopilot estimates, s; NaN if unknown.
 
-    The autopilot divides the remaining charge by its average of the current in level flight.  A parameter sets the
-    initial value of this average (`Battery::computeRemainingTime`).
+    PX4 divides the remaining charge by its average of the current in level flight, whose initial value is a parameter
+    (`Battery::computeRemainingTime`).
 
     energy: energy used, Wh.
     power_factor: factor on the power of the aircraft's model.

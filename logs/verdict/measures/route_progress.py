@@ -21,18 +21,18 @@ from world.kernels import compiled, read_only
 
 Numbers = NDArray[np.int64]
 
-# Distance between neighbouring samples of route and track, m; larger if the table of costs would exceed `_MAX_CELLS`.
+# Distance between samples of route and track, m.  It is larger if the table of costs would exceed `_MAX_CELLS`.
 _SAMPLE_SPACING_M = 20.0
 # Largest number of cells of the table of costs.
 _MAX_CELLS = 16_000_000
-# The row nearest to a waypoint may lie this far before or after the rows along its two legs, m of track.
+# Length of track before and after the rows along a waypoint's two legs in which the nearest row is also searched, m.
 _WINDOW_MARGIN_M = 300.0
 # Cost of a part of the route to which no part of the track is matched, as a fraction of its squared distance.
 _SKIP_FRACTION = 0.1
 # Distance whose square is added to the cost of a skipped part of the route, m.
 _SKIP_DISTANCE_M = 15.0
-# Distance whose square is the cost of each route sample before the start, m: a flight that may begin anywhere on the
-# route then begins at the earliest of equally near samples.
+# Distance whose square is the cost of each route sample before the start, m.  A flight that may begin anywhere on the
+# route thus begins at the earliest of equally near samples.
 _LATE_START_M = 1.0
 # Largest distance of a flown loiter from its drawn circle, m; the number of laps does not matter here.
 _LOITER_MARGIN_M = 60.0
@@ -62,7 +62,7 @@ class _Samples:
     positions: m, (m, 2).
     radii: radius within which each sample is reached, m, (m,); 0 on a leg, the reach of the circle for a loiter.
     distances: distance from the route's start, m, (m,).
-    sample_of_waypoint: number of each waypoint's sample, (w,); the corners of a loiter share one sample.
+    sample_of_waypoint: index of each waypoint's sample, (w,); the corners of a loiter share one sample.
     """
 
     positions: Floats
@@ -72,7 +72,7 @@ class _Samples:
 
 
 def route_progress(route: Route, position: Floats, *, anywhere: bool) -> RouteProgress:
-    """Match a track to a route.
+    """Match a track to a route by positions alone, and return its progress along the route.
 
     position: positions in at least two usable rows, m, (t, 3).
     anywhere: True if the track may begin anywhere on the route, like a part of an imported log; False if it begins at
@@ -105,16 +105,18 @@ def route_progress(route: Route, position: Floats, *, anywhere: bool) -> RoutePr
     while target + 1 < count and samples.sample_of_waypoint[target + 1] == samples.sample_of_waypoint[target]:
         target += 1
     first, last = np.full(count, len(distance_run)), np.full(count, -1)
-    for i in range(target + 1):
-        sample = int(samples.sample_of_waypoint[i])
+    for waypoint in range(target + 1):
+        sample = int(samples.sample_of_waypoint[waypoint])
         earlier_samples = samples.sample_of_waypoint[samples.sample_of_waypoint < sample]
         later_samples = samples.sample_of_waypoint[samples.sample_of_waypoint > sample]
         first_sample = int(earlier_samples[-1]) if earlier_samples.size else 0
         last_sample = min(final_sample, int(later_samples[0]) if later_samples.size else len(samples.distances) - 1)
         matched_samples = np.flatnonzero(ends[first_sample : last_sample + 1, 0] >= 0) + first_sample
         if matched_samples.size:
-            first[i] = np.searchsorted(distance_run, distance_run[begin_rows[matched_samples[0]]] - _WINDOW_MARGIN_M)
-            last[i] = (
+            first[waypoint] = np.searchsorted(
+                distance_run, distance_run[begin_rows[matched_samples[0]]] - _WINDOW_MARGIN_M
+            )
+            last[waypoint] = (
                 np.searchsorted(
                     distance_run, distance_run[end_rows[matched_samples[-1]]] + _WINDOW_MARGIN_M, side="right"
                 )
@@ -130,10 +132,14 @@ def _sample_route(route: Route, spacing: float) -> _Samples:
     positions, radii, distances = [points[:1]], [np.zeros(1)], [np.zeros(1)]
     sample_of_waypoint = np.zeros(len(points), dtype=np.int64)
     sample_count = 1
-    for i in range(1, len(points)):
-        start, end = points[i - 1], points[i]
-        if route.arc_radii[i] > 0.0 and route.arc_radii[i - 1] > 0.0 and route.stops[i] == route.stops[i - 1]:
-            sample_of_waypoint[i] = sample_of_waypoint[i - 1]
+    for waypoint in range(1, len(points)):
+        start, end = points[waypoint - 1], points[waypoint]
+        if (
+            route.arc_radii[waypoint] > 0.0
+            and route.arc_radii[waypoint - 1] > 0.0
+            and route.stops[waypoint] == route.stops[waypoint - 1]
+        ):
+            sample_of_waypoint[waypoint] = sample_of_waypoint[waypoint - 1]
             continue
         length = math.dist(start, end)
         count = max(1, math.ceil(length / spacing))
@@ -142,24 +148,24 @@ def _sample_route(route: Route, spacing: float) -> _Samples:
         radii.append(np.zeros(count))
         distances.append(distances[-1][-1] + fractions * length)
         sample_count += count
-        sample_of_waypoint[i] = sample_count - 1
-        if route.arc_radii[i] > 0.0:
+        sample_of_waypoint[waypoint] = sample_count - 1
+        if route.arc_radii[waypoint] > 0.0:
             corners = [
                 k
-                for k in range(i, len(points))
-                if route.stops[k] == route.stops[i] and route.arc_radii[i : k + 1].all()
+                for k in range(waypoint, len(points))
+                if route.stops[k] == route.stops[waypoint] and route.arc_radii[waypoint : k + 1].all()
             ]
             positions[-1][-1], radii[-1][-1] = _loiter_center(route, corners)
     return _Samples(np.concatenate(positions), np.concatenate(radii), np.concatenate(distances), sample_of_waypoint)
 
 
 def _loiter_center(route: Route, waypoints: Sequence[int]) -> tuple[Floats, float]:
-    """Return the center of a loiter, m, (2,), and the radius around it within which the loiter is flown, m.
+    """Return the center of a loiter, m, (2,), and the radius within which it is flown, m.
 
     waypoints: waypoints at the loiter's corners.
     """
     loiter_circle = rtl_arrival_circle(route)
-    # The arcs of an RTL before its last one are turns on the way to its loiter.
+    # Only the last arcs of an RTL are its loiter; earlier arcs are turns.
     is_rtl_loiter = (
         waypoints[0] in rtl_waypoints(route) and not route.arc_radii[waypoints[-1] + 1 : route.rtl_end].any()
     )
@@ -192,15 +198,15 @@ def rtl_arrival_circle(route: Route) -> tuple[Floats, float] | None:
 
 @compiled
 def _match_rows(track: Floats, samples: Floats, radii: Floats, capture: float, anywhere: bool) -> Numbers:
-    """Match the rows of a track to the samples of a route at the lowest total cost, without going back.
+    """Match the rows of a track to the samples of a route, both in order, at the lowest total cost.
 
-    The cost of a row is min(distance, capture)^2; the cost of a skipped sample is `_SKIP_FRACTION` of this cost plus
-    `_SKIP_DISTANCE_M`^2.  Of equally good ends the earliest is taken.
-
+    The cost of a row is min(distance, capture)^2.  The cost of a skipped sample is `_SKIP_FRACTION` of this cost plus
+    `_SKIP_DISTANCE_M`^2.  If several ends have the same cost, the earliest is taken.
     track: positions, m, (n, 2).
     samples, radii: route samples, m, (m, 2), and the radii within which they are reached, m, (m,).
+    anywhere: True if the track may begin at any sample; False if it begins at the first.
 
-    Returns the first and the last row at each sample, (m, 2); -1 for samples before the track's start or after its end.
+    Return the first and the last row at each sample, (m, 2); -1 for samples before the track's start or after its end.
     """
     rows, count = track.shape[0], samples.shape[0]
     moves = np.zeros((rows, count), dtype=np.uint8)

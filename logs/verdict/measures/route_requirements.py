@@ -42,7 +42,7 @@ from world.wind import Wind
 # The zones by which a flight is judged: the scenario's zones, then the zones of the mission's own fence.
 
 
-# Margin about the boxes of straight pieces, m: arcs leave their chords by far less.
+# Margin around the bounding boxes of straight pieces, m; an arc deviates from its chord by far less.
 _BOX_MARGIN_M = 10.0
 
 
@@ -97,14 +97,14 @@ def judged_airspace(setup: FlightSetup) -> Airspace:
         stated_zones = fence_zones(setup.mission.fences, setup.scenario.origin, "the mission")
         unites = setup.autopilot.checks.unites_inclusions
         mission_zones = unite_inclusions(stated_zones) if unites else stated_zones
-    # A union may have more corners than a zone may have.
+    # ValueError: a union of zones may have more corners than a zone may have.
     except (MissionError, ValueError) as error:
         fence_fault = str(error)
     zones = (*setup.scenario.zones, *mission_zones) if mission_zones else setup.scenario.zones
     return Airspace(zones, _cached_records(zones), fence_fault, len(setup.scenario.zones))
 
 
-# The zones that were used last, because converting a thousand zones takes longer than judging them.
+# Zones converted last and their records: converting a thousand zones takes longer than judging them.
 _last_records: list[tuple[tuple[Zone, ...], ZoneRecords]] = []
 
 
@@ -155,7 +155,7 @@ class TurnRequirements:
     limit: Floats
 
 
-# Performance of the aircraft by leg and airspeed, m/s.
+# Function that returns the aircraft's performance on a leg at an airspeed, m/s.
 LegPerformance = Callable[[int, float], PerformanceTable]
 
 
@@ -189,19 +189,24 @@ def find_leg_winds(setup: FlightSetup, route: Route) -> tuple[Wind, ...]:
 
 
 def turn_requirements(route: Route, performance: LegPerformance) -> TurnRequirements:
-    """Compute the length that each turn uses, from the aircraft's performance at the route's airspeeds."""
+    """Compute each turn's radius and length, and the sharpest turn that fits there.
+
+    performance: aircraft's performance on a leg at an airspeed.
+    """
     points = route.positions
     courses, runs, count = leg_courses(points), leg_runs(points), len(points)
     turns = np.zeros(count)
     if count > 2:
         turns[1:-1] = signed_turns(points)
     min_radius, radius, length_before, length_after = (np.zeros(count) for _ in range(4))
-    for i in range(1, count - 1):
-        speed = float(max(route.leg_airspeeds[i - 1], route.leg_airspeeds[i]))
-        min_radius[i] = turn_radius_between(performance(i, speed), courses[i - 1], courses[i], points[i, 2])
-        radius[i] = route.arc_radii[i] or min_radius[i]
-        length_before[i], length_after[i] = turn_lengths(
-            abs(float(turns[i])), float(radius[i]), bool(route.fly_over[i])
+    for waypoint in range(1, count - 1):
+        speed = float(max(route.leg_airspeeds[waypoint - 1], route.leg_airspeeds[waypoint]))
+        min_radius[waypoint] = turn_radius_between(
+            performance(waypoint, speed), courses[waypoint - 1], courses[waypoint], points[waypoint, 2]
+        )
+        radius[waypoint] = route.arc_radii[waypoint] or min_radius[waypoint]
+        length_before[waypoint], length_after[waypoint] = turn_lengths(
+            abs(float(turns[waypoint])), float(radius[waypoint]), bool(route.fly_over[waypoint])
         )
     reversal = _reversal_lengths(route, performance, courses, turns, radius, points[:, 2])
     limit = _sharpest_turns(route, runs, min_radius, length_before, length_after, reversal)
@@ -214,7 +219,8 @@ def turn_lengths(turn: float, radius: float, fly_over: bool) -> tuple[float, flo
     A fly-over uses only the leg after its waypoint.  Both lengths are 0 without a turn, and infinite for a fly-by with
     a turn larger than `U_TURN_RAD`.
 
-    radius: turn radius, m.  fly_over: True if the turn begins only at its waypoint.
+    radius: turn radius, m.
+    fly_over: True if the turn begins only at its waypoint.
     """
     if turn < 1e-9:
         return 0.0, 0.0
@@ -229,9 +235,10 @@ def turn_lengths(turn: float, radius: float, fly_over: bool) -> tuple[float, flo
 def _reversal_lengths(
     route: Route, performance: LegPerformance, courses: Floats, turns: Floats, radius: Floats, up: Floats
 ) -> Floats:
-    """Return the length that the roll between opposite banks uses on each leg, m, (w - 1,).
+    """Return the length that the roll between turns to opposite sides uses on each leg, m, (w - 1,).
 
     The length is 0 between turns to the same side.
+    radius, up: radius of the turn at each waypoint and altitude of the waypoint, m, (w,).
     """
     lengths = np.zeros(len(courses))
     for leg in range(1, len(courses) - 1):
@@ -247,16 +254,18 @@ def _reversal_lengths(
 
 
 def available_lengths(
-    runs: Floats, length_before: Floats, length_after: Floats, reversal: Floats, i: int
+    runs: Floats, length_before: Floats, length_after: Floats, reversal: Floats, waypoint: int
 ) -> tuple[float, float]:
-    """Return the lengths (m) of the legs before and after waypoint i that its turn may use.
+    """Return the lengths (m) of the legs before and after a waypoint that its turn may use.
 
-    Each turn may use at least half of a leg.  If the leg is too short for both of its turns, a turn that needs more
-    than half of it is at fault.
+    Each turn may use at least half of a leg.  On a leg too short for both of its turns, a turn that needs more than
+    half of the leg thus has the fault.
+    runs, reversal: length of each leg, and the length that the roll between opposite turns uses, m, (w - 1,).
+    length_before, length_after: lengths that the turn at each waypoint uses, m, (w,).
     """
     return (
-        max(runs[i - 1] - length_after[i - 1], 0.5 * runs[i - 1]) - reversal[i - 1],
-        max(runs[i] - length_before[i + 1], 0.5 * runs[i]) - reversal[i],
+        max(runs[waypoint - 1] - length_after[waypoint - 1], 0.5 * runs[waypoint - 1]) - reversal[waypoint - 1],
+        max(runs[waypoint] - length_before[waypoint + 1], 0.5 * runs[waypoint]) - reversal[waypoint],
     )
 
 
@@ -265,23 +274,24 @@ def _sharpest_turns(
 ) -> Floats:
     """Return the sharpest turn at each waypoint that fits between the neighbouring turns, (w,) rad."""
     limits = np.full(len(min_radius), math.pi)
-    for i in range(1, len(min_radius) - 1):
-        if not math.isfinite(min_radius[i]):
-            limits[i] = 0.0
+    for waypoint in range(1, len(min_radius) - 1):
+        if not math.isfinite(min_radius[waypoint]):
+            limits[waypoint] = 0.0
             continue
-        length_before, length_after = available_lengths(runs, lengths_before, lengths_after, reversal, i)
-        if route.fly_over[i]:
-            limits[i] = sharpest_fly_over_turn(length_after / min_radius[i])
+        length_before, length_after = available_lengths(runs, lengths_before, lengths_after, reversal, waypoint)
+        if route.fly_over[waypoint]:
+            limits[waypoint] = sharpest_fly_over_turn(length_after / min_radius[waypoint])
         else:
-            limits[i] = 2.0 * math.atan(min(length_before, length_after) / min_radius[i])
+            limits[waypoint] = 2.0 * math.atan(min(length_before, length_after) / min_radius[waypoint])
     return limits
 
 
 def sharpest_fly_over_turn(radii: float) -> float:
-    """Return the sharpest fly-over turn (rad) that fits a leg of a given length, in turn radii.
+    """Return the sharpest fly-over turn that fits the leg after its waypoint, rad.
 
-    The turn uses only the leg after its waypoint.  This is the inverse of `fly_over_run`.  With half the turn h and z =
-    (cos h + sqrt(1 + cos^2 h))^2, the square of the length is 6 z - z^2 - 1.
+    This is the inverse of `fly_over_run`.
+    With half the turn h and z = (cos h + sqrt(1 + cos^2 h))^2, the square of the length is 6 z - z^2 - 1.
+    radii: length of the leg in turn radii.
 
     >>> round(math.degrees(sharpest_fly_over_turn(fly_over_run(math.radians(70.0)))), 6)
     70.0
@@ -296,11 +306,11 @@ def sharpest_fly_over_turn(radii: float) -> float:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlannedPath:
-    """Fly-by path as a chain of n points.
+    """Fly-by path as a polyline of n points.
 
-    points: (n, 3) m.
-    legs: (n - 1,) leg of each segment.
-    times: (n,) s at which each point is passed.
+    points: m, (n, 3).
+    legs: leg of each segment, (n - 1,).
+    times: planned time at each point, s, (n,).
     """
 
     points: Floats
@@ -424,7 +434,7 @@ class RouteRequirements:
 
     def leg(self, index: int) -> Place:
         """Return the place of a finding on a leg, with the item to which the leg leads."""
-        # As in `Route.leg_numbers`, which is too slow to compute for each leg of a long mission.
+        # This is `Route.leg_numbers[index]`, but that property is too slow to read for each leg of a long mission.
         number = max(int(self.setup.route.stops[index + 1]) - 1, 0)
         return Place("leg", index, to_item=self._item_number(index + 1), number=number)
 
@@ -434,22 +444,27 @@ class RouteRequirements:
         return None if item < 0 else item
 
     def turnaround_waypoints(self) -> set[int]:
-        """Return the waypoints of the turn-arounds of all surveys, including ends, entries and exits.
+        """Return the waypoints of the turnarounds of all surveys, including ends, entries and exits.
 
-        The autopilot decides the path of a turn-around.
+        The autopilot decides the path of a turnaround.
         """
-        return {i for survey in self.surveys for first, last in survey.transitions() for i in range(first, last + 1)}
+        return {
+            waypoint
+            for survey in self.surveys
+            for first, last in survey.transitions()
+            for waypoint in range(first, last + 1)
+        }
 
     def turnaround_legs(self) -> set[int]:
-        """Return the legs of the turn-arounds of all surveys, including entries and exits."""
-        return {i for survey in self.surveys for first, last in survey.transitions() for i in range(first, last)}
+        """Return the legs of the turnarounds of all surveys, including entries and exits."""
+        return {leg for survey in self.surveys for first, last in survey.transitions() for leg in range(first, last)}
 
     def leg_unit(self, leg: int) -> Floats:
         """Return the unit vector (east, north) of a leg's course, (2,)."""
         return np.array([math.sin(self.courses[leg]), math.cos(self.courses[leg])])
 
     def straight_start(self, leg: int) -> Floats:
-        """Return the point where a leg leaves a loiter's circle, or its first waypoint without a loiter, (3,) m.
+        """Return the point where a leg leaves a loiter's circle, or else its first waypoint, (3,) m.
 
         The waypoints of a loiter are corners outside its circle; the leg leaves the circle at a tangent point.
         """
@@ -463,20 +478,22 @@ class RouteRequirements:
         return max(0.0, run - float(self.length_after[leg])) if self.setup.route.arc_radii[leg] > 0.0 else run
 
     def apexes(self) -> Floats:
-        """Return the points at which the fly-by path passes each waypoint: the midpoints of the arcs, (w, 3) m."""
+        """Return the midpoints of the fly-by arcs, where the path passes each waypoint, (w, 3) m."""
         apexes = self.points.copy()
-        for i in range(1, len(apexes) - 1):
-            if self.fly_by_offset[i] > 0.0:
-                inward = self.leg_unit(i) - self.leg_unit(i - 1)
-                apexes[i, :2] += self.fly_by_offset[i] * inward / math.hypot(*inward)
-                # Halfway between the altitudes at the arc's ends.
-                tangent = min(self.length_before[i], self.runs[i - 1], self.runs[i])
-                apexes[i, 2] += 0.5 * tangent * (math.tan(self.slopes[i]) - math.tan(self.slopes[i - 1]))
+        for waypoint in range(1, len(apexes) - 1):
+            if self.fly_by_offset[waypoint] > 0.0:
+                inward = self.leg_unit(waypoint) - self.leg_unit(waypoint - 1)
+                apexes[waypoint, :2] += self.fly_by_offset[waypoint] * inward / math.hypot(*inward)
+                # The altitude is halfway between the altitudes at the ends of the arc.
+                tangent = min(self.length_before[waypoint], self.runs[waypoint - 1], self.runs[waypoint])
+                apexes[waypoint, 2] += (
+                    0.5 * tangent * (math.tan(self.slopes[waypoint]) - math.tan(self.slopes[waypoint - 1]))
+                )
         return apexes
 
 
 def route_requirements(setup: FlightSetup, *, envelope: bool = True) -> RouteRequirements:
-    """Compute the requirements of a setup's route.
+    """Compute the requirements of a setup's route, and the aircraft's limits on each turn and leg.
 
     envelope: False to judge by the flight alone, without the aircraft's limits.
     """
@@ -530,7 +547,7 @@ def route_requirements(setup: FlightSetup, *, envelope: bool = True) -> RouteReq
 
 
 def _possible_bank(setup: FlightSetup) -> float:
-    """Return the largest bank limit that may apply, rad: the setup's unless the aircraft's limit is a guess."""
+    """Return the largest bank limit that may apply, rad: more than the setup's only if that is a guess."""
     envelope, stated_bank = setup.envelope, setup.scenario.flight.max_bank_deg
     if not envelope.bank_guessed or setup.max_bank < envelope.max_bank:
         return setup.max_bank
@@ -538,17 +555,17 @@ def _possible_bank(setup: FlightSetup) -> float:
     return min(POSSIBLE_BANK_RAD, setup.autopilot.turns.max_bank, other_limit)
 
 
-# The setups whose surveys were searched last, with these surveys: several parts of one verdict need them.
+# Setups whose surveys were searched last, and these surveys, which several parts of one verdict need.
 _last_surveys: list[tuple[FlightSetup, tuple[Survey, ...]]] = []
 # Number of setups whose surveys are kept.
 _MAX_KEPT_SURVEYS = 4
 
 
 def judged_surveys(setup: FlightSetup) -> tuple[Survey, ...]:
-    """Return the surveys of a setup's mission that are judged by their lines, cached for the last setups.
+    """Return the surveys of a setup's mission whose photo lines are judged, cached for the last setups.
 
-    A plan made by planfly has no surveys.  In other missions, these are the surveys that switch the camera; if the
-    scenario states "lines", all legs that form a survey pattern.
+    A plan made by planfly has no surveys.  In other missions, these are the surveys that switch the camera.  If the
+    scenario states `surveys = "lines"`, all legs that form a survey pattern are included.
     """
     for cached_setup, surveys in tuple(_last_surveys):
         if cached_setup is setup:
@@ -559,10 +576,9 @@ def judged_surveys(setup: FlightSetup) -> tuple[Survey, ...]:
 
 
 def _search_surveys(setup: FlightSetup) -> tuple[Survey, ...]:
-    """Find the surveys of a setup's mission that are judged by their photo lines.
+    """Find the surveys of a setup's mission whose photo lines are judged; see `judged_surveys`.
 
-    There are none in a flight of a plan, or if the scenario's limits state `surveys = "path"`.  With "lines" every
-    survey is judged; otherwise only surveys with a camera are.
+    There are none in a flight of a plan, or if the scenario's limits state `surveys = "path"`.
     """
     mode = setup.scenario.limits.surveys
     if setup.plan is not None or mode == "path":
@@ -581,7 +597,7 @@ def _search_surveys(setup: FlightSetup) -> tuple[Survey, ...]:
 def true_airspeed_route(setup: FlightSetup) -> Route:
     """Return a setup's route with the true airspeeds that are demanded in flight.
 
-    ArduPlane's airspeeds are equivalent: they are converted at each leg's mean altitude.
+    ArduPlane's commands are equivalent airspeeds, which are converted at each leg's mean altitude.
 
     >>> from flight.autopilots.arduplane.autopilot import ArduPlane
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
@@ -603,9 +619,9 @@ def true_airspeed_route(setup: FlightSetup) -> Route:
 
 
 def _planned_path(path: FlyByPath, route: Route, ground_speed: Floats) -> PlannedPath:
-    """Return the fly-by path as a chain of points, with the time at each point.
+    """Return the fly-by path as a polyline, with the time at each point.
 
-    ground_speed: ground speed on each leg, m/s; on a leg without a finite one, the leg's airspeed is used.
+    ground_speed: ground speed on each leg, m/s; the leg's airspeed replaces a value that is not finite.
     """
     points, legs = path_polyline(path)
     speed = np.where(np.isfinite(ground_speed), ground_speed, route.leg_airspeeds)
@@ -637,9 +653,11 @@ def _leg_limits(
 def _fly_by_offsets(route: Route, turns: TurnRequirements) -> Floats:
     """Return the distance at which the fly-by path passes each waypoint, (w,) m."""
     offsets = np.zeros(len(turns.radius))
-    for i in np.flatnonzero(np.isfinite(turns.radius) & ~route.fly_over).tolist():
-        radius = float(turns.radius[i])
-        offsets[i] = min(fly_by_offset(abs(float(turns.turns[i])), radius), MAX_FLY_BY_OFFSET_RADII * radius)
+    for waypoint in np.flatnonzero(np.isfinite(turns.radius) & ~route.fly_over).tolist():
+        radius = float(turns.radius[waypoint])
+        offsets[waypoint] = min(
+            fly_by_offset(abs(float(turns.turns[waypoint])), radius), MAX_FLY_BY_OFFSET_RADII * radius
+        )
     return offsets
 
 
@@ -651,28 +669,29 @@ def _blend_lengths(setup: FlightSetup, route: Route, points: Floats, runs: Float
     slopes = np.diff(points[:, 2]) / np.maximum(runs, 1.0)
     blend = np.zeros(len(points))
     speed = float(route.leg_airspeeds.max()) + setup.scenario.wind.max_speed_at(points[:, 2])
-    for i in range(1, len(points) - 1):
-        slope_changes = [abs(slopes[i] - slopes[i - 1])]
-        turn = abs(float(turns.turns[i]))
-        arc = float(turns.radius[i]) * turn if turn > 0.0 else 0.0
-        if 0.0 < arc < math.inf and math.isfinite(turns.length_after[i]) and not setup.route.fly_over[i]:
+    for waypoint in range(1, len(points) - 1):
+        slope_changes = [abs(slopes[waypoint] - slopes[waypoint - 1])]
+        turn = abs(float(turns.turns[waypoint]))
+        arc = float(turns.radius[waypoint]) * turn if turn > 0.0 else 0.0
+        if 0.0 < arc < math.inf and math.isfinite(turns.length_after[waypoint]) and not setup.route.fly_over[waypoint]:
             # The arc is shorter than its two tangents, so that its slope is steeper than the slopes of the legs.
-            arc_slope_ = (slopes[i - 1] + slopes[i]) * turns.length_after[i] / arc
-            slope_changes = [abs(arc_slope_ - slopes[i - 1]), abs(arc_slope_ - slopes[i])]
-        blend[i] = max(slope_changes) * speed**2 / (2.0 * BLEND_ACCELERATION)
+            arc_slope_ = (slopes[waypoint - 1] + slopes[waypoint]) * turns.length_after[waypoint] / arc
+            slope_changes = [abs(arc_slope_ - slopes[waypoint - 1]), abs(arc_slope_ - slopes[waypoint])]
+        blend[waypoint] = max(slope_changes) * speed**2 / (2.0 * BLEND_ACCELERATION)
     return blend
 
 
 # ----------------------------------------------------------------------
-# The tighter of the scenario's limit and the aircraft's limit at each turn, leg and fly-by arc.
+# Limit at each turn, leg and fly-by arc: the lower of the scenario's limit and the aircraft's limit.
 
 
 @dataclass(frozen=True, slots=True)
 class SteepArc:
     """Fly-by arc that is steeper than the aircraft can climb or sink.
 
-    tangent: tangent of the arc's slope.  limit: tangent of the aircraft's limit, averaged over both legs' courses;
-    positive.  missing_height: height by which a climb or descent at the limit misses the arc's end, m.
+    tangent: tangent of the arc's slope.
+    limit: tangent of the aircraft's limit, positive; mean of the limits on both legs.
+    missing_height: height by which a climb or descent at the limit misses the arc's end, m.
     """
 
     tangent: float
@@ -680,22 +699,29 @@ class SteepArc:
     missing_height: float
 
 
-def turn_limit(requirements: RouteRequirements, i: int) -> tuple[float, str]:
-    """Return the turn limit (rad) at a waypoint, the tighter of scenario and aircraft, and its source."""
-    return tighter_turn_limit(requirements, i, float(requirements.turn_limit[i]))
+def turn_limit(requirements: RouteRequirements, waypoint: int) -> tuple[float, str]:
+    """Return the turn limit at a waypoint (rad), the lower of scenario and aircraft, and its source."""
+    return tighter_turn_limit(requirements, waypoint, float(requirements.turn_limit[waypoint]))
 
 
-def tighter_turn_limit(requirements: RouteRequirements, i: int, aircraft_limit: float) -> tuple[float, str]:
-    """Return the tighter of the scenario's turn limit and an aircraft limit, rad, and its source."""
+def tighter_turn_limit(requirements: RouteRequirements, waypoint: int, aircraft_limit: float) -> tuple[float, str]:
+    """Return the lower of the scenario's turn limit and the given `aircraft_limit` (rad), and its source.
+
+    The scenario's limit does not apply to the corners of a loiter.
+    """
     scenario_limit = requirements.limits.max_turn
-    # A loiter has no angle: planfly made its corners.
-    if scenario_limit is not None and scenario_limit <= aircraft_limit and requirements.setup.route.arc_radii[i] == 0.0:
+    # The corners of a loiter are planfly's drawing, not turns of the mission.
+    if (
+        scenario_limit is not None
+        and scenario_limit <= aircraft_limit
+        and requirements.setup.route.arc_radii[waypoint] == 0.0
+    ):
         return scenario_limit, "scenario"
     return aircraft_limit, "aircraft" if math.isfinite(aircraft_limit) else "none"
 
 
 def slope_limits(requirements: RouteRequirements, leg: int) -> tuple[float, float]:
-    """Return the limits on climb and dive along a leg, tighter of scenario and aircraft, rad, positive."""
+    """Return the limits on climb and dive along a leg, rad, each the lower of scenario and aircraft."""
     return (
         slope_limit(requirements, leg, is_climb=True)[0],
         slope_limit(requirements, leg, is_climb=False)[0],
@@ -703,9 +729,10 @@ def slope_limits(requirements: RouteRequirements, leg: int) -> tuple[float, floa
 
 
 def slope_limit(requirements: RouteRequirements, leg: int, *, is_climb: bool | None = None) -> tuple[float, str]:
-    """Return the tighter limit of scenario and aircraft on a climb or a dive, rad, positive, and its source.
+    """Return the limit on a climb or a dive along a leg (rad, positive), and its source.
 
-    is_climb: None for the direction of the leg itself: a dive on a descending leg, a climb on every other leg.
+    The limit is the lower of the scenario's and the aircraft's.  The source is "scenario", "aircraft" or "none".
+    is_climb: True for a climb, False for a dive, None for the direction of the leg itself.
     """
     is_climb = bool(requirements.slopes[leg] >= 0.0) if is_climb is None else is_climb
     scenario_limit = requirements.limits.max_climb if is_climb else requirements.limits.max_dive
@@ -721,7 +748,7 @@ class GroundSlopeLimit(NamedTuple):
     limit: rad, positive.
     certain: the certain part of the limit if the aircraft's model is uncertain, rad.
     source: "scenario" or "aircraft".
-    airspeed: true airspeed for which it holds, m/s.
+    airspeed: true airspeed to which the limit applies, m/s.
     """
 
     limit: float
@@ -735,10 +762,10 @@ def ground_slope_limit(
 ) -> GroundSlopeLimit:
     """Return the slope limit of a climb from the ground, or of a descent to it, on a leg's course.
 
-    The limit is the tighter of the limits at both ends of the leg.  A take-off uses the leg's airspeed.  A landing uses
-    the autopilot's airspeed on the glide, but at least the minimum airspeed of level flight.  ArduPlane flies the
-    glide's airspeed from the start of the leg, as soon as it is lined up (AP_Landing_Slope.cpp,
-    `type_slope_verify_land` and `type_slope_get_target_airspeed_cm`).
+    The limit is the lower of the limits at both ends of the leg.  A take-off uses the leg's airspeed.  A landing uses
+    the autopilot's airspeed on the glide, but at least the minimum airspeed of level flight.  ArduPlane flies this
+    airspeed as soon as it is lined up on the leg (AP_Landing_Slope.cpp, `type_slope_verify_land` and
+    `type_slope_get_target_airspeed_cm`).
 
     altitudes: altitudes of both ends, m AMSL.
     """
@@ -762,19 +789,23 @@ def ground_slope_limit(
 def steep_arc(requirements: RouteRequirements, leg: int) -> SteepArc | None:
     """Return the fly-by arc at a leg's end if it is too steep, otherwise None.
 
-    An arc is too steep if the airspeed changes by more than `SPEED_TOLERANCE_MPS`.  The part dh of the climb or descent
-    that exceeds the aircraft's ability changes the airspeed V by g dh / V.
+    The height dh by which the arc exceeds the aircraft's ability changes the airspeed V by g dh / V.  The arc is too
+    steep if this change exceeds `SPEED_TOLERANCE_MPS`.
     """
-    i = leg + 1
-    if i == requirements.legs or requirements.setup.route.fly_over[i] or requirements.setup.route.arc_radii[i] > 0.0:
+    corner = leg + 1
+    if (
+        corner == requirements.legs
+        or requirements.setup.route.fly_over[corner]
+        or requirements.setup.route.arc_radii[corner] > 0.0
+    ):
         return None
-    turn_length = float(requirements.length_before[i])
-    length = float(requirements.radius[i]) * abs(float(requirements.turns[i]))
+    turn_length = float(requirements.length_before[corner])
+    length = float(requirements.radius[corner]) * abs(float(requirements.turns[corner]))
     if not 0.0 < turn_length < min(requirements.runs[leg : leg + 2]):
         return None
     slope_before = math.tan(requirements.slopes[leg])
-    slope_after = math.tan(requirements.slopes[i])
-    tangent = arc_slope(slope_before, slope_after, turn_length, float(requirements.radius[i]))
+    slope_after = math.tan(requirements.slopes[corner])
+    tangent = arc_slope(slope_before, slope_after, turn_length, float(requirements.radius[corner]))
     limits = (requirements.climb if tangent > 0.0 else requirements.dive)[leg : leg + 2]
     if not np.isfinite(limits).all() or not (limits > 0.0).all():
         return None

@@ -60,7 +60,10 @@ class LegFit:
 
 
 def fit_line(x: Floats, y: Floats) -> tuple[float, float]:
-    """Fit a line y(x) by least squares; return its slope and the RMS residual.  x must vary."""
+    """Fit a line y(x) by least squares; return its slope and the RMS residual.
+
+    x, y: (n,); x must not be constant.
+    """
     dx, dy = x - x.mean(), y - y.mean()
     slope = float((dx * dy).sum() / (dx * dx).sum())
     return slope, float(np.sqrt(np.mean((dy - slope * dx) ** 2)))
@@ -69,10 +72,10 @@ def fit_line(x: Floats, y: Floats) -> tuple[float, float]:
 def straight_span(
     requirements: RouteRequirements, leg: int, clearance: float, *, excludes_blends: bool = False
 ) -> tuple[float, float]:
-    """Return the start and end (m from the leg's start) of the part of a leg between its turns.
+    """Return start and end of the straight part of a leg between its turns, m from the leg's start.
 
     clearance: distance kept from the turns, m.
-    excludes_blends: True to exclude the slope blends as well.
+    excludes_blends: True to exclude also the parts next to the turns on which the slope changes (blends).
     """
     start_clearance, end_clearance = clearance, clearance
     if excludes_blends:
@@ -88,7 +91,7 @@ def straight_span(
 def leg_course(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> LegFit | None:
     """Return a leg's flown course, or None if the leg was not flown.
 
-    If a leg is too short for a fit, its course is the mean over at least a second and has a larger tolerance.
+    The course of a leg that is too short for a fit is the mean over at least one second, with a larger tolerance.
     """
     if not aligned.has_flown(leg):
         return None
@@ -105,7 +108,7 @@ def leg_course(requirements: RouteRequirements, aligned: AlignedTrack, leg: int)
             distance,
             True,
         )
-    # A short leg: the mean course between its turns, over at least a second.
+    # The course of a short leg is the mean between its turns, over at least one second.
     span_start, span_end = straight_span(requirements, leg, 0.0)
     indices = np.flatnonzero((distance_along >= span_start) & (distance_along <= span_end))
     if not indices.size:
@@ -128,7 +131,8 @@ def leg_course(requirements: RouteRequirements, aligned: AlignedTrack, leg: int)
 def leg_slope(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> LegFit | None:
     """Return a leg's flown slope, or None if less than a second or less than a metre of the leg was flown.
 
-    If a leg is too short for a fit between its blends, its slope is rough and has a larger tolerance.
+    The slope of a leg that is too short for a fit between its blends has a larger tolerance.  Blends are the parts next
+    to the turns on which the slope changes.
     """
     if not aligned.has_flown(leg):
         return None
@@ -144,7 +148,7 @@ def leg_slope(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) 
     time = aligned.track.time[rows]
     if time[-1] - time[0] < 1.0:
         return None
-    # A short leg: the least-squares slope of at least four seconds about its midpoint, or of the whole leg if shorter.
+    # The slope of a short leg is fitted over `MIN_STRETCH_TIME_S` around its midpoint, or over the whole leg.
     middle_time = float(np.interp(0.5 * requirements.runs[leg], np.maximum.accumulate(distance_along), time))
     start = min(
         max(middle_time - 0.5 * MIN_STRETCH_TIME_S, float(time[0])),
@@ -161,8 +165,8 @@ def leg_slope(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) 
 def _angle_tolerance(floor: float, residual: float, distance: float) -> float:
     """Return the tolerance (rad) of an angle fitted over a distance (m) with an RMS residual (m).
 
-    The tolerance is ``floor`` (rad) plus the rotation of the line if its ends differ by twice the RMS, and at most
-    `MAX_UNSTEADINESS_RAD`.
+    The tolerance is `floor` (rad) plus the angle of a line that deviates by twice the RMS residual over the distance.
+    It is at most `MAX_UNSTEADINESS_RAD`.
     """
     return min(floor + math.atan2(2.0 * residual, distance), MAX_UNSTEADINESS_RAD)
 
@@ -236,11 +240,12 @@ def measure_slope(requirements: RouteRequirements, aligned: AlignedTrack, leg: i
 
 
 def _height_error(requirements: RouteRequirements, leg: int, position: Floats) -> tuple[float | None, bool]:
-    """Return the largest altitude error on a leg, m, with its sign, and True if the leg has only blends.
+    """Return the largest altitude error on a leg (m, with its sign), and True if the leg has only blends.
 
-    The error is measured from the leg's line, outside the slope blends.  On a leg that consists of blends only, it is
-    measured between the turns; it is None if no row lies between the turns.  On a leg that follows the ground, it is
-    measured from the demanded height above ground.
+    Blends are the parts next to the turns on which the slope changes.  The error is measured from the leg's line,
+    outside the blends.  If the leg has only blends, it is measured between the turns, and is None if no row lies there.
+    A leg that follows the ground is compared with its demanded height above ground.
+    position: positions of the track on the leg, m, (n, 3).
     """
     if follows_ground(requirements, leg):
         return _ground_following_error(requirements, leg, position), False
@@ -259,9 +264,10 @@ def _height_error(requirements: RouteRequirements, leg: int, position: Floats) -
 
 
 def _ground_following_error(requirements: RouteRequirements, leg: int, position: Floats) -> float | None:
-    """Return the largest error from a leg's height above ground, between its turns, m, with its sign.
+    """Return the largest error from a leg's demanded height above ground, m, with its sign.
 
-    Return None without a row between the turns over known ground.
+    Only the part between the leg's turns is measured.
+    Return None if no row lies between the turns over known ground.
 
     position: positions of the track, m, (n, 3).
     """
@@ -274,10 +280,7 @@ def _ground_following_error(requirements: RouteRequirements, leg: int, position:
 
 
 def steady_rows(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> slice:
-    """Return the rows of a leg from the time at which its commanded airspeed can be reached.
-
-    There may be no such rows.
-    """
+    """Return the rows of a leg from the time at which its commanded airspeed can be reached; may be empty."""
     rows = aligned.leg_rows(leg)
     speeds = requirements.route.leg_airspeeds
     change = abs(float(speeds[leg] - speeds[leg - 1])) if leg else 0.0
@@ -297,13 +300,13 @@ def _saturation_times(
     is_at_full, is_at_idle = _rows_at_limits(requirements, aligned, rows)
     commanded = float(requirements.route.leg_airspeeds[leg])
     error = track.airspeed[rows].astype(np.float64) - commanded
-    # A gust along the track changes the airspeed but not the energy: the airspeed without the gust must be off, too.
+    # A gust along the track changes the airspeed but not the energy.  So the error in the mean wind counts, too.
     gust_free_error = _speed_in_mean_wind(requirements, aligned, rows) - commanded
     row_count = max(1, round(SATURATED_TIME_S / tick))
     lift_gain = aligned.lift_gain[rows]
     speed_deficit = np.minimum(-error, -gust_free_error) - np.maximum(0.0, -lift_gain)
     speed_excess = np.minimum(error, gust_free_error) - np.maximum(0.0, lift_gain)
-    # A log may lack the airspeed at some rows.
+    # A log may lack the airspeed in some rows.
     is_known = np.isfinite(speed_deficit) & np.isfinite(speed_excess)
     speed_loss = _max_mean_in_mask(is_at_full & is_known, np.where(is_known, speed_deficit, 0.0), row_count)
     speed_gain = _max_mean_in_mask(is_at_idle & is_known, np.where(is_known, speed_excess, 0.0), row_count)
@@ -320,9 +323,9 @@ def _pitch_limit_time(requirements: RouteRequirements, aligned: AlignedTrack, le
 
 
 def _rows_at_limits(requirements: RouteRequirements, aligned: AlignedTrack, rows: slice) -> tuple[Flags, Flags]:
-    """Return two masks (n,): True for rows with full throttle, and True for rows with idle throttle.
+    """Return masks of the rows with full throttle and of the rows with idle throttle, (n,) each.
 
-    Full throttle means the autopilot's upper limit.
+    Full throttle means the autopilot's upper throttle limit.
     """
     track = aligned.track
     throttle = track.controls[rows, THROTTLE]
@@ -334,14 +337,15 @@ def _rows_at_limits(requirements: RouteRequirements, aligned: AlignedTrack, rows
 
 
 def measure_ability(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> Ability | None:
-    """Measure the climb rate that the aircraft can reach at the throttle limit on a leg.
+    """Measure the steepest climb or descent that the aircraft can fly at the throttle limit on a leg.
 
-    The throttle limit is full in a climb and idle in a descent.  The excess of thrust over drag corresponds to the
-    climb rate v_up + v . a / g, where v is the velocity relative to the air and a the acceleration over the ground.
-    This is exact in any gust, because lift does no work.  A least-squares plane fits the climb rate over airspeed and
-    altitude.  It is evaluated at the commanded airspeed and the highest measured altitude, because an aircraft climbs
-    least there.  Return None if the throttle was at the limit for too short a time, or if the standard error is too
-    large.
+    The limit is full throttle in a climb and idle throttle in a descent.  Return None if the throttle was at the limit
+    for too short a time, or if the standard error is too large.
+
+    The excess of thrust over drag corresponds to the climb rate v_up + v . a / g, with the velocity v relative to the
+    air and the acceleration a over the ground.  This is exact in any gust, because lift does no work.  A plane is
+    fitted to the climb rate over airspeed and altitude, and evaluated at the commanded airspeed and the highest
+    altitude, where an aircraft climbs least.
     """
     rows = steady_rows(requirements, aligned, leg)
     track, sign = aligned.track, 1.0 if requirements.slopes[leg] >= 0.0 else -1.0
@@ -356,7 +360,7 @@ def measure_ability(requirements: RouteRequirements, aligned: AlignedTrack, leg:
     is_measured &= (distance_along >= span_start) & (distance_along <= span_end)
     velocity = track.velocity[rows].astype(np.float64)
     air_velocity = velocity - track.wind[rows]
-    # A log may lack the wind at some rows.
+    # A log may lack the wind in some rows.
     is_measured &= np.isfinite(air_velocity).all(axis=1)
     duration = float(is_measured.sum() * aligned.tick)
     if duration < ABILITY_WINDOW_S:
@@ -383,15 +387,16 @@ def measure_ability(requirements: RouteRequirements, aligned: AlignedTrack, leg:
 
 
 def _rows_after_run(mask: Flags, count: int) -> Flags:
-    """Return a mask: True for each row that is set in ``mask`` together with the ``count`` rows before it."""
+    """Return a mask (n,): True if `mask` is True in the row and in the `count` rows before it."""
     rows = np.arange(mask.size)
     return np.asarray(rows - np.maximum.accumulate(np.where(mask, -1, rows)) > count)
 
 
 def _fit_plane_at_origin(value: Floats, x: Floats, y: Floats, sample_count: float) -> tuple[float, float] | None:
-    """Fit a plane value(x, y) by least squares, and return its value at x = y = 0 and the standard error of this value.
+    """Fit a plane value(x, y); return its value at x = y = 0 and the standard error of this value.
 
-    Return None if the plane is not determined.  If y hardly varies, the fit does not depend on it.
+    Return None if the data do not determine the plane.  A y that hardly varies is left out of the fit.
+    sample_count: number of independent samples among the values.
     """
     columns = [np.ones_like(x), x] + ([y] if np.ptp(y) > 1e-3 else [])
     design_matrix = np.column_stack(columns)
@@ -416,9 +421,9 @@ def _speed_in_mean_wind(requirements: RouteRequirements, aligned: AlignedTrack, 
 
 
 def _max_mean_in_mask(mask: NDArray[np.bool_], value: Floats, width: int) -> float:
-    """Return the largest mean of ``value`` over ``width`` consecutive rows of which most are in ``mask``.
+    """Return the largest mean of `value` over `width` consecutive rows, most of them with `mask` True.
 
-    Return 0 if there are no such rows, or if the mean is negative.
+    "Most" means the fraction `SATURATED_FRACTION`.  Return 0 without such rows, or if the mean is negative.
     """
     if mask.size < width:
         return 0.0

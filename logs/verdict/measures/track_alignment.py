@@ -37,8 +37,8 @@ from world.kernels import compiled, read_only
 RowNumbers = NDArray[np.int64]
 
 
-# A waypoint was not passed if the route from the track's end to the waypoint is longer than the waypoint's arrival
-# radius plus this margin, m.
+# Margin beyond a waypoint's arrival radius, m.  A waypoint was not passed if the route from the track's end to it is
+# longer than both together.
 _MISSED_MARGIN_M = 50.0
 # Largest number of cells in the assignment of rows to waypoints; the track is thinned to stay within it.
 _CELLS = 40_000_000
@@ -51,8 +51,8 @@ class AlignedTrack:
     track: the usable rows.
     bad_rows: number of rows with non-finite or implausible numbers, or with a time not later than the row before.
     first_bad: time of the first bad row, s; NaN if there is none.
-    rows: row nearest to each waypoint's apex, (w,), never decreasing; the last row for a waypoint that the flight did
-        not reach.
+    rows: row nearest to the point at which the planned path passes each waypoint (apex), (w,), never decreasing; the
+        last row for a waypoint that the flight did not reach.
     apex_distance: distance of that row from the apex, m, (w,).
     passed: True for each waypoint that the flight passed, (w,).
     course: course over the ground, unwrapped, rad, (t,).
@@ -92,7 +92,7 @@ class AlignedTrack:
         return bool(self.passed[leg]) and self.rows[leg + 1] > self.rows[leg]
 
     def leg_segments(self, leg: int) -> tuple[int, int]:
-        """Return the first segment of the track on a leg, and the segment after the last; both are 0 for none.
+        """Return the first segment of the track on a leg, and the one after its last; 0, 0 without any.
 
         The first leg includes the track before it, the last leg the track after it.  If both waypoints of a short leg
         were passed at the same row, as within a turn, the leg has the segment after this row.
@@ -109,7 +109,7 @@ class AlignedTrack:
         return int(np.searchsorted(self.rows[1:-1], min(row, len(self.track) - 2), side="right"))
 
     def position_text(self, row: int, fraction: float = 0.0) -> str:
-        """Describe the position at a row, or at a fraction of the segment to the next row."""
+        """Describe the position in a row, or at a fraction (0 to 1) of the segment to the next row."""
         position = self.track.position
         east, north = (position[row] + fraction * (position[min(row + 1, len(position) - 1)] - position[row]))[:2]
         return f"east {east:.0f} m, north {north:.0f} m"
@@ -139,8 +139,8 @@ def align_track(requirements: RouteRequirements, track: Track) -> AlignedTrack |
     progress = _advance_target_to_arrival(usable_track, progress, centers, arrival_radius)
     rows, distance = _find_passage_rows(usable_track, apexes, progress)
     distances = np.hypot(*(usable_track.position[rows, :2] - centers).T)
-    # A waypoint was passed if the track goes on after its nearest row, or ends within its arrival circle; but a
-    # waypoint that is far ahead along the route was not passed.
+    # A waypoint was passed if the track continues after its nearest row, or ends within its arrival circle.  A waypoint
+    # far ahead along the route was not passed.
     is_far_ahead = progress.remaining_distance > arrival_radius + _MISSED_MARGIN_M
     is_far_ahead[-1] = False
     passed = ((rows < last_row) & ~is_far_ahead) | (distances <= arrival_radius)
@@ -182,21 +182,21 @@ def _arrival_circles(requirements: RouteRequirements) -> tuple[Floats, Floats]:
         requirements.points[:, :2].copy(),
         np.array(
             [
-                max(float(offset) + FINAL_WAYPOINT_TOLERANCE_M, acceptance_condition(requirements, i).radius)
-                for i, offset in enumerate(offsets)
+                max(float(offset) + FINAL_WAYPOINT_TOLERANCE_M, acceptance_condition(requirements, waypoint).radius)
+                for waypoint, offset in enumerate(offsets)
             ]
         ),
     )
     loiter_circle = rtl_arrival_circle(route)
     if loiter_circle is not None:
-        # The autopilot chooses the path of an RTL and where on the loiter it ends, so the drawn waypoints do not count.
+        # The autopilot chooses the path of an RTL and its end on the loiter, so its drawn waypoints are not compared.
         centers[rtl_waypoints(route)], radii[rtl_waypoints(route)] = loiter_circle
     if requirements.setup.autopilot.loiters.steers_to_center:
         # A mission that ends on a loiter may end anywhere on the loiter, which may be flown wider than drawn.
-        k, item = route.arc_radii.size - 1, route.items[-1]
-        while k > 0 and route.items[k] == item and route.arc_radii[k - 1]:
-            radii[k] = max(radii[k], RTL_ARRIVAL_RADIUS_M)
-            k -= 1
+        corner, item = route.arc_radii.size - 1, route.items[-1]
+        while corner > 0 and route.items[corner] == item and route.arc_radii[corner - 1]:
+            radii[corner] = max(radii[corner], RTL_ARRIVAL_RADIUS_M)
+            corner -= 1
     return centers, radii
 
 
@@ -227,10 +227,10 @@ def _advance_last_leg(
     centers: Floats,
     arrival_radius: Floats,
 ) -> None:
-    """Move the start of the last leg in ``rows`` to the row at which the track entered the arrival circle.
+    """Move the start of the last leg in `rows` to the row in which the track entered the arrival circle.
 
-    ``rows`` changes only if the track ends inside the arrival circle of the last passed waypoint, before the waypoint
-    itself: the autopilot is then already on the next leg.
+    `rows` changes only if the track ends before the last passed waypoint, but inside its arrival circle.  The autopilot
+    is then already on the next leg.
     """
     last_passed = int(np.flatnonzero(passed)[-1]) if passed.any() else 0
     if (
@@ -257,9 +257,9 @@ def project_onto_leg(requirements: RouteRequirements, leg: int, position: Floats
 
 
 def closest_approaches(position: Floats, target: Floats) -> tuple[Floats, Floats]:
-    """Return each track segment's minimum horizontal distance (m) from a target, and where it occurs.
+    """Return each track segment's minimum horizontal distance from a target (m), and its place.
 
-    Both have shape (n - 1,).  The place is a fraction of the segment.
+    The place is a fraction of the segment.
 
     position: positions of the track, m, (n, 3).
     target: position, m, (2,) or (3,).
@@ -302,10 +302,11 @@ def _usable_rows(track: Track, *, is_own: bool) -> NDArray[np.bool_]:
 
 
 def _find_passage_rows(track: Track, apexes: Floats, progress: RouteProgress) -> tuple[RowNumbers, Floats]:
-    """Return the row at which each waypoint was passed, and its distance from the apex, m, (w,) each.
+    """Return the row in which each waypoint was passed, and its distance from the apex (m), (w,) each.
 
     The row numbers never decrease, and minimize the sum of squared distances from the apexes.  Only rows along each
     waypoint's legs are considered.
+    apexes: points at which the planned path passes the waypoints, m, (w, 3).
     """
     position, count, last_row = track.position, len(apexes), len(track) - 1
     tick = max(1e-6, float(track.time[-1] - track.time[0]) / last_row)
@@ -314,28 +315,31 @@ def _find_passage_rows(track: Track, apexes: Floats, progress: RouteProgress) ->
     chords, is_missed = _match_chords(read_only(position), apexes, first, last, step, CAPTURE_RADIUS_M)
     rows = np.zeros(count, dtype=np.int64)
     distance = np.zeros(count)
-    # The row of a missed waypoint lies between those of its neighbours; waypoints after the last captured one get the
-    # last row.
+    # The row of a missed waypoint lies between the rows of its neighbours.  Waypoints after the last captured waypoint
+    # get the last row.
     captured_waypoints = np.flatnonzero(~is_missed)
     last_captured = int(captured_waypoints[-1]) if captured_waypoints.size else -1
     previous_row = 0
-    for i in range(count):
-        if i > last_captured and i > 0:
+    for waypoint in range(count):
+        if waypoint > last_captured and waypoint > 0:
             start, end = last_row, last_row
-        elif is_missed[i]:
-            later_captured = captured_waypoints[captured_waypoints > i]
+        elif is_missed[waypoint]:
+            later_captured = captured_waypoints[captured_waypoints > waypoint]
             start, end = (
                 previous_row,
                 min(last_row, (int(chords[later_captured[0]]) + 1) * step) if later_captured.size else last_row,
             )
         else:
-            start, end = max(previous_row, (int(chords[i]) - 1) * step), min(last_row, (int(chords[i]) + 2) * step)
+            start, end = (
+                max(previous_row, (int(chords[waypoint]) - 1) * step),
+                min(last_row, (int(chords[waypoint]) + 2) * step),
+            )
         start, end = min(start, last_row), max(min(start, last_row), end)
-        offsets = position[start : end + 1] - apexes[i]
+        offsets = position[start : end + 1] - apexes[waypoint]
         distances = np.sqrt((offsets * offsets).sum(axis=1))
         nearest_row = int(np.argmin(distances))
-        rows[i], distance[i] = start + nearest_row, distances[nearest_row]
-        previous_row = int(rows[i])
+        rows[waypoint], distance[waypoint] = start + nearest_row, distances[nearest_row]
+        previous_row = int(rows[waypoint])
     return rows, distance
 
 
@@ -349,7 +353,7 @@ def airspeed_gain_in_rising_air(time: Floats, airspeed: Singles, vertical_wind: 
     for k in range(1, time.size):
         step = time[k] - time[k - 1]
         rate = GRAVITY * vertical_wind[k] / max(MIN_AIRBORNE_AIRSPEED_MPS, airspeed[k])
-        # A log may lack the airspeed or the wind at some rows.
+        # A log may lack the airspeed or the wind in some rows.
         rate = rate if math.isfinite(rate) else 0.0
         speed[k] = (speed[k - 1] + rate * step) / (1.0 + step / SPEED_MEMORY_S)
     return speed
@@ -359,12 +363,14 @@ def airspeed_gain_in_rising_air(time: Floats, airspeed: Singles, vertical_wind: 
 def _match_chords(
     position: Floats, marks: Floats, first: RowNumbers, last: RowNumbers, step: int, capture: float
 ) -> tuple[RowNumbers, NDArray[np.bool_]]:
-    """Assign each mark to a chord of the track (``step`` rows long), with the chords in order of time.
+    """Assign each mark to a chord of the track, which spans `step` rows; the chords are in order of time.
 
-    The assignment minimizes the sum of min(distance, capture)^2 by dynamic programming; of equally good assignments the
-    earliest is taken.  A mark can be captured only by the chords from `first` to `last`.
+    The assignment minimizes the sum of min(distance, capture)^2 by dynamic programming.  The earliest of equally good
+    assignments is taken.  Only the chords from `first` to `last` can capture a mark.
+    position: positions of the track, m, (t, 3).
+    marks: positions of the marks, m, (n, 3).
 
-    Returns the chord of each mark, and a mask: True for each mark that is farther than `capture` from all rows of its
+    Return the chord of each mark, and a mask: True for each mark that is farther than `capture` from all rows of its
     chord.
     """
     last_row = position.shape[0] - 1
@@ -416,7 +422,7 @@ def _match_chords(
 # ----------------------------------------------------------------------
 # Leg on which each row of a track was flown, by the alignment of the verdict.
 #
-# The legs that guidance recorded are ignored, so that a report's tables and a replay cannot differ from the verdict.
+# The legs that guidance recorded are not read, so that a report's tables and a replay agree with the verdict.
 
 _IGNORED_COLUMNS = ("velocity", "attitude", "airspeed", "controls", "wind", "current", "energy")
 
@@ -452,14 +458,14 @@ def with_legs(track: Track, leg_ends: Sequence[float]) -> Track:
 # airborne part.  The route of this part begins where the take-off ended, like the autopilot's own first leg, and ends
 # at the last waypoint before the landing point.  Only positions and times are used to find the phases.
 
-# Time after the last waypoint at which the airborne part ends, s: an autopilot turns before the waypoint.
+# Time after the last waypoint at which the airborne part ends, s.
 _END_DELAY_S = 2.0
 
 
 def flown_phases(whole_requirements: RouteRequirements, track: Track) -> tuple[RouteRequirements, AlignedTrack | None]:
-    """Return the requirements and the aligned track of a flight's airborne part.
+    """Return requirements and aligned track of a flight's part between take-off and landing.
 
-    The track is None if it is unusable.
+    The track is None if it has fewer than two usable rows.
     whole_requirements: requirements of the whole route, returned unchanged for a flight without ground phases.
     """
     procedures = whole_requirements.setup.ground_phases

@@ -16,16 +16,16 @@ from world.arrays import Floats
 # ----------------------------------------------------------------------
 # Corners of an imported flight: closest approach to the waypoint, and overshoot beyond the next leg.
 #
-# The autopilot of an imported flight knows nothing of planfly's arcs: it turns where it considers the waypoint reached.
-# So its corners are measured against known quantities: the waypoint and the next leg.
+# The autopilot of an imported flight does not follow planfly's arcs.  It turns when it considers the waypoint reached.
+# So its corners are compared with the waypoint and the next leg.
 
-# Fraction of the next leg over which a corner is examined: by its end the next corner has begun.
+# Fraction of the next leg over which a corner is examined; the next corner may begin after it.
 NEXT_LEG_FRACTION = 0.7
 
 
 @dataclass(frozen=True, slots=True)
 class CornerPass:
-    """Measured pass of one waypoint.
+    """Measured pass of one waypoint of an imported flight.
 
     time: time of the closest approach, s.
     distance: horizontal distance from the waypoint at that time, m.
@@ -67,12 +67,12 @@ def corner_passes(requirements: RouteRequirements, aligned: AlignedTrack) -> tup
 
 
 def _nearest_passes(requirements: RouteRequirements, aligned: AlignedTrack) -> list[tuple[float, float]]:
-    """Return the time (s) and the distance (m) of the closest approach to each waypoint; the times never decrease."""
+    """Return time (s) and distance (m) of the closest approach to each waypoint; times never decrease."""
     time, rows = aligned.track.time, aligned.rows
     passes: list[tuple[float, float]] = []
     start_time = float(time[0])
     for k in range(len(rows)):
-        # Waypoints that share a row do not bound each other.
+        # The search ends at the row of the next waypoint that has a later row.
         later_rows = rows[k + 1 :][time[rows[k + 1 :]] > max(float(time[rows[k]]), start_time)]
         times, positions = _track_between(
             aligned, start_time, float(time[later_rows[0]] if later_rows.size else time[-1])
@@ -85,26 +85,29 @@ def _nearest_passes(requirements: RouteRequirements, aligned: AlignedTrack) -> l
 
 
 def _track_between(aligned: AlignedTrack, start: float, end: float) -> tuple[Floats, Floats]:
-    """Return the track between two times (s), with interpolated ends: times, s, (n,), and positions, m, (n, 3)."""
+    """Return times (s, (n,)) and positions (m, (n, 3)) of the track between two times, s.
+
+    Both ends are interpolated.
+    """
     time = aligned.track.time
     times = np.concatenate([[start], time[(time > start) & (time < end)], [end]])
     return times, np.column_stack([np.interp(times, time, aligned.track.position[:, j]) for j in range(3)])
 
 
 def _corner_overshoot(
-    requirements: RouteRequirements, aligned: AlignedTrack, k: int, start: float, end: float
+    requirements: RouteRequirements, aligned: AlignedTrack, waypoint: int, start: float, end: float
 ) -> tuple[float | None, float]:
-    """Return the overshoot at waypoint `k` (m) and the overrun (m), as in `CornerPass`.
+    """Return the overshoot at a waypoint (m) and the overrun (m), as in `CornerPass`.
 
     The overshoot is None if the aircraft was already beyond the next leg at the start; only then is there an overrun.
 
     start, end: times of the closest approach to this waypoint and to the next waypoint, s.
     """
-    leg_length = float(requirements.runs[k])
-    distance_along, lateral_offset = project_onto_leg(requirements, k, _track_between(aligned, start, end)[1])
+    leg_length = float(requirements.runs[waypoint])
+    distance_along, lateral_offset = project_onto_leg(requirements, waypoint, _track_between(aligned, start, end)[1])
     if distance_along[0] > leg_length:
         return None, float(distance_along[0]) - leg_length
-    outside_offset = -math.copysign(1.0, float(requirements.turns[k])) * lateral_offset
+    outside_offset = -math.copysign(1.0, float(requirements.turns[waypoint])) * lateral_offset
     rows_past = np.flatnonzero(distance_along >= NEXT_LEG_FRACTION * leg_length)
     end_row = int(rows_past[0]) if rows_past.size else len(distance_along)
     if 0 < end_row < len(distance_along):
@@ -151,7 +154,7 @@ class TurnMeasure:
 
 def measure_turns(requirements: RouteRequirements, aligned: AlignedTrack) -> list[TurnMeasure]:
     """Measure the turn at every inner waypoint, in order."""
-    measures = [measure_turn(requirements, aligned, i) for i in range(1, requirements.legs)]
+    measures = [measure_turn(requirements, aligned, waypoint) for waypoint in range(1, requirements.legs)]
     if requirements.setup.imported_log is None:
         return measures
     corners = corner_passes(requirements, aligned)[1:-1]
@@ -161,29 +164,31 @@ def measure_turns(requirements: RouteRequirements, aligned: AlignedTrack) -> lis
     ]
 
 
-def measure_turn(requirements: RouteRequirements, aligned: AlignedTrack, i: int) -> TurnMeasure:
-    """Measure the turn at inner waypoint `i`; the fields keep their defaults if one of its legs was not flown."""
-    if not aligned.has_flown(i - 1) or not aligned.has_flown(i):
+def measure_turn(requirements: RouteRequirements, aligned: AlignedTrack, waypoint: int) -> TurnMeasure:
+    """Measure the turn at an inner waypoint; fields keep their defaults if a leg was not flown."""
+    if not aligned.has_flown(waypoint - 1) or not aligned.has_flown(waypoint):
         return TurnMeasure()
     track = aligned.track
-    first, middle, last = (int(aligned.rows[k]) for k in (i - 1, i, i + 1))
+    first, middle, last = (int(aligned.rows[k]) for k in (waypoint - 1, waypoint, waypoint + 1))
     position = track.position[first : last + 1]
-    distance_along_before, _ = project_onto_leg(requirements, i - 1, position)
-    distance_along, lateral_offset = project_onto_leg(requirements, i, position)
+    distance_along_before, _ = project_onto_leg(requirements, waypoint - 1, position)
+    distance_along, lateral_offset = project_onto_leg(requirements, waypoint, position)
     entry_row = _first_row(
-        distance_along_before >= requirements.runs[i - 1] - requirements.length_before[i], middle - first
+        distance_along_before >= requirements.runs[waypoint - 1] - requirements.length_before[waypoint], middle - first
     )
     is_after_waypoint = np.arange(first, last + 1) >= middle
-    exit_row = _first_row(is_after_waypoint & (distance_along >= requirements.length_after[i]), last - first)
-    # If the next turn needs more than the rest of the leg, it gets half of the leg: the next turn is then at fault.
+    exit_row = _first_row(is_after_waypoint & (distance_along >= requirements.length_after[waypoint]), last - first)
+    # A next turn that needs more than the rest of the leg gets half of the leg, because it has the fault.
     next_turn_length = min(
-        float(requirements.length_before[i + 1]),
-        max(0.5 * requirements.runs[i], requirements.runs[i] - requirements.length_after[i]),
+        float(requirements.length_before[waypoint + 1]),
+        max(0.5 * requirements.runs[waypoint], requirements.runs[waypoint] - requirements.length_after[waypoint]),
     )
-    end_row = _first_row(is_after_waypoint & (distance_along >= requirements.runs[i] - next_turn_length), last - first)
+    end_row = _first_row(
+        is_after_waypoint & (distance_along >= requirements.runs[waypoint] - next_turn_length), last - first
+    )
     rows_around = aligned.rows_around(first + entry_row, first + max(entry_row, exit_row), 1.0)
     held_bank, radius = _bank_and_radius(aligned, rows_around)
-    angle, tolerance, is_fitted = _course_change(requirements, aligned, i)
+    angle, tolerance, is_fitted = _course_change(requirements, aligned, waypoint)
     is_watched = np.arange(position.shape[0]) <= max(exit_row, end_row)
     is_watched &= track.time[first : last + 1] <= track.time[first + exit_row] + SETTLING_WATCH_TIME_S
     course_change = abs(float(aligned.course[first + exit_row] - aligned.course[first + entry_row]))
@@ -196,16 +201,18 @@ def measure_turn(requirements: RouteRequirements, aligned: AlignedTrack, i: int)
         radius=radius,
         overshoot=_arc_overshoot(
             requirements,
-            i,
+            waypoint,
             position[is_watched],
             distance_along_before[is_watched],
             distance_along[is_watched],
             lateral_offset[is_watched],
         ),
-        settled_distance=_settled_distance(requirements, aligned, i, first, end_row, distance_along, lateral_offset),
-        min_distance=float(closest_approaches(position, requirements.points[i])[0].min()),
-        full_circles=max(0, round((course_change - abs(float(requirements.turns[i]))) / (2.0 * math.pi))),
-        is_complete=bool(aligned.passed[i + 1] or end_row < last - first or exit_row < last - first),
+        settled_distance=_settled_distance(
+            requirements, aligned, waypoint, first, end_row, distance_along, lateral_offset
+        ),
+        min_distance=float(closest_approaches(position, requirements.points[waypoint])[0].min()),
+        full_circles=max(0, round((course_change - abs(float(requirements.turns[waypoint]))) / (2.0 * math.pi))),
+        is_complete=bool(aligned.passed[waypoint + 1] or end_row < last - first or exit_row < last - first),
     )
 
 
@@ -216,14 +223,14 @@ def _first_row(mask: NDArray[np.bool_], default: int) -> int:
 
 
 def _course_change(
-    requirements: RouteRequirements, aligned: AlignedTrack, i: int
+    requirements: RouteRequirements, aligned: AlignedTrack, waypoint: int
 ) -> tuple[float | None, float | None, bool]:
-    """Return the flown course change at waypoint `i`, its tolerance, and True if both courses are fitted.
+    """Return the flown course change at a waypoint, its tolerance, and True if both courses are fitted.
 
     The angles are in rad.  Return None, None, False if either leg was flown too little.
     """
-    course_before = leg_course(requirements, aligned, i - 1)
-    course_after = leg_course(requirements, aligned, i)
+    course_before = leg_course(requirements, aligned, waypoint - 1)
+    course_after = leg_course(requirements, aligned, waypoint)
     if course_before is None or course_after is None:
         return None, None, False
     change = abs(math.remainder(course_after.value - course_before.value, 2.0 * math.pi))
@@ -231,9 +238,10 @@ def _course_change(
 
 
 def _bank_and_radius(aligned: AlignedTrack, rows: slice) -> tuple[float, float]:
-    """Return the maximum one-second mean of the bank (rad) and the minimum radius over one second (m).
+    """Return the maximum one-second mean of the bank (rad), and the minimum radius over one second (m).
 
-    The radius is inf without a turn, or if the rows span less than a second.
+    If the rows span less than a second, the bank is their mean and the radius is inf.  The radius is also inf without a
+    turn.
     """
     time = aligned.track.time[rows]
     bank = np.abs(aligned.track.attitude[rows, ROLL].astype(np.float64))
@@ -252,44 +260,44 @@ def _bank_and_radius(aligned: AlignedTrack, rows: slice) -> tuple[float, float]:
 
 def _arc_overshoot(
     requirements: RouteRequirements,
-    i: int,
+    waypoint: int,
     position: Floats,
     distance_along_before: Floats,
     distance_along: Floats,
     lateral_offset: Floats,
 ) -> float | None:
-    """Return the maximum distance outside the arc, and beyond its end outside the next leg, m; at least 0.
+    """Return the overshoot of a turn: the largest distance outside its arc or its next leg, m.
 
-    Return None if the turn has no fly-by arc.
+    It is at least 0.  Return None if the turn has no fly-by arc.
 
-    i: index of the waypoint.
+    waypoint: index of the waypoint.
     position: positions of the track at the turn, m, (n, 3).
     distance_along_before, distance_along: their distances along the leg before and along the leg after the waypoint, m.
     lateral_offset: their offsets from the leg after the waypoint, m.
     """
-    if requirements.setup.route.fly_over[i] or not math.isfinite(requirements.length_before[i]):
+    if requirements.setup.route.fly_over[waypoint] or not math.isfinite(requirements.length_before[waypoint]):
         return None
-    turn_sign = math.copysign(1.0, requirements.turns[i])
-    ux, uy = requirements.leg_unit(i - 1)
+    turn_sign = math.copysign(1.0, requirements.turns[waypoint])
+    ux, uy = requirements.leg_unit(waypoint - 1)
     center = (
-        requirements.points[i, :2]
-        - requirements.length_before[i] * np.array([ux, uy])
-        + turn_sign * requirements.radius[i] * np.array([uy, -ux])
+        requirements.points[waypoint, :2]
+        - requirements.length_before[waypoint] * np.array([ux, uy])
+        + turn_sign * requirements.radius[waypoint] * np.array([uy, -ux])
     )
     has_started = np.maximum.accumulate(
-        distance_along_before >= requirements.runs[i - 1] - requirements.length_before[i]
+        distance_along_before >= requirements.runs[waypoint - 1] - requirements.length_before[waypoint]
     )
-    is_in_arc = has_started & (distance_along < requirements.length_after[i])
+    is_in_arc = has_started & (distance_along < requirements.length_after[waypoint])
     distance_outside = np.where(has_started & ~is_in_arc, -turn_sign * lateral_offset, 0.0)
     center_offset = position[is_in_arc, :2] - center
-    distance_outside[is_in_arc] = np.hypot(center_offset[:, 0], center_offset[:, 1]) - requirements.radius[i]
+    distance_outside[is_in_arc] = np.hypot(center_offset[:, 0], center_offset[:, 1]) - requirements.radius[waypoint]
     return max(0.0, float(distance_outside.max())) if distance_outside.size else 0.0
 
 
 def _settled_distance(
     requirements: RouteRequirements,
     aligned: AlignedTrack,
-    i: int,
+    waypoint: int,
     first_row: int,
     end_row: int,
     distance_along: Floats,
@@ -297,12 +305,12 @@ def _settled_distance(
 ) -> float:
     """Return the mean distance from the next leg's line in the last second before the next turn, m.
 
-    If this second has no row after the turn at waypoint `i`, return the distance in the last row.
+    If this second has no row after the turn at a waypoint, return the distance in the last row.
     """
     time = aligned.track.time[first_row : first_row + end_row + 1]
     start = int(np.searchsorted(time, time[-1] - 1.0))
     rows = np.arange(start, end_row + 1)
-    rows = rows[distance_along[rows] >= requirements.length_after[i]]
+    rows = rows[distance_along[rows] >= requirements.length_after[waypoint]]
     if rows.size:
         return float(np.abs(lateral_offset[rows]).mean())
     return float(abs(lateral_offset[end_row]))

@@ -41,11 +41,9 @@ def violated_legs(requirements: RouteRequirements, finding: Finding) -> tuple[in
 
 
 def legs_near_missiles(requirements: RouteRequirements, max_distance: float) -> dict[int, tuple[float, int]]:
-    """Return the legs of the planned path that pass a missile's sphere closely.
+    """Return the legs of the planned path that pass a missile's sphere within `max_distance` (m).
 
-    Each leg comes with its distance from the nearest sphere, m, negative inside, and the index of the threat.
-
-    max_distance: distance from a sphere within which a leg is returned, m.
+    The values are the leg's distance from the nearest sphere (m, negative inside), and the index of the threat.
     """
     path, threats = requirements.path, requirements.setup.scenario.threats
     radii = threats.kill_radius

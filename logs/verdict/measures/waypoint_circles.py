@@ -11,14 +11,14 @@ from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.wording import place_text
 
-# Least change of course of a circle at a waypoint, rad: less hardly leads off the legs.
+# Smallest change of course that counts as a circle at a waypoint, rad; a smaller one hardly leads off the legs.
 _MIN_CIRCLE_RAD = 0.5 * math.pi
 # Maximum number of circles that a text names.
 _MAX_NAMED = 4
 
 
 class WaypointCircle(NamedTuple):
-    """Circle that an autopilot flew at a waypoint that is no loiter.
+    """Circle that an autopilot flew at a plain waypoint to reach the waypoint's altitude.
 
     waypoint: index of the waypoint.
     height_error: altitude error with which the aircraft reached the waypoint, m, positive above.
@@ -38,28 +38,28 @@ def waypoint_circles(requirements: RouteRequirements, aligned: AlignedTrack) -> 
     if not setup.autopilot.deviations.altitude_parameter:
         return []
     circles, begin = [], 0
-    for i in range(1, len(route.points)):
-        if not aligned.passed[i - 1] or i - 1 in route.rtl_legs:
+    for waypoint in range(1, len(route.points)):
+        if not aligned.passed[waypoint - 1] or waypoint - 1 in route.rtl_legs:
             break
-        if route.arc_radii[i] > 0.0:
-            begin = max(begin, int(aligned.rows[i]))
+        if route.arc_radii[waypoint] > 0.0:
+            begin = max(begin, int(aligned.rows[waypoint]))
             continue
-        stop = int(aligned.rows[min(i + 2, requirements.legs)]) + 1 if aligned.passed[i] else len(track)
-        offsets = track.position[begin : max(stop, begin + 1)] - requirements.points[i]
+        stop = int(aligned.rows[min(waypoint + 2, requirements.legs)]) + 1 if aligned.passed[waypoint] else len(track)
+        offsets = track.position[begin : max(stop, begin + 1)] - requirements.points[waypoint]
         is_off = np.abs(offsets[:, 2]) > setup.autopilot.loiters.altitude_tolerance
-        is_near = np.hypot(offsets[:, 0], offsets[:, 1]) <= acceptance_condition(requirements, i).radius
-        is_past = offsets[:, :2] @ requirements.leg_unit(i - 1) > 0.0
+        is_near = np.hypot(offsets[:, 0], offsets[:, 1]) <= acceptance_condition(requirements, waypoint).radius
+        is_past = offsets[:, :2] @ requirements.leg_unit(waypoint - 1) > 0.0
         is_reached = (is_near | is_past) & ~is_off
         end = int(np.argmax(is_reached)) if is_reached.any() else len(offsets) - 1
         rows_off = np.flatnonzero(is_off[:end] & is_near[:end])
         if rows_off.size and np.ptp(aligned.course[begin + int(rows_off[0]) : begin + end]) >= _MIN_CIRCLE_RAD:
-            circles.append(WaypointCircle(i, float(offsets[rows_off[0], 2])))
+            circles.append(WaypointCircle(waypoint, float(offsets[rows_off[0], 2])))
         begin += end
     return circles
 
 
 def circles_text(requirements: RouteRequirements, circles: Sequence[WaypointCircle]) -> str:
-    """State where an autopilot circled, its altitude errors there, and the parameter that made it circle.
+    """State where an autopilot circled, its altitude errors, and the parameter that limits them.
 
     Return "" without circles.
     """

@@ -31,15 +31,15 @@ MAX_DRAWN_PATHS = 3
 _MAX_STARTS = 40
 # Step of that search above or below the flight's altitude, m.
 _STEP_M = 80.0
-# Number of steps in one direction.
+# Largest number of steps above or below the flight's altitude.
 _MAX_STEPS = 15
-# Number of bisections of the last step.
+# Number of bisections between the last safe and the last unsafe altitude.
 _HALVING_COUNT = 3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WorstReturn:
-    """Worst return of a time range, to be drawn.
+    """Worst return from a time range of the flight, to be drawn.
 
     return_range: the time range.
     path: positions at intervals of one second, m, (t, 3).
@@ -101,7 +101,7 @@ Key = TypeVar("Key")
 
 
 def group_segments(elements: Sequence[Element], key: Callable[[Element], Key]) -> list[tuple[Key, list[Element]]]:
-    """Group consecutive elements by key; each group but the last also has the next group's first element.
+    """Group consecutive elements by key; each group also ends with the first element of the next group.
 
     >>> group_segments([1, 3, 2, 5], lambda one: one % 2)
     [(1, [1, 3, 2]), (0, [2, 5]), (1, [5])]
@@ -115,7 +115,7 @@ def group_segments(elements: Sequence[Element], key: Callable[[Element], Key]) -
 def drawn_returns(
     world: ReturnWorld, starts: ReturnStarts, returns: Returns, glides: Glides = NO_GLIDES
 ) -> DrawnReturns:
-    """Add the data for drawing to judged returns.
+    """Compute the data for drawing judged returns: the worst paths and the lowest safe altitudes.
 
     starts: the starts of the judged returns.
     """
@@ -124,14 +124,17 @@ def drawn_returns(
 
 
 def drawn_returns_without_glides(world: ReturnWorld, starts: ReturnStarts, returns: Returns) -> DrawnReturns:
-    """Add the data for drawing to judged returns, without the slow parts: glides and minimum altitudes."""
+    """Compute the data for drawing judged returns, without glides and lowest safe altitudes.
+
+    Those take the most time.
+    """
     return DrawnReturns(returns, worst_returns(world, starts, returns), MinSafeAltitudes(np.zeros(0), np.zeros(0)))
 
 
 def worst_returns(world: ReturnWorld, starts: ReturnStarts, returns: Returns) -> tuple[WorstReturn, ...]:
-    """Select the returns to draw.
+    """Select and simulate the returns to draw, at most `MAX_DRAWN_PATHS`.
 
-    These are the worst of each kind of failure, then others; the lowest return if all are safe.
+    These are the worst return of each kind of failure, then other failures.  If all are safe, it is the lowest return.
     """
     unsafe_ranges = [return_range for return_range in returns.ranges if not return_range.worst.safe]
     worst_range_by_kind = {return_range.worst.kind: return_range for return_range in reversed(unsafe_ranges)}
@@ -172,7 +175,11 @@ def _marked_position(world: ReturnWorld, ret: SimulatedReturn, path: Floats) -> 
 
 
 def min_safe_altitudes(world: ReturnWorld, starts: ReturnStarts) -> MinSafeAltitudes:
-    """Find the lowest safe altitude at up to `_MAX_STARTS` of the starts; NaN if the ground is unknown."""
+    """Find the lowest altitude from which a return is safe, at up to `_MAX_STARTS` of the starts.
+
+    The search goes up or down from the flight's altitude in steps, and then bisects the last step.  An altitude is NaN
+    if the ground is unknown or none is safe.
+    """
     if not len(starts):
         return MinSafeAltitudes(np.zeros(0), np.zeros(0))
     rows = np.unique(np.linspace(0, len(starts) - 1, _MAX_STARTS).round().astype(np.intp))
@@ -203,9 +210,9 @@ def min_safe_altitudes(world: ReturnWorld, starts: ReturnStarts) -> MinSafeAltit
 
 
 def _are_safe_at_offset(world: ReturnWorld, starts: ReturnStarts, offsets: Floats, is_simulated: Flags) -> Flags:
-    """Return a mask (n,): True for each start from which a return is safe at an altitude offset.
+    """Return a mask (n,): True for each start from which a return is safe after a change of its altitude.
 
-    offsets: altitude offsets, m, (n,).
+    offsets: changes of the starts' altitudes, m, (n,).
     is_simulated: mask of the starts to simulate; the result is False for all others.
     """
     is_safe = np.zeros(len(starts), dtype=np.bool_)

@@ -31,6 +31,7 @@ _MAX_BLOCKS = 200
 class Band(NamedTuple):
     """Area in which the required height above ground lies between two heights, m.
 
+    min_height, max_height: limits of the required height above ground, m.
     parts: outlines of the area's parts on the map.
     """
 
@@ -58,7 +59,7 @@ class GlideFootprint:
     ) -> tuple[Band, ...]:
         """Return the bands of required height above ground, the lowest first.
 
-        east, north: ranges of the map, m; by default the whole map.
+        east, north: ranges (from, to) of the map, m; by default the whole map.
         """
         grid = self.grid
         needed_heights = np.where(np.isfinite(grid.ground), self.min_altitude - grid.ground, math.inf)
@@ -74,7 +75,10 @@ class GlideFootprint:
     def landings(
         self, east: tuple[float, float] = _WHOLE_RANGE, north: tuple[float, float] = _WHOLE_RANGE
     ) -> tuple[Part, ...]:
-        """Return the outlines of ground on which a landing is possible, within ranges of the map, m."""
+        """Return the outlines of ground on which a landing is possible.
+
+        east, north: ranges (from, to) of the map, m; by default the whole map.
+        """
         blocks = _CellBlocks.from_map(self.grid, east, north)
         return blocks.outlines(blocks.max_by_block(self.is_landable.astype(np.float64)) > 0.0)
 

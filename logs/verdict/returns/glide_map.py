@@ -32,7 +32,7 @@ from world.kernels import Record, Records, compiled, inlined, inner, record_dtyp
 from world.terrain import Terrain
 from world.wind import mean_wind_speed
 
-# Row and column of each of c cells, (c, 2).
+# Rows and columns of c cells, (c, 2).
 Cells = NDArray[np.int64]
 
 # ----------------------------------------------------------------------
@@ -42,9 +42,9 @@ Cells = NDArray[np.int64]
 MAX_CELLS = 700_000
 # Smallest side of a cell, m.
 _MIN_CELL_M = 20.0
-# Largest side of a cell, m: a larger cell would have the altitude of its highest ground even if most of it is a valley.
+# Largest side of a cell, m.  A cell has the altitude of its highest ground, even if most of it is a valley.
 _MAX_CELL_M = 240.0
-# Largest side of a cell as a number of pixels of the elevation file, if this is longer.
+# Largest side of a cell in pixels of the elevation file; applies if it is longer than `_MAX_CELL_M`.
 _MAX_CELL_PIXELS = 8
 # Margin of the map around the destinations and the flight, m.
 MAP_MARGIN_M = 3000.0
@@ -120,9 +120,11 @@ def make_glide_map(
 
 
 def _add_sphere(grid: GlideMap, center: Floats, radius: float) -> None:
-    """Add one kill sphere to the altitude ranges in which the cells of ``grid`` lie in kill spheres.
+    """Add one kill sphere to the altitudes `sphere_bottoms` and `sphere_tops` of the cells of `grid`.
 
     Each cell is checked at its point nearest to the sphere's center.
+    center: (east, north, up), m.
+    radius: m.
     """
     row, column = grid.cell_at(float(center[0]), float(center[1]))
     cell_reach = math.ceil(radius / grid.cell) + 1
@@ -143,7 +145,7 @@ def _add_sphere(grid: GlideMap, center: Floats, radius: float) -> None:
 
 # Side of the square of flat ground that a landing needs, m.
 LANDING_SQUARE_M = 150.0
-# Largest gradient of the plane that fits the ground of the square best, m per m.
+# Largest gradient of the plane fitted to the ground of the square, m per m.
 MAX_LANDING_GRADIENT = 0.05
 # Largest root-mean-square deviation of the square's ground from that plane, m.
 MAX_LANDING_ROUGHNESS_M = 1.5
@@ -152,7 +154,8 @@ MAX_LANDING_ROUGHNESS_M = 1.5
 def landable_cells(grid: GlideMap) -> Flags:
     """Return a mask (n, e): True for each cell outside kill spheres that has flat ground around it.
 
-    The ground is taken from the elevation file, which does not show trees, houses or water.
+    A plane is fitted to the square of `LANDING_SQUARE_M` around the cell; its gradient and the deviations from it must
+    be small.  The elevation file does not show trees, houses or water.
     """
     half_count = max(1, math.ceil(0.5 * (LANDING_SQUARE_M / grid.cell - 1.0) - 1e-9))
     offsets = np.arange(-half_count, half_count + 1)
@@ -174,7 +177,12 @@ def landable_cells(grid: GlideMap) -> Flags:
 
 
 def _square_sums(values: Floats, row_weights: Floats, column_weights: Floats) -> Floats:
-    """Return the weighted sum over the square around each cell, (n, e); NaN if the square leaves the map."""
+    """Return the weighted sum of values over the square around each cell, (n, e).
+
+    It is NaN if the square leaves the map.
+    values: (n, e).
+    row_weights, column_weights: weights of the square's rows and columns, (s,) with s odd; a cell has their product.
+    """
     sums = values
     for axis, weights in ((0, row_weights), (1, column_weights)):
         half_count = weights.size // 2
@@ -188,7 +196,7 @@ def _square_sums(values: Floats, row_weights: Floats, column_weights: Floats) ->
 
 
 def exclude_zones(grid: GlideMap, is_flat: Flags, zones: ZoneRecords, height: float) -> None:
-    """Set the mask ``is_flat``, (n, e), to False in exclusion zones whose floor is below ``height``."""
+    """Set `is_flat` to False in exclusion zones that reach down to `height` (m above ground)."""
     for z in np.flatnonzero(zones.zones["exclusion"]):
         _exclude_zone(is_flat, grid.ground, zones, int(z), grid.west, grid.south, grid.cell, height)
 
@@ -197,7 +205,12 @@ def exclude_zones(grid: GlideMap, is_flat: Flags, zones: ZoneRecords, height: fl
 def _exclude_zone(
     is_flat: Flags, ground: Floats, zones: ZoneRecords, z: int, west: float, south: float, cell: float, height: float
 ) -> None:
-    """Set the mask to False in exclusion zone `z` where the zone reaches down to a height above ground, m."""
+    """Set the mask `is_flat` to False in the cells of exclusion zone `z` that reaches down to `height`.
+
+    height: m above ground.
+    west, south: center of the first cell, m.
+    cell: side of a cell, m.
+    """
     zone = zones.zones[z]
     rows, columns = is_flat.shape
     for i in range(
@@ -243,7 +256,7 @@ def glide_steps() -> tuple[Records, Records]:
         fraction_by_cell: dict[tuple[int, int], float] = {}
         for k in range(1, 64):
             fraction = k / 64.0
-            # From the end backwards; a cell that is only touched at a corner may be included or not.
+            # The samples go backwards from the end.  A cell that is only touched at a corner may be missed.
             cell = (-round(fraction * east), -round(fraction * north))
             fraction_by_cell.setdefault(cell, fraction)
         ends = ((0, 0), (-east, -north))
@@ -423,8 +436,9 @@ def _settle_cells(
     band_heads: Codes,
     links: Codes,
 ) -> None:
-    """Fill `min_altitude`, `destination` and `next_step` by settling cells in order of altitude, band after band.
+    """Fill `min_altitude`, `destination` and `next_step` by settling cells in order of altitude.
 
+    This is the search of Dijkstra, against the direction of flight; see the head of this module.
     band: height of a band, m.
     band_heads: first cell of each band, (b,); -1 for an empty band.
     links: previous and next cell of each cell in its band, (cells, 2); -1 for none.

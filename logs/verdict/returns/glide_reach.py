@@ -45,7 +45,7 @@ def remaining_glide_altitudes(
     airspeed: float,
     bank: float,
 ) -> tuple[Floats, Codes]:
-    """Return the altitude left on arrival at each start's best destination, m, and its cell, (n,) each.
+    """Return the altitude left at each start's best destination (m), and its cell, (n,) each.
 
     starts: (n,) of dtype `flight.autopilots.simulated_returns.RETURN_START`.
     glide_altitudes: result of the backward search from the destinations.
@@ -81,7 +81,10 @@ def remaining_glide_altitudes(
 
 
 def cell_position(grid: GlideMap, cell: int) -> tuple[float, float, float]:
-    """Return the center of a cell, as east, north and ground altitude, m. cell: flat index into the map, row by row."""
+    """Return the center of a cell: east, north and ground altitude, m.
+
+    cell: flat index into the map, row by row.
+    """
     row, column = divmod(cell, grid.floor.shape[1])
     return (*grid.cell_center(row, column), float(grid.ground[row, column]))
 
@@ -161,7 +164,7 @@ def _fill_altitudes_left(
                 state.north += step_duration * ground_north
                 state.up -= step_duration * turn_sink
                 yaw += turn_sign * _TURN_STEP_RAD
-    # Compiled code frees an array after its last use, and a use of one of its records does not keep it alive.
+    # This use keeps the array alive: compiled code frees an array after its last use, even if its records are in use.
     if state_array.size != 1:
         altitude_left[:] = math.nan
 
@@ -178,7 +181,7 @@ def _wind_at_start(start: Record, aircraft: Record, field: Floats) -> tuple[floa
 
 @inner
 def _is_clear(state: Record, floor: Floats, spheres: Floats, radii: Floats, glider: Record) -> bool:
-    """Return True if the aircraft is on the map, above the cell's minimum altitude, and outside every kill sphere."""
+    """Return True if the aircraft is on the map, above the cell's floor and outside kill spheres."""
     i = round((state.north - glider.south) / glider.cell)
     j = round((state.east - glider.west) / glider.cell)
     if not (0 <= i < floor.shape[0] and 0 <= j < floor.shape[1]) or not state.up >= floor[i, j]:
@@ -194,12 +197,11 @@ def _is_clear(state: Record, floor: Floats, spheres: Floats, radii: Floats, glid
 
 @inner
 def _best_cell(state: Record, min_altitude: Floats, slope: float, glider: Record) -> tuple[float, int, int]:
-    """Return the altitude left in the best cell, and its row and column.
+    """Return the largest altitude left at the center of the aircraft's cell or a neighbouring cell, m.
 
-    The best cell is the aircraft's cell or one of its neighbours.  Neighbours are included because a cell's center may
-    lie in a sphere even if the aircraft does not.
-
-    slope: height lost per meter on the way to a cell's center.
+    Also return the row and the column of that cell.  Neighbours are included because a cell's center may lie in a
+    sphere even if the aircraft does not.
+    slope: height lost per meter of distance to a cell's center.
     """
     row = round((state.north - glider.south) / glider.cell)
     column = round((state.east - glider.west) / glider.cell)
@@ -218,9 +220,9 @@ def _best_cell(state: Record, min_altitude: Floats, slope: float, glider: Record
 def _remaining_turn(
     state: Record, i: int, j: int, turn_sign: float, next_step: Codes, step_records: Records, glider: Record
 ) -> float:
-    """Return the remaining turn to the course of the path at a cell, rad.
+    """Return the course change until the aircraft heads along the path from a cell, rad.
 
-    It is negative if the course was overshot, and 0 at the end of the path.
+    It is negative if the turn has overshot this course, and 0 near the end of the path.
 
     i, j: row and column of the cell.
     turn_sign: 1 for a turn to the right, -1 to the left.

@@ -51,7 +51,7 @@ def glides_headline(glides: Glides) -> str:
     home_text, *other_texts = (
         _COUNT_TEXTS[reach].format(count=count) for reach, count in counts if count or reach == "home"
     )
-    reach_text = ", ".join([f"{home_text} of {count_text(len(glides.each), 'position')}", *other_texts])
+    reach_text = "; ".join([f"{home_text} of {count_text(len(glides.each), 'position')}", *other_texts])
     if any(glide.own_return.end == "not flown" for glide in glides.each):
         follows_text = ", which would follow the terrain," if glides.follows_terrain else " without the engine"
         own_text = f"{glides.autopilot}'s own return{follows_text} is not simulated"
@@ -76,7 +76,7 @@ def site_text(site: GlideSite) -> str:
 
 
 def glide_range_text(glide_range: GlideRange, glides: Glides) -> str:
-    """Describe a time range: the best destination in reach, the altitude to spare, and the autopilot's own return."""
+    """Describe a time range: best destination, altitude to spare, and the autopilot's own return."""
     time_text = (
         f"{glide_range.first:.0f} s"
         if glide_range.count == 1
@@ -114,7 +114,7 @@ def _range_reach_text(glide_range: GlideRange, glides: Glides) -> str:
 
 
 def _own_return_text(glide: Glide, glides: Glides) -> str:
-    """Describe the outcome of the autopilot's own return without thrust; return "" if it is not simulated."""
+    """Describe the autopilot's own RTL without thrust as a clause; "" if it is not simulated."""
     name, own_text = glide.own_return.target.name, f"; {glides.autopilot}'s own return"
     match glide.own_return.end:
         case "arrives":

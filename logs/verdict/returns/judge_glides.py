@@ -37,12 +37,12 @@ from world.arrays import Flags, Floats
 from world.kernels import Record
 from world.scenario import Scenario
 
-# Height above ground that a glide keeps until it arrives, m.  The simulated ArduPlane without thrust was at most 13 m
-# too high, and the elevation file has its own error.
+# Height above ground that a glide keeps until it arrives, m.  The simulated ArduPlane's flights without thrust were at
+# most 13 m too high, and the elevation file has an error, too.
 MARGIN = 30.0
-# Longest time of a glide during which the wind of a forecast is looked up, s.
+# Time after the last start for which the winds of a forecast are sampled, s.
 _MAX_GLIDE_TIME_S = 600.0
-# Number of values of east, north and time at which it is looked up around the flight and its destinations.
+# Number of samples of a forecast's wind to the east, to the north and in time, around the flight and its destinations.
 _WIND_SAMPLES = (9, 9, 5)
 
 _NO_POSITION = (math.nan, math.nan, math.nan)
@@ -122,7 +122,7 @@ class Glide:
 
 @dataclass(frozen=True, slots=True)
 class GlideRange:
-    """Time range of the flight with the same best destination and the same outcome of the autopilot's return.
+    """Time range with the same best destination and the same outcome of the autopilot's return.
 
     first, last: times of the first and the last start, s.
     count: number of glides.
@@ -228,7 +228,7 @@ NO_GLIDES = Glides((), (), math.nan)
 def judge_glides(world: ReturnWorld, starts: ReturnStarts) -> Glides:
     """Judge the destinations that each start can reach after an engine failure.
 
-    Low starts in take-offs and landings are omitted, because from them the aircraft descends straight ahead.
+    Low starts in take-offs and landings are omitted, because the aircraft then descends straight ahead.
     """
     starts = starts.subset(np.flatnonzero(~starts.is_low))
     none = _no_glides(world)
@@ -251,7 +251,7 @@ def judge_glides(world: ReturnWorld, starts: ReturnStarts) -> Glides:
     slopes = glide_slopes(aircraft, airspeed, min_ground_altitude, top_altitude, winds)
 
     def search_glides_to(cells: Cells) -> tuple[Floats, NDArray[np.int32], Floats]:
-        """Return the altitude left (m) and the reached cell of each start, and the map of minimum altitudes (m)."""
+        """Return each start's altitude left (m) and reached cell, and the map of minimum altitudes (m)."""
         altitudes = search_glide_altitudes(grid, cells, slopes, max_altitude)
         lefts, reached_cells = remaining_glide_altitudes(rows, altitudes, aircraft, environment, airspeed, bank)
         return lefts, reached_cells, altitudes.min_altitude
@@ -287,7 +287,7 @@ def judge_glides(world: ReturnWorld, starts: ReturnStarts) -> Glides:
 
 
 def _no_glides(world: ReturnWorld) -> Glides:
-    """Return a `Glides` without any glide; its other fields are filled."""
+    """Return a `Glides` without any glide, but with sites, airspeed and autopilot."""
     return Glides(
         (),
         _glide_sites(world),
@@ -347,9 +347,10 @@ def _simulate_engine_out_returns(world: ReturnWorld, starts: ReturnStarts) -> li
 
 
 def _possible_winds(scenario: Scenario, positions: Floats, times: Floats) -> PossibleWinds:
-    """Return a function that samples a forecast's winds around positions, m, (n, 2).
+    """Return a function that samples a forecast's winds around the flight and its destinations.
 
-    The samples cover the times of the positions, s, (n,), and the longest glide after the last of them.
+    positions: east and north of starts and destinations, m, (n, 2).
+    times: times of the starts, s; the samples also cover the longest glide after the last start.
     """
     low, high = positions.min(axis=0), positions.max(axis=0)
     first, last = float(times.min()), float(times.max()) + _MAX_GLIDE_TIME_S
@@ -365,7 +366,7 @@ def _possible_winds(scenario: Scenario, positions: Floats, times: Floats) -> Pos
 
 
 def _engine_out_return(world: ReturnWorld, target: ReturnTarget, result: Record) -> EngineOutReturn:
-    """Describe a simulated return without thrust. result: record of dtype `RETURN_RESULT`."""
+    """Convert a result of a return without thrust (dtype `RETURN_RESULT`) to an `EngineOutReturn`."""
     clearance = float(result["clearance_before_arrival"])
     arrival_height, shortfall, impact = math.nan, math.nan, _NO_POSITION
     if result["outcome"] == RETURN_ARRIVED and world.scenario.terrain is not None:

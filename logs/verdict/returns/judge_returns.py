@@ -66,27 +66,27 @@ UNSAFE = frozenset(KINDS[:5])
 # ArduPlane); or it flies straight to a landing sequence (RTL_AUTOLAND 2, and "land" as a battery failsafe action).
 Ending = Literal["circle", "on to land", "straight to land"]
 
-# Distance to the ground or the required height within which the point mass could be wrong, m: its least clearance is
-# within 7 m of 38 flights of ArduPlane, and in JSBSim (`benchmarks.return_differences`) within 4.5 m of 254 flights of
-# the simulated ArduPlane and within 5.1 m of 555 flights of the simulated PX4.
+# Possible error of the point mass's minimum clearance, m.  The clearance differed by at most 7 m from 38 flights of
+# ArduPlane.  In JSBSim (`benchmarks.return_differences`) it differed by at most 4.5 m from 254 flights of the simulated
+# ArduPlane, and by at most 5.1 m from 555 flights of the simulated PX4.
 POINT_MASS_ERROR_M = 10.0
-# Distance to a kill sphere within which the point mass could be wrong, m: its least distance outside a sphere is within
-# 32 m of 57 flights of the simulated ArduPlane in JSBSim, and within 18 m where it is below 100 m; and within 35 m of
-# 97 of 111 flights of the simulated PX4, of which the others turned back to another side.
+# Possible error of the point mass's minimum distance from a kill sphere, m.  The distance differed by at most 32 m from
+# 57 flights of the simulated ArduPlane in JSBSim, and by at most 18 m if it was below 100 m.  It differed by at most
+# 35 m from 97 of 111 flights of the simulated PX4; the other 14 turned back to the other side.
 POINT_MASS_POSITION_ERROR_M = 35.0
 # Distance to a limit within which the difference between point mass and JSBSim matters, m.
 _DECISIVE_MARGIN_M = 50.0
-# Height lost in the turn of a return, m.  A return that begins where the flight itself is below the required height
-# above ground, as after a take-off, has to keep the flight's height minus this loss.
+# Height lost in the turn of a return, m.  If the flight itself is below the required height above ground at the start,
+# as after a take-off, the return has to keep the flight's height minus this loss.
 TURN_HEIGHT_LOSS_M = 2.0
 # Fraction of its starting height that a return from a flown take-off or landing has to keep: it may be sinking.
 _LOW_START_FRACTION = 0.5
 # Minimum height above ground from which returns in a take-off or a landing are judged, m: no autopilot turns below it.
 MIN_JUDGED_HEIGHT_M = 10.0
-# A return from a greater height is omitted if it hits the ground or gets low within this horizontal distance, m, after
-# losing the remaining fraction of its starting height.
+# Returns from a greater height in a take-off or a landing are omitted if they sink below `_LOW_START_FRACTION` of the
+# starting height within this horizontal distance, m.
 _SINK_DISTANCE_M = 500.0
-# Bank beyond which a JSBSim flight cannot begin at a start, rad, because it approaches the start straight.
+# Largest bank of a start from which JSBSim can fly a return, rad, because its flight reaches the start on a straight.
 _MAX_START_BANK_RAD = math.radians(10.0)
 
 
@@ -153,7 +153,7 @@ NoReturnKind = Literal["never", "later", "at once", "battery", "used", "power", 
 
 
 class PointOfNoReturn(NamedTuple):
-    """Last start from which a return leaves the energy reserve, in the given wind.
+    """Last start from which a return leaves the energy reserve.
 
     kind: kind of the point, or the reason why it is unknown.
     time: time of that start, s; NaN if there is no point of no return, or if it is unknown.
@@ -183,10 +183,10 @@ class Returns:
     unjudged_parts: parts that are not judged, whatever the simulation shows: each a key of
         `logs.verdict.returns.returns_text.UNJUDGED_PART_TEXTS`, or a clause by the autopilot.
     autoland: RTL_AUTOLAND; None for returns of another autopilot.
-    autoland_assumed: True if this value is assumed, because ArduPlane does not arm with 0.
+    autoland_assumed: True if RTL_AUTOLAND is assumed, because ArduPlane does not arm with 0.
     autopilot: title of the autopilot whose return is simulated.
-    path_text: its sentence on the path of its returns; "" if there is nothing to say.
-    trials_text: its parameters that may make its returns safe, in messages.
+    path_text: the autopilot's sentence on the path of its returns; "" if there is nothing to say.
+    trials_text: names of the autopilot's parameters that may make its returns safe.
     landings: the mission's landing sequences.
     omitted_count: number of further returns while the aircraft is on the ground, or so low in a take-off or a landing
         that it sinks to the ground before it can return.
@@ -276,7 +276,7 @@ class Returns:
 
 
 def _report_key(ret: SimulatedReturn) -> tuple[object, ...]:
-    """Return the key by which returns are grouped for the report."""
+    """Return the grouping key of returns: outcome and destination, and the entered sphere or zone."""
     key = (ret.kind, ret.target.name)
     return (*key, ret.threat, ret.zone) if ret.kind in ("threat", "zone") else key
 
@@ -418,7 +418,11 @@ class ReturnWorld:
         return tuple(parts)
 
     def target(self, row: Record, ending: Ending | None = None) -> ReturnTarget:
-        """Return the destination of an RTL from a start.  ending: how the RTL ends; by default by its rules."""
+        """Return the destination of an RTL.
+
+        row: start of the RTL, with the fields `east`, `north` and `up`, m.
+        ending: how the RTL ends; by default as the autopilot's rules demand.
+        """
         rules = self.autopilot.returns.rules
         position = (float(row["east"]), float(row["north"]), float(row["up"]))
         ending = ending or self.ending
@@ -430,7 +434,7 @@ class ReturnWorld:
         return self.with_landing(target) if ending == "on to land" else target
 
     def with_landing(self, target: ReturnTarget) -> ReturnTarget:
-        """Return an RTL's target with the landing sequence that follows its loiter; unchanged if there is none."""
+        """Return an RTL's target with the landing sequence after its loiter; unchanged without one."""
         landing = nearest_landing_sequence(target.position, self.landings) if self.ending == "on to land" else None
         if landing is None:
             return target
@@ -440,7 +444,9 @@ class ReturnWorld:
 
     def _choice_reason(self, landing: LandingStart) -> str:
         """Explain why a landing sequence was chosen; return "" if the mission has only one."""
-        return f"item {landing.item} is of the nearest of {len(self.landings)}" if len(self.landings) > 1 else ""
+        if len(self.landings) == 1:
+            return ""
+        return f"item {landing.item} begins the nearest of {len(self.landings)} landing sequences"
 
     def with_parameters(self, **values: float) -> "ReturnWorld":
         """Return a copy with other parameters, by the autopilot's names and in its units."""
@@ -462,7 +468,7 @@ def unknown_energy_text(setup: FlightSetup) -> str:
 
 
 def returning_title(setup: FlightSetup) -> str:
-    """Return the title of the autopilot whose RTL is simulated; ArduPlane if the setup's autopilot has no RTL."""
+    """Return the title of the autopilot whose RTL is simulated; ArduPlane for one without an RTL."""
     autopilot = setup.autopilot.model
     return ArduPlane.title if autopilot.returns.fly is None else autopilot.title
 
@@ -497,7 +503,7 @@ def make_return_world(setup: FlightSetup, other_law: Autopilot | None = None) ->
 
 
 def without_engine_world(world: ReturnWorld) -> ReturnWorld:
-    """Return the world for returns without an engine; ArduPlane flies them if the autopilot has no such return.
+    """Return the world for returns without an engine, with ArduPlane if the autopilot has no such return.
 
     ArduPlane then has the aircraft's parameters, and the airspeeds of the user's PX4 parameter file.
     """
@@ -508,14 +514,14 @@ def without_engine_world(world: ReturnWorld) -> ReturnWorld:
     return make_return_world(world.setup, ArduPlane(parameters))
 
 
-def _with_px4_airspeeds(parameters: ArduPilotParameters, own: Parameters | None) -> ArduPilotParameters:
+def _with_px4_airspeeds(parameters: ArduPilotParameters, user_parameters: Parameters | None) -> ArduPilotParameters:
     """Return ArduPlane's parameters with the airspeeds of the user's PX4 parameter file.
 
-    own: the user's parameters; the result is unchanged if they are not PX4's.
+    user_parameters: the user's parameters; without PX4 parameters, the result is unchanged.
     """
-    if not isinstance(own, Px4Parameters):
+    if not isinstance(user_parameters, Px4Parameters):
         return parameters
-    file_parameters = own.by_origin("file")
+    file_parameters = user_parameters.by_origin("file")
     names = {name: FROM_ARDUPILOT[name][0] for name in ("AIRSPEED_MIN", "AIRSPEED_CRUISE", "AIRSPEED_MAX")}
     return parameters.changed(
         **{name: file_parameters[px4_name] for name, px4_name in names.items() if px4_name in file_parameters}
@@ -540,9 +546,9 @@ def judge_returns(
     """Simulate and judge the return from each start.
 
     interval: time between starts, s.
-    fly_again: flies a return in JSBSim; None for no such flights.
+    fly_again: function that flies an uncertain return again in JSBSim; None for no such flights.
     max_flights: maximum number of JSBSim flights.
-    advance: called with the number judged and the total; an exception that it raises ends the work.
+    advance: called with the number of judged returns and the total; an exception that it raises ends the work.
     """
     returns: list[SimulatedReturn] = []
     differences: list[float] = []
@@ -582,7 +588,7 @@ def judge_returns(
 
 
 def _no_returns(world: ReturnWorld, starts: ReturnStarts, interval: float) -> Returns:
-    """Return a `Returns` without any return; its other fields are filled."""
+    """Return a `Returns` without any return, but with the data on autopilot, zones and reserve."""
     parameters = world.autopilot.parameters
     autoland = int(parameters.rtl_autoland) if isinstance(parameters, ArduPilotParameters) else None
     return Returns(
@@ -607,13 +613,9 @@ def _no_returns(world: ReturnWorld, starts: ReturnStarts, interval: float) -> Re
 def sinks_to_ground(ret: SimulatedReturn, height: float) -> bool:
     """Return True if an RTL from low in a take-off or landing sinks to the ground before it can return.
 
-    The path of the return is then not at fault.
-
-    height: height of the start above ground, m.
-
-    Below `MIN_JUDGED_HEIGHT_M`, the result is True for any return that hits the ground or gets too low near its start.
-    Above this height, the return must also lose half of its height.  It is False for a return that flies into rising
-    ground, or hits a hill later.
+    The path of the return is then not at fault.  Returns that fly into rising ground or hit a hill later do not count.
+    height: height of the start above ground, m.  Above `MIN_JUDGED_HEIGHT_M`, the return must also lose half of this
+        height.
     """
     distance = math.dist(ret.start[:2], ret.lowest_position[:2])
     is_sinking = (
@@ -634,9 +636,8 @@ def simulate_judged_returns(
 ) -> tuple[Records, tuple[Floats, ...]]:
     """Simulate returns for judging; the required height does not apply in a landing sequence.
 
-    From the first item of a landing sequence on, a return flies the mission's approach, which descends to the landing.
-    There, only the ground, the spheres, the zones and the energy limit the return.  If a return becomes too low on the
-    approach, its clearance is measured only up to the first item.
+    After the first item of a landing sequence, a return flies the mission's approach, which descends to the landing.
+    The clearance of a return that becomes too low on the approach is therefore measured only up to the first item.
 
     min_heights: required heights above ground, m, (n,).
     min_sphere_distances: required distances outside spheres, m, (n,), to abort a return that is too close or too low;
@@ -663,7 +664,7 @@ def simulate_judged_returns(
     results = results.copy()
     for name in ("clearance", "clearance_east", "clearance_north", "clearance_up"):
         values = results[name]
-        # A return that meets the ground keeps the place where it does.
+        # A return that hits the ground keeps the position of the impact.
         is_airborne = results["outcome"][indices] != RETURN_GROUND_IMPACT
         values[indices[is_airborne]] = short_results[name][is_airborne]
     return results, simulation.tracks
@@ -672,7 +673,7 @@ def simulate_judged_returns(
 def required_heights(world: ReturnWorld, starts: ReturnStarts) -> Floats:
     """Return the required height above ground of the RTL from each start, m, (n,).
 
-    This is the limit.  It is lower for a start at which the flight itself is below the limit, or soon will be, as in a
+    It is `ReturnWorld.limit`, or less if the flight itself is below this limit at the start or soon afterwards, as in a
     landing sequence.
     """
     start_heights = heights_above_ground(world, starts)
@@ -708,7 +709,7 @@ def classify_return(world: ReturnWorld, result: Record, zone: int, energy_left: 
     if energy_left < ENERGY_RESERVE_FRACTION * world.setup.battery:
         return "energy"
     if result["clearance"] < required_height - CLEARANCE_TOLERANCE_M:
-        # A return that was too low is not judged better by an unknown rest of its path.
+        # A return that was too low fails even if the rest of its path is unknown.
         return "low"
     if result["outcome"] == RETURN_OFF_TERRAIN or math.isnan(result["clearance"]):
         return "unknown"
@@ -728,9 +729,11 @@ def _judge_return(
     path: Floats,
     required_height: float,
 ) -> SimulatedReturn:
-    """Judge the return from start number `k`.
+    """Judge one simulated return, from start number `k`.
 
+    result: record of dtype `RETURN_RESULT`.
     path: positions of the return, m, (t, 3); empty without zones.
+    required_height: required height above ground, m.
     """
     zone = most_violated_zone(world, path) if len(path) > 1 else -1
     energy_used = float(starts.energy_used[k])
@@ -759,7 +762,10 @@ def _judge_return(
 
 
 def most_violated_zone(world: ReturnWorld, path: Floats) -> int:
-    """Return the index of the zone that a path violates most, or -1 if it violates none.  path: m, (t, 3)."""
+    """Return the index of the zone that a path violates most, or -1 if it violates none.
+
+    path: positions at intervals of one second, m, (t, 3).
+    """
     steps = np.diff(path, axis=0)
     moves: Records = np.zeros(len(steps), MOVE)
     lengths = np.hypot(steps[:, 0], steps[:, 1])
@@ -788,9 +794,9 @@ def _recheck_in_jsbsim(
 ) -> tuple[list[SimulatedReturn], list[float]]:
     """Fly doubtful returns in JSBSim, the most doubtful first, and correct the point-mass results.
 
-    Some doubtful returns are not flown in JSBSim, because they begin in a turn or `max_flights` are flown already.
-    They get the correction of the nearest flown return among the successive doubtful returns around them, if JSBSim
-    made that return worse.
+    A return is doubtful if the error of the point mass may change its outcome.  Doubtful returns that begin in a turn,
+    or that exceed `max_flights`, are not flown in JSBSim.  They get the correction of the nearest flown return in the
+    same series of doubtful returns, if JSBSim made that return worse.
 
     Returns the corrected returns, and for each flown return the difference in clearance (JSBSim minus point mass, m).
     """
@@ -812,7 +818,7 @@ def _recheck_in_jsbsim(
         distance_offset = jsbsim_minima[1] - returns[k].sphere_distance
         if math.isfinite(height_offset) and not is_ground_impact:
             differences.append(height_offset)
-        # 0 if there is nothing to compare.
+        # The offset is 0 if one of the two values is unknown.
         offsets[k] = (
             height_offset if math.isfinite(height_offset) else 0.0,
             distance_offset if math.isfinite(distance_offset) else 0.0,
@@ -842,7 +848,7 @@ def _corrected_return(
 ) -> SimulatedReturn:
     """Correct a doubtful return by the differences between JSBSim and the point mass on a flown return.
 
-    If these differences are large and change the outcome, it becomes "unsure", unless a failure is certain.
+    If these differences are large and matter, the outcome becomes "unsure", unless a failure is certain.
 
     offsets: differences (JSBSim minus point mass) in clearance and in distance outside kill spheres, m.
     flown: result of the point mass for the flown return.
@@ -886,7 +892,7 @@ def _with_offsets(
 
 
 def can_start_in_jsbsim(world: ReturnWorld, row: Record) -> bool:
-    """Return True if a JSBSim flight can begin at a start: the bank is small, and the airspeed is high enough."""
+    """Return True if a JSBSim flight can begin at a start, which needs a small bank and enough airspeed."""
     place = [float(row[name]) for name in ("east", "north", "up")]
     wind_east, wind_north = world.scenario.wind_velocity(place, float(row["time"]))
     east = float(row["velocity_east"]) - wind_east
@@ -896,7 +902,7 @@ def can_start_in_jsbsim(world: ReturnWorld, row: Record) -> bool:
 
 
 def limit_ratio(ret: SimulatedReturn) -> float:
-    """Return the distance of a return from its nearest limit, in units of the point mass's error.
+    """Return a return's distance from its nearest limit, divided by the error of the point mass.
 
     The limits are the ground, the required height and the kill spheres.  Below 1, the error of the point mass may
     change the outcome.  Return inf for an outcome that depends on no distance, or if all distances are unknown.

@@ -18,11 +18,11 @@ from world.arrays import Flags, Floats
 from world.geometry import leg_courses
 from world.kernels import Records
 
-# Time over which velocities are computed for a track without velocities, s.
+# Time before and after a row over which a missing velocity is computed from positions, s.
 _VELOCITY_WINDOW_S = 1.0
 # Height lost at the beginning of a return from a final approach with the motor off, before the aircraft climbs, m.
 SINK_HEIGHT_LOSS_M = 10.0
-# Time between the positions of the planned path at which its height above ground is taken, s.
+# Longest time between the samples of the planned path's height above ground, s.
 _PATH_INTERVAL_S = 1.0
 # Time in which a return from a descent stops sinking, s: the default of ArduPlane's TECS_TIME_CONST.
 SINK_TIME_S = 5.0
@@ -63,7 +63,7 @@ class ReturnStarts:
 
 
 def flown_starts(setup: FlightSetup, track: Track, interval: float) -> ReturnStarts:
-    """Sample a flown track up to its own return to launch; samples on the ground are left out.
+    """Sample a flown track as starts of returns, without samples on the ground or in its own RTL.
 
     interval: time between samples, s.
 
@@ -81,7 +81,7 @@ def flown_starts(setup: FlightSetup, track: Track, interval: float) -> ReturnSta
         return _empty_starts(is_flown=True)
     time = track.time[usable_rows]
     sample_times = np.arange(time[0], time[-1] + 1e-9, interval)
-    # Take the nearest row, except in a pause of the log.
+    # Take the next row at or after each sample time; a gap in the log gives only one row.
     sampled_rows = usable_rows[np.unique(np.searchsorted(time, sample_times - 1e-9).clip(0, len(usable_rows) - 1))]
     is_low, is_slow = _low_and_slow_rows(setup, track, sampled_rows)
     start_rows, is_low_start = sampled_rows[~is_slow], is_low[~is_slow]
@@ -101,7 +101,7 @@ def _empty_starts(*, is_flown: bool) -> ReturnStarts:
 
 
 def _height_losses(setup: FlightSetup, time: Floats, position: Floats, start_times: Floats) -> Floats:
-    """Return the height above ground that a flight loses in the `SINK_TIME_S` after each start, m, (n,); 0 if unknown.
+    """Return the height above ground lost in the `SINK_TIME_S` after each start, m, (n,); 0 if unknown.
 
     time, position: times of the flight, s, (t,), and its positions, m, (t, 3).
     start_times: s, (n,), within these times.
@@ -116,9 +116,10 @@ def _height_losses(setup: FlightSetup, time: Floats, position: Floats, start_tim
 
 
 def _low_and_slow_rows(setup: FlightSetup, track: Track, rows: NDArray[np.intp]) -> tuple[Flags, Flags]:
-    """Return two masks (n,): rows that are low in a take-off or landing, and those of them that are too slow to fly.
+    """Return masks of low rows of a take-off or landing, and of low rows too slow to fly, (n,).
 
     Without terrain, both masks contain all rows of the take-off and the landing.
+    rows: rows of the track, (n,).
     """
     procedures, terrain = setup.ground_phases, setup.scenario.terrain
     is_ground_phase = ground_phase_rows(track, procedures)[rows]
@@ -132,7 +133,7 @@ def _low_and_slow_rows(setup: FlightSetup, track: Track, rows: NDArray[np.intp])
 
 
 def _ground_velocities(track: Track, rows: NDArray[np.intp]) -> Floats:
-    """Return the ground velocities at some rows, m/s, (n, 3), with missing ones computed from positions."""
+    """Return the ground velocities in some rows, m/s, (n, 3); missing ones are computed from positions."""
     velocity = track.velocity[rows].astype(np.float64)
     for k in np.flatnonzero(~np.isfinite(velocity).all(axis=1)):
         window_rows = np.flatnonzero(np.abs(track.time - track.time[rows[k]]) <= _VELOCITY_WINDOW_S)
@@ -143,7 +144,7 @@ def _ground_velocities(track: Track, rows: NDArray[np.intp]) -> Floats:
 
 
 def planned_starts(setup: FlightSetup, interval: float, requirements: RouteRequirements | None = None) -> ReturnStarts:
-    """Sample the planned path up to its own return to launch, with the predicted energy used before.
+    """Sample the planned path up to its own RTL as starts of returns, with the energy used.
 
     interval: time between samples, s.
     requirements: the setup's route requirements if already known.
@@ -189,7 +190,7 @@ def planned_positions(setup: FlightSetup, interval: float) -> tuple[Floats, Floa
 
 
 def _moves_before_return(setup: FlightSetup) -> Records:
-    """Return the moves of the planned path up to its return to launch; none if it begins with a return."""
+    """Return the moves (`MOVE`) of the planned path up to its RTL; none if it begins with one."""
     route = setup.route
     last_leg = (route.legs if route.rtl_start is None else route.rtl_start) - 1
     moves = path_moves(setup.path, _ground_speeds(setup), 0, last_leg)
@@ -197,10 +198,10 @@ def _moves_before_return(setup: FlightSetup) -> Records:
 
 
 def _sample_positions(moves: Records, interval: float) -> tuple[Floats, NDArray[np.intp], Floats, Floats]:
-    """Sample moves at an interval of time.
+    """Sample the moves of a planned path at an interval of time.
 
-    Returns times, s, numbers of the moves, and the flown fraction of each move, all (t,), and positions, m, (t, 3).
-    moves: at least one move of a planned path.
+    Return times (s), numbers of the moves, and the flown fraction of each move, all (t,), and positions (m, (t, 3)).
+    moves: at least one straight segment or arc, of dtype `MOVE`.
     interval: time between samples, s.
     """
     times = np.arange(0.0, float(moves["time"][-1] + moves["lasts"][-1]), interval)
@@ -235,7 +236,10 @@ def flown_end(track: Track) -> ReturnStarts:
 
 
 def planned_end(requirements: RouteRequirements) -> ReturnStarts:
-    """Return the end of the planned path as the start of a return, in straight flight, with the predicted energy."""
+    """Return the end of the planned path as the start of a return, with the predicted energy.
+
+    The aircraft is in straight flight.
+    """
     course = float(requirements.courses[-1])
     slope = math.tan(float(requirements.slopes[-1]))
     speed = float(_ground_speeds(requirements.setup)[-1])
@@ -249,7 +253,7 @@ def planned_end(requirements: RouteRequirements) -> ReturnStarts:
 def _ground_speeds(setup: FlightSetup) -> Floats:
     """Return the ground speed on each leg in the mean wind, or the airspeed if the wind is too strong, m/s.
 
-    In a forecast, this is the wind at the middle of the leg at the time when the aircraft is there.
+    With a forecast, the wind is taken in the middle of the leg, at the time when the aircraft is there.
     """
     route, speeds = setup.route, []
     courses, winds = leg_courses(route.positions), find_leg_winds(setup, route)

@@ -107,12 +107,15 @@ def segment_text(kind: Kind) -> str:
 
 
 def outcome_text(ret: SimulatedReturn, limit: float) -> str:
-    """Describe the outcome of one return.  limit: required minimum height above ground, m."""
+    """Describe the outcome of one return, such as "is safe" or "hits the ground".
+
+    limit: required minimum height above ground, m.
+    """
     return "is safe" if ret.safe else _SINGULAR_TEXTS[ret.kind].format(limit=limit)
 
 
 def measured_text(ret: SimulatedReturn, limit: float, scenario: Scenario) -> str:
-    """Describe one return: destination, outcome, minimum height above ground, and distance from missile spheres.
+    """Describe one return: destination, outcome, minimum height, and distance from missile spheres.
 
     limit: required minimum height above ground, m.
     """
@@ -131,7 +134,7 @@ def measured_text(ret: SimulatedReturn, limit: float, scenario: Scenario) -> str
 
 
 def counts_text(returns: Returns) -> str:
-    """Return a text with the number of returns by outcome, the worst first; "" if all are safe."""
+    """State the number of returns by outcome, the worst first, as "3 hit the ground"; "" if all are safe."""
     counts = {kind: returns.count(kind) for kind in KINDS if kind != "safe"}
     texts = {
         kind: (_SINGULAR_TEXTS if count == 1 else _PLURAL_TEXTS)[kind].format(limit=returns.limit)
@@ -154,7 +157,7 @@ def headline(returns: Returns) -> str:
         return f"not judged: {reasons}" if reasons else "no position to return from"
     landing_suffix = "; the landing is not judged" if returns.lands else ""
     omitted_text = (
-        f"; {returns.omitted_count} on or near the ground during take-off and landing omitted"
+        f"; {count_text(returns.omitted_count, 'start')} on or near the ground during take-off and landing omitted"
         if returns.omitted_count
         else ""
     )
@@ -180,7 +183,7 @@ def _judged_text(returns: Returns) -> str:
         first_count, _, outcomes = failure_counts.partition(" ")
         safe_text = "none is" if safe_count == 0 else "1 is" if safe_count == 1 else f"{safe_count} are"
         return f"{first_count} of {total} returns {outcomes}; {safe_text} safe"
-    # Leave out returns that begin below the limit, as after a take-off: their lowest point is the start.
+    # Returns that begin below the limit, as after a take-off, are left out: their lowest point is the start.
     high_returns = [ret for ret in returns.each if not ret.required_height < returns.limit] or returns.each
     lowest_return = min(high_returns, key=lambda ret: ret.clearance)
     min_energy_left = min(
@@ -195,7 +198,7 @@ def _judged_text(returns: Returns) -> str:
 
 
 def point_of_no_return_text(returns: Returns) -> str:
-    """Describe the point after which the battery no longer permits a return with its reserve.
+    """Describe the point of no return: after it, a return no longer leaves the battery's reserve.
 
     >>> point_of_no_return_text(Returns((), 1.0, (), 60.0, None, 0.0, True))
     'point of no return by energy: not judged, because the battery energy is unknown'
@@ -225,7 +228,7 @@ def point_of_no_return_text(returns: Returns) -> str:
 
 
 def describe_causes(causes: tuple[Cause, ...]) -> list[str]:
-    """List, in up to three lines, the events that cause a return, those that cause a landing, and the others.
+    """List, in up to three lines, the events that cause a return, a landing, or neither.
 
     >>> from flight.autopilots.arduplane.failsafes import failsafe_causes
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
@@ -237,7 +240,7 @@ def describe_causes(causes: tuple[Cause, ...]) -> list[str]:
     """
 
     def setting_text(cause: Cause) -> str:
-        """Return the parameter that decides on an event, and its value, in brackets."""
+        """Return the parameter that decides the reaction to an event, and its value, in brackets."""
         return f" ({cause.parameter} {cause.value})" if cause.parameter else ""
 
     returning = [f"{cause.name}{setting_text(cause)}" for cause in causes if cause.is_return]
@@ -291,7 +294,7 @@ def describe_landing(returns: Returns) -> list[str]:
 
 
 def range_text(return_range: ReturnRange, returns: Returns, scenario: Scenario) -> str:
-    """Describe a time range: whether its returns are safe, their destination and outcome, and its worst return."""
+    """Describe a time range: are its returns safe, their destination, and the worst return."""
     worst_return = return_range.worst
     time_text = (
         f"{return_range.first:.0f} s"
@@ -316,7 +319,7 @@ def _judgement_text(ret: SimulatedReturn) -> str:
 
 
 def _energy_outcome_text(ret: SimulatedReturn, returns: Returns) -> str:
-    """Describe the energy that a return leaves, if its outcome depends on the energy."""
+    """Describe the energy that a return leaves, compared with the required reserve."""
     if ret.kind == "used":
         return "the energy used before is unknown"
     if ret.energy_left < 0.0:
@@ -378,7 +381,7 @@ def remedy_text(remedy: Remedy, returns: Returns, scenario: Scenario) -> str:
 
 
 def rally_texts(rally: Sequence[ReturnPoint], scenario: Scenario) -> list[str]:
-    """Return the latitude, longitude and height above home of each rally point as text for a ground station."""
+    """Return latitude, longitude and height above home of each rally point as text."""
     texts = []
     for point in rally:
         lat, lon = (float(value) for value in to_geo(scenario.origin, point.east, point.north))

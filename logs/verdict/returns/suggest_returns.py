@@ -55,9 +55,9 @@ class Remedy:
 
 
 def is_improvement(before: Returns, after: Returns) -> bool:
-    """Return True if fewer returns fail after a change, and no kind of failure becomes more frequent.
+    """Return True if a change improves the returns and makes no kind of failure more frequent.
 
-    Only "low" and "safe" returns may become more frequent.
+    "low" returns may become more frequent only if fewer returns are unsafe.
     """
     has_more_failures = any(after.count(kind) > before.count(kind) for kind in KINDS if kind not in ("low", "safe"))
     has_more_low_returns = after.count("low") > before.count("low") and len(after.unsafe) >= len(before.unsafe)
@@ -70,7 +70,11 @@ def is_improvement(before: Returns, after: Returns) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class _ReturnLimits:
-    """Required height above ground and required distance outside spheres of the return from each start, m, (n,)."""
+    """Limits of the return from each start.
+
+    clearance: required height above ground, m, (n,).
+    sphere_distance: required distance outside kill spheres, m, (n,).
+    """
 
     clearance: Floats
     sphere_distance: Floats
@@ -81,12 +85,11 @@ class _ReturnLimits:
 
 
 def _return_limits(world: ReturnWorld, starts: ReturnStarts, margin: float = MARGIN) -> _ReturnLimits:
-    """Return the required height above ground and distance from the spheres of the return from each start.
+    """Return each return's required height above ground and distance from kill spheres.
 
-    A start that is itself lower, or closer to a sphere, has a weaker limit: the start's own value minus the height lost
-    in the turn.
-
-    margin: added to the required height, and required as the distance from the spheres, m.
+    If the start itself is lower or closer to a sphere, only its own value minus the height lost in the turn is
+    required.
+    margin: added to the required height, and required as distance from the spheres, m.
     """
     rows = starts.rows
     sphere_distances = np.full(len(starts), math.inf)
@@ -107,7 +110,7 @@ def _return_limits(world: ReturnWorld, starts: ReturnStarts, margin: float = MAR
 
 
 def meets_return_limits(world: ReturnWorld, starts: ReturnStarts) -> Flags:
-    """Return a mask (n,): True for each start whose simulated RTL keeps the limits, without margin."""
+    """Return a mask (n,): True for each start whose simulated RTL keeps all limits, without `MARGIN`."""
     return _rtls_meet_criterion(world, starts, _return_limits(world, starts, 0.0), _meets_all_limits)
 
 
@@ -119,7 +122,7 @@ def _clears_ground(_world: ReturnWorld, results: Records, limits: _ReturnLimits)
 def _meets_all_limits(world: ReturnWorld, results: Records, limits: _ReturnLimits) -> Flags:
     """Return a mask (n,): True for each return that arrives, keeps the required height and avoids spheres.
 
-    `_meets_criterion` checks zones and energy.
+    Zones and energy are not in the results; `_meets_criterion` checks them.
     """
     return np.asarray(_clears_ground(world, results, limits) & (results["sphere_distance"] >= limits.sphere_distance))
 
@@ -130,7 +133,11 @@ Criterion = Callable[[ReturnWorld, Records, _ReturnLimits], Flags]
 def _rtls_meet_criterion(
     world: ReturnWorld, starts: ReturnStarts, limits: _ReturnLimits, criterion: Criterion
 ) -> Flags:
-    """Return a mask (n,): True for each start whose RTL meets a criterion, as `_meets_criterion` does."""
+    """Return a mask (n,): True for each start whose RTL meets a criterion.
+
+    Each RTL goes to the destination that the autopilot chooses.
+    criterion: see `_meets_criterion`.
+    """
     return _meets_criterion(world, starts, [world.target(row) for row in starts.rows], limits, criterion)
 
 
@@ -143,7 +150,7 @@ def _meets_criterion(
 ) -> Flags:
     """Return a mask (n,): True for each return to its target that meets a criterion.
 
-    With `_meets_all_limits`, zones and energy are checked too.
+    criterion: `_clears_ground` or `_meets_all_limits`; with the latter, zones and energy are checked, too.
     """
     sphere_distances = limits.sphere_distance if criterion is _meets_all_limits else np.full(len(starts), -math.inf)
     results, paths = simulate_judged_returns(world, starts, targets, limits.clearance, sphere_distances)
@@ -159,7 +166,7 @@ def _meets_criterion(
 
 
 class _ReturnTrial:
-    """Tests returns from all starts, beginning with the starts that failed in earlier tests."""
+    """Test of returns from all starts, which begins with the starts that failed most recently."""
 
     def __init__(self, starts: ReturnStarts, limits: _ReturnLimits) -> None:
         self._starts, self._limits = starts, limits
@@ -182,8 +189,7 @@ def suggest_parameters(world: ReturnWorld, starts: ReturnStarts) -> list[Remedy]
     """Suggest the lowest return height that clears the ground or is safe, or another change of parameters.
 
     Return [] if the returns already keep all limits with the present parameters.
-
-    Heights are tried one by one, because a higher return is not always safer: it may lead through a sphere.
+    Heights are tried one by one, because a higher return may lead through a sphere and need not be safer.
     """
     limits = _return_limits(world, starts)
     trial = _ReturnTrial(starts, limits)
@@ -199,7 +205,7 @@ def suggest_parameters(world: ReturnWorld, starts: ReturnStarts) -> list[Remedy]
             remedies.append(Remedy(search.values(ground_altitude)))
         safe_altitude = search.lowest(ground_altitude or 0.0, _meets_all_limits, trial)
         if safe_altitude is None:
-            # No altitude keeps the margin on all returns: take the lowest that makes them safe.
+            # No height keeps the margin on all returns: take the lowest height with which they are safe.
             trial_without_margin = _ReturnTrial(starts, _return_limits(world, starts, 0.0))
             safe_altitude = search.lowest(0.0, _meets_all_limits, trial_without_margin)
         if safe_altitude is not None and safe_altitude not in (ground_altitude, search.current):
@@ -210,10 +216,13 @@ def suggest_parameters(world: ReturnWorld, starts: ReturnStarts) -> list[Remedy]
 
 
 class _AltitudeSearch:
-    """Search for the lowest height of the returns above their destination, from the present height upwards."""
+    """Search, upwards from the present value, for the lowest height of returns above their destination."""
 
     def __init__(self, world: ReturnWorld, present_values: Mapping[str, float]) -> None:
-        """Prepare the heights to try.  present_values: as in `ReturnTrials.altitudes`."""
+        """Prepare the heights to try.
+
+        present_values: parameters of the return height and their present values, m, as in `ReturnTrials.altitudes`.
+        """
         self._world, self._present_values = world, present_values
         self.current = next(iter(present_values.values()))
         ground_heights = world.environment.heights[np.isfinite(world.environment.heights)]
@@ -234,7 +243,7 @@ class _AltitudeSearch:
         return {name: altitude for name, present in self._present_values.items() if altitude > present}
 
     def lowest(self, min_altitude: float, criterion: Criterion, trial: _ReturnTrial) -> float | None:
-        """Return the lowest height, at least ``min_altitude``, with which all returns pass, or None."""
+        """Return the lowest height, at least `min_altitude` (m), with which all returns pass, or None."""
         return first_that_passes(
             (altitude for altitude in self._candidates if altitude >= min_altitude),
             lambda altitude: trial.passes(self._world.with_parameters(**self.values(altitude)), criterion),
@@ -242,9 +251,9 @@ class _AltitudeSearch:
 
 
 def _suggest_other_parameters(world: ReturnWorld, trial: _ReturnTrial, altitudes: dict[str, float]) -> list[Remedy]:
-    """Suggest another change of parameters with which all returns meet the limits; return [] without one.
+    """Suggest a change of other parameters with which all returns are safe; return [] without one.
 
-    altitudes: parameters of a return height, m, by name; each change is also tried together with them.  May be empty.
+    altitudes: parameters of a return height (m) by name, which are also tried together with each change; may be empty.
     """
     candidates = [dict(values) for values in world.autopilot.returns.trials.others]
     if altitudes:
@@ -264,11 +273,11 @@ _MAX_STARTS = 120
 _MAX_PATH_DISTANCE_M = 2500.0
 # Largest number of candidates.
 _MAX_CANDIDATES = 320
-# Least grid spacing of candidates, m.
+# Smallest grid spacing of candidates, m.
 _GRID_SPACING_M = 600.0
-# Number of nearest candidates to which returns are simulated from each start.
+# Number of candidates, the nearest ones, to which returns are simulated from each start.
 _SIMULATED_CANDIDATES = 60
-# Greatest distance of such a candidate, m.
+# Greatest distance from a start of a candidate to which returns are simulated, m.
 _MAX_SIMULATED_DISTANCE_M = 4500.0
 # Radius around a candidate within which the ground is checked, m: the width of ArduPlane's smallest loiters.
 _LOITER_RADIUS_M = 280.0
@@ -283,10 +292,10 @@ _PAIR_SEED_COUNT = 30
 
 
 def suggest_rally_points(world: ReturnWorld, starts: ReturnStarts) -> Remedy | None:
-    """Suggest the fewest rally points that make most returns safe, or None if no point improves the returns.
+    """Suggest the fewest rally points that make the most returns safe; None if no point helps.
 
-    The search adds the best points one by one, then swaps points, then removes superfluous points.  It assumes that
-    each return goes to the point that the autopilot chooses.
+    The search adds the best points one by one, swaps points, and removes superfluous points.  Each return goes to the
+    point that the autopilot would choose.
     """
     limits, start_count = _return_limits(world, starts), len(starts)
     # Without the mission's own rally points, all returns go home.
@@ -324,12 +333,12 @@ def _search_in_rounds(
     searched_starts: NDArray[np.intp],
     initial_count: int,
 ) -> tuple[int, tuple[ReturnPoint, ...], NDArray[np.intp]]:
-    """Search, simulate all starts, and repeat the search with the starts that remain unsafe.
+    """Search for rally points, simulate all returns, and search again with the starts that remain unsafe.
 
-    A return is good if it keeps all limits.
+    searched_starts: starts of the first search.
+    initial_count: number of candidates, from the first one, that form the initial set.
 
-    initial_count: number of first candidates that form the initial set.
-    Returns for the best round the number of good returns, the points, and the starts that remain unsafe.
+    Return for the best round the number of returns that keep all limits, the points, and the starts that remain unsafe.
     """
     best_result: tuple[int, tuple[ReturnPoint, ...], NDArray[np.intp]] = (-1, (), np.zeros(0, dtype=np.intp))
     for _ in range(_SEARCH_ROUNDS):
@@ -343,7 +352,7 @@ def _search_in_rounds(
         unsearched_starts = np.setdiff1d(unsafe_starts, searched_starts)
         if not unsearched_starts.size:
             break
-        # A few of each sequence of starts are enough.
+        # About 20 of the unsafe starts are enough.
         searched_starts = np.union1d(searched_starts, unsearched_starts[:: max(1, len(unsearched_starts) // 20)])
     return best_result
 
@@ -351,7 +360,7 @@ def _search_in_rounds(
 def _rally_candidates(
     world: ReturnWorld, starts: ReturnStarts, spacing: float, max_distance: float
 ) -> list[ReturnPoint]:
-    """Return candidate rally points on a grid near the path, at two altitudes, with loiters clear of spheres.
+    """Return candidate rally points on a grid near the path, at two altitudes, clear of spheres.
 
     spacing: grid spacing, m, increased if there are too many candidates.
     max_distance: maximum distance from the path, m.
@@ -371,7 +380,7 @@ def _rally_candidates(
             break
         spacing *= 1.2
     candidates = []
-    # PX4 ends its return above a rally point, which is a place on the ground; ArduPlane at the point itself.
+    # PX4 ends its return at this height above a rally point, which lies on the ground.  ArduPlane ends at the point.
     end_height = world.autopilot.returns.rules.rally_height
     for grid_east, grid_north in grid.tolist():
         min_altitude = _highest_ground(world, grid_east, grid_north) + world.limit + MARGIN
@@ -480,7 +489,10 @@ class _RallySearch:
         )
 
     def _simulate_candidates(self, searched_starts: NDArray[np.intp]) -> None:
-        """Simulate the returns from starts to their nearest candidates; returns to others count as unsafe."""
+        """Simulate the returns from starts to their nearest candidates.
+
+        Returns to other candidates count as unsafe.
+        """
         pairs = [
             (start, int(candidate))
             for start in searched_starts
@@ -505,7 +517,7 @@ class _RallySearch:
         )
 
     def _count_good(self, searched_starts: NDArray[np.intp], point_set: list[int]) -> int:
-        """Return the number of good returns with these rally points, each to the point that the autopilot chooses.
+        """Return the number of good returns if the autopilot chooses among these rally points.
 
         The autopilot chooses the nearest point.  It returns as without rally points if this point is too far away, or
         farther than another destination.
@@ -525,7 +537,7 @@ class _RallySearch:
         return int(is_good.sum())
 
     def _with_swaps(self, searched_starts: NDArray[np.intp], point_set: list[int]) -> list[int]:
-        """Return a set in which points were swapped for better ones until no swap is an improvement."""
+        """Swap points of a set for other candidates until no swap increases the number of good returns."""
         best_count, has_improved = self._count_good(searched_starts, point_set), True
         while has_improved:
             has_improved = False
@@ -538,7 +550,7 @@ class _RallySearch:
         return point_set
 
     def _without_superfluous_points(self, searched_starts: NDArray[np.intp], point_set: list[int]) -> list[int]:
-        """Return a set without the points whose removal makes no return unsafe."""
+        """Remove the points of a set that do not increase the number of good returns."""
         for candidate in list(point_set):
             smaller_set = [other for other in point_set if other != candidate]
             if self._count_good(searched_starts, smaller_set) >= self._count_good(searched_starts, point_set):

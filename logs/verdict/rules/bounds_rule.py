@@ -23,16 +23,16 @@ def bounds_findings(
     if scenario.external:
         reason = "the mission came without a scenario, so there is no area to stay in"
         return [make_finding("bounds", FLIGHT, ok=None, reason=reason, unit="m")]
-    planned_margin, edge, k = _min_distance_inside(requirements, requirements.points)
-    margin, where_text = planned_margin, f"at {place_text(requirements.waypoint(k))}"
+    planned_margin, edge, row = _min_distance_inside(requirements, requirements.points)
+    margin, where_text = planned_margin, f"at {place_text(requirements.waypoint(row))}"
     ok: bool | None = planned_margin >= -ROUNDING_M
     flown_margin = math.nan
     if not geometric and aligned is None:
         ok, where_text = None, "nothing was flown"
     elif aligned is not None:
-        margin, edge, k = _min_distance_inside(requirements, aligned.track.position)
+        margin, edge, row = _min_distance_inside(requirements, aligned.track.position)
         flown_margin, ok = margin, margin >= -ROUNDING_M
-        where_text = f"at {aligned.track.time[k]:.1f} s"
+        where_text = f"at {aligned.track.time[row]:.1f} s"
     margin_text = f"{abs(margin):.0f} m {'inside' if margin >= 0.0 else 'beyond'} the {edge} {where_text}"
     return [
         make_finding(
@@ -54,9 +54,10 @@ def bounds_findings(
 
 
 def _min_distance_inside(requirements: RouteRequirements, points: Floats) -> tuple[float, str, int]:
-    """Return the minimum distance from the nearest edge of the area, its name, and the row of `points`.
+    """Find the point with the smallest distance inside an edge of the area.
 
-    The distance is in m, negative outside the area.
+    Return this distance (m, negative outside the area), the name of the edge, and the row of the point.
+    points: positions (east, north, up), m, (n, 3).
     """
     scenario = requirements.setup.scenario
     (west, east), (south, north) = scenario.bounds
@@ -69,8 +70,8 @@ def _min_distance_inside(requirements: RouteRequirements, points: Floats) -> tup
         "ceiling": scenario.ceiling - points[:, 2],
     }
     edge = min(distances, key=lambda name: float(distances[name].min()))
-    k = int(np.argmin(distances[edge]))
-    return float(distances[edge][k]), edge, k
+    row = int(np.argmin(distances[edge]))
+    return float(distances[edge][row]), edge, row
 
 
 RULE = Rule(

@@ -35,8 +35,8 @@ def clearance_findings(
 ) -> list[Finding]:
     """Judge the minimum height above ground on each leg, except on a landing that another rule judges.
 
-    Without terrain data the legs are not judged, and one undecided finding states this.  Other findings are on the
-    altitude of home.
+    Without terrain data, one undecided finding states that the legs are not judged.  A further finding reports a
+    doubtful altitude of home.
     """
     terrain = requirements.setup.scenario.terrain
     limit = requirements.limits.min_clearance
@@ -76,13 +76,12 @@ def clearance_findings(
 
 
 def _known_heights(terrain: Terrain, points: Floats) -> tuple[Floats, Floats]:
-    """Return each segment's lowest known height above ground, and where the ground is first unknown.
+    """Return each segment's lowest known height above ground, and its first place over unknown ground.
 
-    points: (n, 3) m.
+    points: corners of the path (east, north, up), m, (n, 3).
 
-    The heights have the shape (n - 1,) and the unit m.  A height is NaN if the ground is unknown along the whole
-    segment; if it is known along a part, this part is sampled.  The places have the shape (n - 1, 3) and the unit m,
-    and are NaN for segments over known ground.
+    The heights are in m, (n - 1,).  A height is NaN if the ground is unknown along the whole segment.  If only a part
+    is known, samples of that part give the height.  The places are in m, (n - 1, 3), NaN where all ground is known.
     """
     heights, fractions = path_clearance(terrain.heights, terrain.to_pixel.record, points)
     off_terrain = np.full((len(heights), 3), np.nan)
@@ -98,9 +97,9 @@ def _known_heights(terrain: Terrain, points: Floats) -> tuple[Floats, Floats]:
 
 
 def _off_terrain_text(requirements: RouteRequirements, terrain: Terrain, places: Floats) -> str:
-    """Return a clause on the first place of a leg where the ground is unknown; "" if it is known everywhere.
+    """Return a clause on the first place where a leg leaves the terrain data; "" if it does not.
 
-    places: see `_known_heights`.
+    places: for each segment of the leg, the first place over unknown ground, m, (n, 3); NaN if there is none.
     """
     is_off = np.isfinite(places[:, 0])
     if not is_off.any():
@@ -182,7 +181,7 @@ class _Requirement(NamedTuple):
         return requirement
 
     def worst_height(self, heights: Floats, points: Floats) -> tuple[float, float]:
-        """Return the height above ground with the smallest margin, and the height required at the same point, m.
+        """Return the height above ground with the smallest margin, and the height required there, m.
 
         heights: heights above ground at `points`, m, (n,).
         points: positions, m, (n, 3).
@@ -195,7 +194,7 @@ class _Requirement(NamedTuple):
         return float(heights[k]), requirement
 
     def smallest_margin(self, heights: Floats, points: Floats) -> tuple[int, float]:
-        """Return the index of the known height with the smallest margin, and the height (m) required at this point."""
+        """Return the index of the height with the smallest margin, and the height required there, m."""
         if not self.fields:
             return int(np.nanargmin(heights)), self.limit
         requirement = self.required_heights(points)
@@ -219,11 +218,10 @@ class _Landing(NamedTuple):
 
 
 def _find_landing(requirements: RouteRequirements) -> _Landing | None:
-    """Return the landing of a mission; None without a landing, and for a plan without planned ground phases.
+    """Return the landing of a mission; None without a landing or without planned ground phases.
 
-    Without a `[landing]`, a flight ends in the air, over the landing point and at the height of the waypoint before it.
-    It then says nothing about the descent, which the rules `landing` and `approach` judge.  In an imported log, the
-    descent ends on the ground.
+    Without a `[landing]` in the scenario, a simulated flight ends in the air over the landing point.  This rule then
+    leaves the descent to the rules `landing` and `approach`.  In an imported log, the descent ends on the ground.
     """
     setup, ground = requirements.setup, requirements.ground_phases
     approach = (setup.ground_phases if ground is None else ground.procedures).approach
@@ -240,22 +238,21 @@ def _find_landing(requirements: RouteRequirements) -> _Landing | None:
 def _fields_by_leg(
     requirements: RouteRequirements, landing: _Landing | None
 ) -> dict[int, tuple[tuple[float, float], ...]]:
-    """Return, by leg number, positions (east, north, m) near which the leg needs less height above ground.
+    """Return, by leg number, the home or landing positions near which the leg may be lower.
 
-    For the leg after a flown or logged take-off, this is the position of home.  For the legs before a landing, it is
-    the landing point.  These legs begin at DO_LAND_START, or are the last two legs if the mission has no such item.  Of
-    them, only the final approach is included, and the legs after the last waypoint that keeps the required height above
-    ground.
+    A position is (east, north), m.  The legs of a flown or logged take-off have the position of home.  The final
+    approach has the landing point.  So have earlier legs of the landing, from the last waypoint that keeps the full
+    required height.  A landing begins at DO_LAND_START, or without this item one leg before the final approach.
     """
     setup, ground = requirements.setup, requirements.ground_phases
     procedures = setup.ground_phases if ground is None else ground.procedures
-    fields_of_leg: dict[int, tuple[tuple[float, float], ...]] = {}
+    fields_by_leg: dict[int, tuple[tuple[float, float], ...]] = {}
     if procedures.take_off is not None:
-        fields_of_leg[procedures.take_off.waypoint] = (
+        fields_by_leg[procedures.take_off.waypoint] = (
             (float(procedures.take_off.home[0]), float(procedures.take_off.home[1])),
         )
     elif (home := _logged_takeoff_home(requirements)) is not None:
-        fields_of_leg = dict.fromkeys(range(takeoff_item(requirements)[0] + 1), (home,))
+        fields_by_leg = dict.fromkeys(range(takeoff_item(requirements)[0] + 1), (home,))
     if landing is not None:
         landing_starts = [item.seq for item in setup.mission.items if item.command == Command.DO_LAND_START]
         sequence_start = max((seq for seq in landing_starts if seq < landing.item), default=None)
@@ -264,8 +261,8 @@ def _fields_by_leg(
             later_waypoints = np.flatnonzero(setup.route.items > sequence_start)
             first_leg = max(0, int(later_waypoints[0]) - 1) if later_waypoints.size else first_leg
         for leg in range(max(first_leg, _last_clear_waypoint(requirements, landing.leg)), landing.leg + 1):
-            fields_of_leg[leg] = (*fields_of_leg.get(leg, ()), landing.point)
-    return fields_of_leg
+            fields_by_leg[leg] = (*fields_by_leg.get(leg, ()), landing.point)
+    return fields_by_leg
 
 
 def _logged_takeoff_home(requirements: RouteRequirements) -> tuple[float, float] | None:
@@ -280,8 +277,8 @@ def _logged_takeoff_home(requirements: RouteRequirements) -> tuple[float, float]
 def _first_airborne_segment(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> int:
     """Return the segment of the track from which the clearance of a leg is judged.
 
-    It is normally the first segment of the leg.  In an imported log with a take-off, it is the segment at which the
-    climb-out reaches `GROUND_LEG_CLEARANCE_M`, provided that the aircraft stays near home up to there.
+    It is normally the first segment of the leg.  In an imported log with a take-off, it is the first segment at or
+    above `GROUND_LEG_CLEARANCE_M`, if the aircraft stays near home until then.
     """
     first, last = aligned.leg_segments(leg)
     home = _logged_takeoff_home(requirements)
@@ -295,7 +292,7 @@ def _first_airborne_segment(requirements: RouteRequirements, aligned: AlignedTra
 
 
 def _last_clear_waypoint(requirements: RouteRequirements, final_leg: int) -> int:
-    """Return the last waypoint up to the start of the final approach that keeps the required height above ground.
+    """Return the last waypoint before the final approach that keeps the required height above ground.
 
     Return the start of the final approach if no waypoint keeps this height, or if the terrain is unknown.
     """
@@ -308,12 +305,15 @@ def _last_clear_waypoint(requirements: RouteRequirements, final_leg: int) -> int
 
 
 def _limit_source(requirements: RouteRequirements, limit: float) -> str:
-    """Name the source of a limit on height above ground, m."""
+    """Name the source of a required height above ground, m; near home and landing point it is lower."""
     return "near the field" if limit < requirements.limits.min_clearance else requirements.limits_source
 
 
 def _terrain_error_text(clearance: float, limit: float, error: float | None) -> str:
-    """Describe a clearance minus the stated error of the terrain, m; return "" if no error is stated."""
+    """Describe the clearance that remains after the terrain's error is subtracted; "" without one.
+
+    clearance, limit, error: minimum height above ground, required height and vertical error of the terrain data, m.
+    """
     if error is None or math.isnan(clearance):
         return ""
     shortfall_text = (
@@ -336,7 +336,7 @@ def _planned_finding(
     if is_short:
         reason += f"; {limit:.0f} m are required"
     reason += _terrain_error_text(planned_height, limit, terrain.vertical_error)
-    # A leg that is too low where the ground is known fails, whatever the rest is.
+    # A leg that is too low over known ground fails, even if other ground below it is unknown.
     is_unknown = bool(off_text) and not is_short
     if off_text:
         reason = f"{off_text}; {reason} elsewhere" if math.isfinite(planned_height) else off_text
@@ -386,7 +386,7 @@ def _flown_finding(
             min_clearance = float(aligned.clearance[k])
             ok = min_clearance >= limit - CLEARANCE_TOLERANCE_M
             if not ok and -_CONTACT_DEPTH_M < min_clearance < 0.0:
-                # The row of a ground contact lies in the ground, by less than a tick's way.
+                # The row of a ground contact is below the surface by at most the distance flown in one tick.
                 min_clearance = 0.0
             fraction = float(aligned.clearance_fraction[k])
             reason = f"{_height_text(min_clearance)} {_time_and_place_text(aligned, k, fraction)}"
@@ -438,7 +438,7 @@ def _placed_message(requirements: RouteRequirements, leg: int, text: str) -> Mes
 
 
 def _time_and_place_text(aligned: AlignedTrack, k: int, fraction: float) -> str:
-    """Describe when and where the aircraft was at a fraction of track segment `k`."""
+    """Describe time and position of the aircraft at a fraction (0 to 1) of track segment `k`."""
     time = aligned.track.time
     return f"at {time[k] + fraction * (time[k + 1] - time[k]):.1f} s, {aligned.position_text(k, fraction)}"
 

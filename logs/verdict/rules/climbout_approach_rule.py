@@ -92,9 +92,11 @@ class _Obstacles(NamedTuple):
 
 
 def _climb_slopes(requirements: RouteRequirements, leg: int, course: float, altitude: float) -> tuple[float, float]:
-    """Return the maximum climb slope on a course (rad) at an altitude (m AMSL), m per m.
+    """Return the nominal and the certain maximum climb slope on a course, m per m.
 
-    The first value is the nominal slope.  The second is the slope reduced by the uncertainty of the aircraft's model.
+    The certain slope is the nominal slope reduced by the uncertainty of the aircraft's model.
+    course: rad.
+    altitude: m AMSL.
     """
     speed, limits = float(requirements.route.leg_airspeeds[leg]), requirements.limits
     max_slope, certain_slope = (
@@ -168,8 +170,9 @@ def climbout_findings(
 
 
 def _unjudged_finding(rule: str, place: Place, reason: str, *, is_undecided: bool) -> Finding:
-    """Return the finding that a climb-out or an approach is not judged.
+    """Make the finding on a climb-out or an approach that cannot be judged.
 
+    rule: "climbout" or "approach".
     is_undecided: True if this finding leaves the verdict undecided.
     """
     title = "climb-out" if rule == "climbout" else rule
@@ -180,11 +183,11 @@ def _unjudged_finding(rule: str, place: Place, reason: str, *, is_undecided: boo
 
 
 class _Launch(NamedTuple):
-    """Launch course, and the leg on that course.
+    """Launch course, with length and slope of the first leg if it lies on this course.
 
     course: rad.
-    leg_length: length of the leg on the course, m.
-    slope: slope of the leg, m per m.
+    leg_length: length of the leg, m; inf if the first leg has another course.
+    slope: slope of the leg, m per m; 0 if the first leg has another course.
     course_text: description of the course, "" if the scenario states no course.
     """
 
@@ -195,10 +198,7 @@ class _Launch(NamedTuple):
 
 
 def _find_launch(requirements: RouteRequirements) -> _Launch:
-    """Return the launch on the scenario's course, or along the first leg if the scenario states no course.
-
-    If the first leg lies on the launch course, the launch has the leg's length and slope, otherwise inf and 0.
-    """
+    """Return the launch on the scenario's course, or along the first leg if the scenario states no course."""
     stated_launch = requirements.setup.scenario.launch
     first_leg = _Launch(
         float(requirements.courses[0]), float(requirements.runs[0]), math.tan(float(requirements.slopes[0]))
@@ -216,6 +216,7 @@ class _Climb(NamedTuple):
 
     slope: m per m.
     length: horizontal distance of its end from home, m.
+    obstacles: obstacles on the climb.
     """
 
     slope: float
@@ -240,41 +241,48 @@ def _take_off_climb(
     return _Climb(slope, profile[-1][0], obstacles)
 
 
-def _climb_profile(ground_altitude: float, waypoint_altitude: float, distance: float, climb: float) -> Profile:
+def _climb_profile(ground_altitude: float, waypoint_altitude: float, distance: float, climb_slope: float) -> Profile:
     """Return the profile of a climb from the ground, followed by a straight line to the first waypoint.
+
+    The profile is a list of pairs: horizontal distance from home (m) and altitude (m AMSL).
 
     ground_altitude: altitude of the ground, m AMSL.
     waypoint_altitude: altitude of the waypoint, m AMSL.
     distance: horizontal distance of the waypoint, m.
-    climb: climb slope, m per m.
+    climb_slope: m per m.
     """
     top_altitude = max(waypoint_altitude, ground_altitude + FIRST_CLIMB_HEIGHT_M)
-    climb_distance = (top_altitude - ground_altitude) / climb
+    climb_distance = (top_altitude - ground_altitude) / climb_slope
     if climb_distance >= distance:
-        return [(0.0, ground_altitude), (distance, ground_altitude + climb * distance)]
+        return [(0.0, ground_altitude), (distance, ground_altitude + climb_slope * distance)]
     return [(0.0, ground_altitude), (climb_distance, top_altitude), (distance, waypoint_altitude)]
 
 
 def _takeoff_profile(
-    ground_altitude: float, leg_altitude: float, leg_length: float, slope: float, climb: float
+    ground_altitude: float, leg_altitude: float, leg_length: float, leg_slope: float, climb_slope: float
 ) -> Profile:
-    """Return the climb profile from the ground until the aircraft is on the first leg.
+    """Return the profile of a straight climb from the ground until the aircraft is on the first leg.
+
+    The profile is a list of pairs: horizontal distance from home (m) and altitude (m AMSL).
 
     ground_altitude: altitude of the ground, m AMSL.
     leg_altitude: altitude of the leg's start over home, to which the take-off climbs, m AMSL.
     leg_length: length of the leg, m.
-    slope: slope of the leg, m per m.
-    climb: climb slope, m per m.
+    leg_slope, climb_slope: slopes of leg and climb, m per m.
     """
-    climb_distance = (leg_altitude - ground_altitude) / climb
+    climb_distance = (leg_altitude - ground_altitude) / climb_slope
     if climb_distance < leg_length:
-        joining_distance = (leg_altitude - ground_altitude) / (climb - slope) if climb > slope else math.inf
+        slope_difference = climb_slope - leg_slope
+        joining_distance = (leg_altitude - ground_altitude) / slope_difference if slope_difference > 0.0 else math.inf
         climb_distance = min(leg_length, max(climb_distance, joining_distance))
-    return [(0.0, ground_altitude), (climb_distance, ground_altitude + climb * climb_distance)]
+    return [(0.0, ground_altitude), (climb_distance, ground_altitude + climb_slope * climb_distance)]
 
 
 def _find_obstacles(requirements: RouteRequirements, path: GroundPath) -> _Obstacles:
-    """Return the obstacles on a path from home.  Height above ground is not checked on the first `LAUNCH_RUN_M`."""
+    """Return the obstacles on a path from home.
+
+    Height above ground is not checked on the first `LAUNCH_RUN_M`.
+    """
     terrain, end = requirements.setup.scenario.terrain, float(path.distance[-1])
     entered_hazard = first_hazard_on_path(requirements, path)
     if terrain is None or end <= LAUNCH_RUN_M:
@@ -309,8 +317,9 @@ def _launch_finding(
 ) -> Finding:
     """Judge the climb of a mission that takes off, towards its next waypoint or on a launch course.
 
-    steepest, gentlest: the steepest climb, and the least climb that this aircraft can be relied on to fly.
-    start: launch position (east, north, m), ground altitude there and altitude at the end of the climb (m AMSL).
+    steepest: steepest climb of the aircraft.
+    gentlest: climb at `MIN_CLIMB_FRACTION` of the certain slope.
+    start: launch position (east, north, m), its ground altitude and the altitude at the end of the climb (m AMSL).
     certain_slope: steepest climb reduced by the uncertainty of the aircraft's model, m per m.
     """
     to_item, obstacles = requirements.leg(0).to_item, steepest.obstacles
@@ -351,9 +360,10 @@ def _launch_finding(
 
 
 def _climb_text(climb: _Climb, launch: _Launch, item_text: str, end_height: float) -> str:
-    """Describe the slope of a climb, and where the climb ends if that is beyond its item.
+    """Describe the angle of a climb, and its end if that lies beyond the leg to its item.
 
-    end_height: height of the take-off's end above home, m.
+    item_text: name of the item at the end of the leg.
+    end_height: height above home at which the take-off ends, m.
     """
     text = f"climb angle {_degrees_text(climb.slope)}"
     # The take-off holds its course until it has reached its height.
@@ -366,7 +376,7 @@ def _climb_text(climb: _Climb, launch: _Launch, item_text: str, end_height: floa
 
 
 def _certain_climb_text(max_slope: float, certain_slope: float) -> str:
-    """Return a clause on the slope that is certain, if it is less than the steepest; slopes in m per m."""
+    """Return a clause that compares the nominal and the certain maximum climb slope, m per m."""
     certain_text = _degrees_text(max(0.0, certain_slope))
     return f"; the steepest climb is {_degrees_text(max_slope)}, but only {certain_text} is certain for this aircraft"
 
@@ -379,7 +389,7 @@ def _degrees_text(slope: float) -> str:
 def _clear_courses_text(
     requirements: RouteRequirements, home_position: tuple[float, float], ground_altitude: float, top_altitude: float
 ) -> str:
-    """Describe the widest range of courses on which a launch climbs to the take-off's altitude without obstacles."""
+    """Describe the widest range of launch courses on which the climb is clear of obstacles."""
 
     def is_clear(course: float) -> bool:
         """Return True if a launch on a course (rad) climbs to the take-off's altitude without obstacles."""
@@ -459,7 +469,7 @@ def approach_findings(
     if math.isnan(obstacles.clearance) and not obstacles.entered_hazard:
         return [_path_finding("approach", place, obstacles, None, message(f"the terrain below {subject} is unknown"))]
     obstacle_message = obstacles.obstacle_message(subject, "before the landing point")
-    # With a landing point below the ground the glide hits the ground early: the elevation file may be some metres off.
+    # A glide to a landing point below the ground hits the ground early.  The elevation data may be wrong by metres.
     if (
         obstacles.entered_hazard
         or obstacles.clearance + min(LANDING_POINT_ERROR_M, max(0.0, ground_altitude - point_altitude)) < 0.0

@@ -20,7 +20,7 @@ from world.wording import count_text
 def completion_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, end_reason: str, log_complete: bool
 ) -> list[Finding]:
-    """Judge whether a flight followed a feasible plan to the last waypoint, and whether its log is complete."""
+    """Judge whether a feasible plan was flown to its last waypoint, with a complete log."""
     plan = requirements.setup.plan
     faults = []
     if plan is not None and plan.failures:
@@ -70,7 +70,7 @@ def _ending_place_text(requirements: RouteRequirements, aligned: AlignedTrack | 
 
 
 def _record_faults(aligned: AlignedTrack) -> list[Message]:
-    """Report the longest gap between the log's rows, and positions that contradict the velocities, as faults."""
+    """Report as faults a long gap between the log's rows, and positions that contradict the velocities."""
     track, faults = aligned.track, []
     steps = np.diff(track.time)
     gap = int(np.argmax(steps))
@@ -95,7 +95,7 @@ _RETURN_MODE = "RTL"
 
 
 def imported_completion_finding(setup: FlightSetup, stretches: Sequence[FlownLegs], log_complete: bool) -> Finding:
-    """Judge whether an imported flight completed its mission; undecided if the log ends on the way."""
+    """Judge whether an imported flight completed its mission; undecided if the log may lack a part of it."""
     last_leg, faults, unknown_texts, notes = setup.route.legs - 1, [], [], []
     flown_legs = {leg for legs in stretches for leg in range(legs.first, legs.last - legs.partial)}
     leg_count = len(set(setup.route.leg_numbers.tolist()))
@@ -163,7 +163,10 @@ def imported_completion_finding(setup: FlightSetup, stretches: Sequence[FlownLeg
 def _unflown_legs(
     setup: FlightSetup, flown_stretches: Sequence[FlownLegs], flown_legs: set[int]
 ) -> tuple[list[int], list[str]]:
-    """Return the legs that were certainly not flown, and texts on legs that may be missing in the log."""
+    """Return the legs that were certainly not flown, and texts on legs not recorded or flown only in part.
+
+    flown_legs: numbers of the legs that were flown completely.
+    """
     unflown_legs = [leg for leg in range(setup.route.legs) if leg not in flown_legs]
     begins_in_flight = setup.imported_log is not None and setup.imported_log.begins_in_flight
     unseen_legs = [leg for leg in unflown_legs if begins_in_flight and leg < flown_stretches[0].first]
@@ -199,7 +202,7 @@ def _leg_numbers(setup: FlightSetup, legs: Iterable[int]) -> list[int]:
 
 
 def _legs_text(setup: FlightSetup, legs: Iterable[int]) -> str:
-    """Phrase the numbers of legs, such as "leg 3 is", "legs 3 to 10 are" or "8 legs from 1 to 12 are"."""
+    """Return leg numbers as subject and verb: "leg 3 is", "legs 3 to 10 are" or "8 legs from 1 to 12 are"."""
     numbers = _leg_numbers(setup, legs)
     first, last = numbers[0], numbers[-1]
     if first == last:

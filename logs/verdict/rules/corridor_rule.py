@@ -17,9 +17,8 @@ def corridor_findings(
 ) -> list[Finding]:
     """Judge the cross-track distance of each flown leg; if ``geometric``, of each leg's planned turns.
 
-    A survey, with the legs to and from it, is judged only if the scenario states the corridor explicitly.  The reasons
-    are that the survey rule judges the photo lines, and that the autopilot chooses its turns onto the first line and
-    off the last line.
+    The legs of a survey are judged only if the scenario states a corridor.  The survey rule judges its photo lines, and
+    the autopilot chooses the turns onto the first line and off the last line.
     """
     has_stated_corridor = requirements.setup.scenario.limits.corridor_m is not None
     return [
@@ -67,7 +66,7 @@ def _leg_finding(requirements: RouteRequirements, aligned: AlignedTrack | None, 
         tolerance=ROUNDING_M if geometric else 0.0,
         margin=limit - (planned_distance if geometric else flown_distance),
         unit="m",
-        method="the turns' own arcs" if geometric else "greatest distance from the leg and its neighbours, each row",
+        method="arcs of the turns" if geometric else "greatest distance of all rows from the leg and its neighbours",
     )
 
 
@@ -87,7 +86,7 @@ def _rows_after_takeoff(requirements: RouteRequirements, aligned: AlignedTrack, 
 
 
 def _time_and_place_text(aligned: AlignedTrack, row: int) -> str:
-    """Describe the time and the position of a row of the track."""
+    """Describe the time and the position of the aircraft in a row of the track."""
     east, north, _ = aligned.track.position[row]
     return f"at {aligned.track.time[row]:.1f} s, east {east:.0f} m, north {north:.0f} m"
 

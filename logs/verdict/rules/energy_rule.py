@@ -35,7 +35,7 @@ from logs.verdict.wording import count_text, quantity_text
 from world.errors import PlanflyError
 
 _MAH_PER_AH = 1000.0
-# V.  Rounding of a threshold for the whole battery, for each cell.
+# Rounding of a cell's voltage threshold, V: the threshold is stated for the whole battery.
 _VOLTAGE_ROUNDING_V = 0.005
 
 
@@ -49,8 +49,8 @@ def energy_findings(
 ) -> list[Finding]:
     """Compare the energy used with the battery's energy without its reserve.
 
-    If a battery failsafe aborts the mission earlier, the energy used up to then is the limit.  An endless jump fails.
-    Otherwise it is undecided if the battery is guessed, the energy unknown, a failsafe possible or the power uncertain.
+    If a battery failsafe acts earlier, it sets the limit.  A mission with an endless jump fails.  The finding is
+    undecided if the capacity is a guess, if the power is unknown or too uncertain, or if a failsafe may act.
     """
     setup, envelope = requirements.setup, requirements.setup.envelope
     limit, source, failsafe_text = _energy_limit(requirements)
@@ -81,16 +81,16 @@ def energy_findings(
         if is_guessed:
             reason = f"{GUESSED_BATTERY_TEXT}; {reason}"
         elif energy > limit and not failsafe_text:
-            reason += f"; {ENERGY_RESERVE_FRACTION:.0%} must be left"
+            reason += f"; a reserve of {ENERGY_RESERVE_FRACTION:.0%} must be left"
         reason += "" if is_guessed or max_energy <= needed_energy else _max_energy_text(max_energy, envelope.source)
         reason += failsafes.unjudged_text if failsafes.faults else f"{failsafe_text}{failsafes.unjudged_text}"
     undecided_faults = failsafes.undecided if not faults and (is_guessed or energy <= limit) else []
-    is_open = is_guessed or is_uncertain or bool(undecided_faults) or math.isnan(energy)
+    is_undecided = is_guessed or is_uncertain or bool(undecided_faults) or math.isnan(energy)
     return [
         make_finding(
             "energy",
             FLIGHT,
-            ok=False if faults else None if is_open else energy <= limit,
+            ok=False if faults else None if is_undecided else energy <= limit,
             reason=finding_reason(faults or undecided_faults, [reason]),
             faults=faults or undecided_faults,
             planned=planned_energy,
@@ -107,10 +107,10 @@ def energy_findings(
 
 
 def _energy_limit(requirements: RouteRequirements) -> tuple[float, str, str]:
-    """Return the energy that a flight may use, Wh, the limit's source, and a clause on a battery failsafe.
+    """Return the usable energy (Wh), the source of this limit, and a clause on a battery failsafe.
 
-    The clause is "" if the reserve is reached before any failsafe acts.  With several batteries, their failsafes set no
-    limit, because the share of each battery in the used charge is unknown.
+    The clause is "" if the reserve is reached before any failsafe acts.  The failsafes of several batteries set no
+    limit, because the charge drawn from each battery is unknown.
     """
     setup, volts = requirements.setup, requirements.setup.envelope.volts
     limit = (1.0 - ENERGY_RESERVE_FRACTION) * setup.battery
@@ -132,17 +132,19 @@ def _energy_limit(requirements: RouteRequirements) -> tuple[float, str, str]:
 
 
 def _max_energy_text(max_energy: float, source: str) -> str:
-    """Return a clause on the most energy that the flight may need, Wh.
+    """Return a clause on the upper limit of the energy that the flight may need, Wh.
 
-    source: source of the aircraft's power.
+    source: source of the aircraft's power data.
     """
     return f"; at most {max_energy:.1f} Wh with 95 % probability, because the power is uncertain (from {source})"
 
 
 def _endless_jump_faults(requirements: RouteRequirements, usable_energy: float, energy_ratio: float) -> list[Message]:
-    """Return a fault if a jump is endless, with the number of rounds that the usable energy (Wh) permits.
+    """Report an endless jump as a fault, with the rounds that the energy permits; [] without one.
 
-    energy_ratio: ratio of the flown energy to the predicted energy; 1 if it is not known.
+    A round is one repetition of the items between the jump and its destination.
+    usable_energy: energy without the reserve, Wh.
+    energy_ratio: ratio of the flown energy to the predicted energy; 1 if it is unknown.
     """
     route = requirements.setup.route
     if route.endless_jump is None:
@@ -151,7 +153,7 @@ def _endless_jump_faults(requirements: RouteRequirements, usable_energy: float, 
     start = last_waypoint
     while start > 0 and route.items[start] == route.items[last_waypoint]:
         start -= 1
-    # Find the start of the last round: the previous waypoint of the item with which the route ends.
+    # The last round starts at the previous waypoint of the item with which the route ends.
     while start > 0 and route.items[start] != route.items[last_waypoint]:
         start -= 1
     energies = leg_energies(requirements)[0]
@@ -159,7 +161,7 @@ def _endless_jump_faults(requirements: RouteRequirements, usable_energy: float, 
     fault = f"the jump of item {route.endless_jump} repeats without end"
     if not round_energy > 0.0:
         return [message(fault)]
-    # The first round, the path to it, and the rest of the mission, which an endless jump never reaches.
+    # Energy of the mission flown once through: path to the first round, that round, and the items after the jump.
     first_energy = _energy_without_jump(requirements)
     if not math.isfinite(first_energy):
         first_energy = sum(energies[:start])
@@ -193,7 +195,7 @@ def _energy_without_jump(requirements: RouteRequirements) -> float:
 
 
 def _flown_energy(requirements: RouteRequirements, aligned: AlignedTrack | None) -> tuple[float, float]:
-    """Return the energy (Wh) and the peak current (A) of a flight with its take-off and landing; NaN if not flown."""
+    """Return the energy (Wh) and peak current (A) of a flight from take-off to landing; NaN if not flown."""
     track = None if aligned is None else aligned.track
     if requirements.ground_phases is not None:
         track = requirements.ground_phases.track
@@ -246,10 +248,10 @@ def _judge_battery_failsafes(requirements: RouteRequirements, energy_used: float
 
 
 def _return_time_fault(requirements: RouteRequirements, energy_used: float) -> Message | None:
-    """Return a message if the battery's remaining time may trigger a return before the mission ends, else None.
+    """Return a message if the battery's remaining time may trigger an early return, otherwise None.
 
-    The test compares the shortest remaining time, which is at the end of the mission, with the time of the longest
-    return.  It thus covers all times of the mission.
+    The remaining time is shortest at the end of the mission.  It is compared with the time of the longest return, so
+    that the result holds at all times of the mission.
     """
     failsafe = requirements.setup.autopilot.checks.return_time_failsafe
     if failsafe is None:
@@ -272,7 +274,7 @@ def _return_time_fault(requirements: RouteRequirements, energy_used: float) -> M
 
 
 def _reachable_voltage_text(requirements: RouteRequirements, failsafe: BatteryFailsafe, energy_used: float) -> str:
-    """Explain why a voltage failsafe may act before the battery is down to its reserve; otherwise return "".
+    """Explain why a voltage failsafe may act before the battery is at its reserve; otherwise "".
 
     The voltage of a battery under load is not simulated.  While the reserve is left, a healthy battery has more than
     `EMPTY_CELL_VOLTAGE_V` in each cell.  The number of cells is calculated with `NOMINAL_CELL_VOLTAGE_V`.
@@ -293,7 +295,7 @@ def _reachable_voltage_text(requirements: RouteRequirements, failsafe: BatteryFa
 
 
 def _used_text(requirements: RouteRequirements, energy_used: float, max_current: float, *, is_empty: bool) -> str:
-    """Describe the energy used (Wh) and the peak current (A), or the fuel used by an aircraft without a battery.
+    """Describe the energy used (Wh) and the peak current (A), or the fuel used by an engine.
 
     is_empty: True if the battery or the tank is empty at the end of the flight.
     """

@@ -28,7 +28,7 @@ _METHOD = "every point of the path's straight segments and arcs, and of the segm
 
 
 def make_zone_test(setup: FlightSetup) -> Callable[[Zone], bool]:
-    """Return a function that returns True if the setup's planned path violates a zone by more than `ROUNDING_M`.
+    """Return a test of zones: True if the setup's path violates a zone by more than `ROUNDING_M`.
 
     >>> from logs.recording.example_log import example_log
     >>> from world.airspace.zones import Cylinder
@@ -84,7 +84,7 @@ def fence_findings(
 
 
 def _findings_on_legs(requirements: RouteRequirements, first: int, last: int) -> list[Finding]:
-    """Judge the zones that the planned path touches on legs `first` to `last`."""
+    """Judge the zones that the planned path touches on legs `first` to `last`, both included."""
     airspace, path = requirements.airspace, requirements.path
     start, end = np.searchsorted(path.legs, [first, last + 1]).tolist()
     numbers = airspace.zones_near(path.points[start : end + 1])
@@ -157,8 +157,8 @@ def _zone_finding(
                 f"{visit.depth:.1f} m {side_text}",
                 f", {visit.violation_time:.1f} s in all"
                 + (f" ({visit.entries} times)" if visit.entries > 1 else "")
-                + f"; the {subject} {entry_text} at {_event_text(requirements, visit, 'entry')}, and {exit_text} at"
-                f" {visit.exit_time:.1f} s; it is {deepest_text} at {visit.at_time:.1f} s",
+                + f". The {subject} {entry_text} at {_event_text(requirements, visit, 'entry')}, is {deepest_text} at"
+                f" {visit.at_time:.1f} s, and {exit_text} at {visit.exit_time:.1f} s",
             )
         )
     elif visit.depth > 0.0:
@@ -189,7 +189,7 @@ def _zone_finding(
 
 
 def _visit_facts(visit: Record) -> list[Fact]:
-    """Return the violation's duration, its number of entries, and time, position and leg of entry and exit."""
+    """Return facts on a violation: its duration, its entries, and where it begins and ends."""
     facts = [Fact("time beyond", visit.violation_time, "s"), Fact("entries", float(visit.entries), "1")]
     for event in ("entry", "exit"):
         for coordinate, unit in (("time", "s"), ("east", "m"), ("north", "m"), ("up", "m"), ("leg", "1")):

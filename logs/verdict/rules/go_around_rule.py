@@ -247,7 +247,7 @@ def _go_around_destinations(requirements: RouteRequirements, waypoint: int) -> t
 def _unknown_path_text(
     requirements: RouteRequirements, item: MissionItem, destinations: tuple[LandingStart, ...]
 ) -> str:
-    """Explain why the path of a go-around from a landing item is not known; return "" if it is known."""
+    """Explain why the path of a go-around after a landing item is unknown; return "" if it is known."""
     next_item = next(
         (mission_item for mission_item in requirements.setup.mission.items if mission_item.seq == item.seq + 1), None
     )
@@ -264,13 +264,13 @@ def _unknown_path_text(
 def _go_around_finding(
     requirements: RouteRequirements, terrain: Terrain, landing: _Landing, *, is_required: bool
 ) -> Finding:
-    """Simulate go-arounds from several positions on the glide, and judge the worst; it fails only if required."""
+    """Simulate go-arounds from positions on the glide, and judge the worst; it fails only if required."""
     setup, place, height = requirements.setup, requirements.waypoint(landing.waypoint), landing.climb_height
     climb_text = (
         f"the aircraft climbs to {height:.0f} m above home,"
         f" {landing.home_altitude + height - landing.ground_altitude:.0f} m above the landing point"
     )
-    # A go-around flies to no rally point.
+    # Rally points are removed, because a go-around never flies to one.
     world = make_return_world(replace(setup, mission=replace(setup.mission, rally=())))
     go_arounds = (
         []
@@ -323,7 +323,10 @@ def _go_around_finding(
 
 
 def _abort_distances(landing: _Landing) -> Floats:
-    """Return abort points from the start of the glide to its flare: distances before landing, m, (n,)."""
+    """Return evenly spaced abort points on the glide, as distances before the landing point, m, (n,).
+
+    The first is at the start of the glide.  The last is at the flare, or at the earliest accepted touchdown.
+    """
     last_distance = min(landing.leg_length, max(landing.glide.flare_distance, EARLY_TOUCHDOWN_DISTANCE_M))
     point_count = min(_MAX_ABORT_POINTS, max(2, math.ceil((landing.leg_length - last_distance) / _ABORT_SPACING_M) + 1))
     return np.linspace(landing.leg_length, last_distance, point_count)
@@ -397,12 +400,12 @@ def _judge_go_around(
     destination: LandingStart,
     top_altitude: float,
 ) -> _GoAround:
-    """Judge a simulated go-around, and return it with its outcome.
+    """Return a simulated go-around with its outcome: heights, hazards, and where its path is unknown.
 
     result: record of dtype `flight.autopilots.simulated_returns.RETURN_RESULT`.
-    positions: one point a second, m, (n, 3).
+    positions: simulated path with one point per second, m, (n, 3).
     destination: destination of the go-around.
-    top_altitude: altitude above which the climb is over, m AMSL.
+    top_altitude: altitude at which the climb ends, m AMSL.
     """
     climb_end, end_status = count_climb_rows(positions, top_altitude), int(result["outcome"])
     go_around = go_around._replace(
@@ -410,7 +413,7 @@ def _judge_go_around(
         unknown_part_text=_unknown_part_text(end_status, has_climbed=climb_end < len(positions)),
     )
     if destination.is_landing and climb_end < len(positions):
-        # Where the aircraft joins the glide is unknown: judge only the climb.
+        # It is unknown where the aircraft joins the glide: judge only the climb.
         positions, end_status = positions[: climb_end + 1], 0
         go_around = go_around._replace(
             is_lost=False,
@@ -467,7 +470,7 @@ def _unknown_part_text(end_status: int, *, has_climbed: bool) -> str:
 def _required_heights(terrain: Terrain, destination: LandingStart, points: Floats) -> Floats:
     """Return the required heights above ground on the path back, m: an array (n,) for `points` (n, 3).
 
-    Near a destination below `GO_AROUND_CLEARANCE_M`, only the height of the destination is required.
+    The requirement is `GO_AROUND_CLEARANCE_M`, or near a lower destination the height of that destination.
     """
     required = np.full(len(points), GO_AROUND_CLEARANCE_M)
     for east, north, up in (start.position for start in (destination, *destination.next_stops)):
@@ -481,11 +484,10 @@ def _required_heights(terrain: Terrain, destination: LandingStart, points: Float
 def _next_sufficient_height(
     requirements: RouteRequirements, terrain: Terrain, world: ReturnWorld, landing: _Landing, worst_distance: float
 ) -> float:
-    """Find a higher climb height above home with which all go-arounds are clear, m; NaN without one.
-
-    worst_distance: abort point to try first, as a distance before the landing point, m.
+    """Find the next higher climb height above home with which all go-arounds are clear, m; NaN if none is.
 
     Heights are tried in steps of `_HEIGHT_STEP_M` up to `_MAX_HEIGHT_M`.
+    worst_distance: abort point to try first, as a distance before the landing point, m.
     """
     first = _HEIGHT_STEP_M * math.ceil(landing.climb_height / _HEIGHT_STEP_M + 1e-9)
     distances = [worst_distance, *_abort_distances(landing).tolist()]

@@ -58,12 +58,13 @@ def height_findings(
 
 
 def max_segment_heights(terrain: Terrain, points: Floats) -> tuple[Floats, Floats]:
-    """Return each segment's maximum height above ground (m), and where it occurs, (n - 1,) each.
+    """Return each segment's maximum height above ground (m) and its place, (n - 1,) each.
 
+    The place is a fraction of the segment.
     points: ends of the segments as east, north and up, m, (n, 3).
 
-    The place is a fraction of the segment.  The maximum is exact for bilinear ground.  It is found as a minimum height,
-    with path and ground turned upside down.  It is NaN if a segment leaves the raster or its data.
+    The height is exact for ground that is interpolated bilinearly; NaN if a segment leaves the terrain data.  It is
+    computed as a minimum height, with path and ground turned upside down.
     """
     upside_down = points * np.array([1.0, 1.0, -1.0])
     inverted_heights, fraction = path_clearance(-terrain.heights, terrain.to_pixel.record, upside_down)
@@ -103,6 +104,7 @@ class _LegMaxima:
 def _max_heights(path: _Path, segments: NDArray[np.intp]) -> _LegMaxima | None:
     """Return the maximum height above ground and the maximum altitude on segments; None without segments.
 
+    segments: indices of segments of the path, (k,).
     The height is NaN if the ground is unknown below all segments.
     """
     if not segments.size:
@@ -130,7 +132,8 @@ def _leg_finding(
 ) -> Finding:
     """Judge the maximum height above ground and the maximum altitude of one leg.
 
-    limit: maximum height above ground, m.
+    limit: allowed height above ground, m.
+    planned_maximum: maxima of the planned leg.
     judged_maximum: maxima of the planned or flown leg; None for a leg that was not flown.
     path_name: name of the judged path.
     """

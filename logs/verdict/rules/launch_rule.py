@@ -106,13 +106,12 @@ def _launch_finding(requirements: RouteRequirements, ground: FlownGround, take_o
 def _climb_clearance(requirements: RouteRequirements, path: GroundPath) -> tuple[float, float]:
     """Return the minimum height above ground after the launch run, m, and its distance along the path, m.
 
-    If the take-off ends within the launch run, the height is inf.  Without terrain it is NaN. In both cases, the
-    distance is NaN.
+    The height is inf if the take-off ends within the launch run, and NaN without terrain.  The distance is then NaN.
     """
     terrain, (position, distances) = requirements.setup.scenario.terrain, path
     if terrain is None:
         return math.nan, math.nan
-    # On a runway the aircraft is on the ground: heights apply from lift-off on.
+    # On a runway, the height above ground is judged only after lift-off.
     first_distance = LAUNCH_RUN_M
     take_off = None if requirements.ground_phases is None else requirements.ground_phases.procedures.take_off
     if take_off is not None and take_off.launch.method == "runway":
@@ -128,7 +127,7 @@ def _climb_clearance(requirements: RouteRequirements, path: GroundPath) -> tuple
 
 
 def _remaining_runway(requirements: RouteRequirements, take_off: TakeOff, position: Floats) -> float:
-    """Return the runway remaining at the aircraft's last contact with it, m; inf for a launch without a runway."""
+    """Return the runway left at the aircraft's last contact with it, m; inf without a runway."""
     terrain = requirements.setup.scenario.terrain
     if take_off.launch.method != "runway" or terrain is None:
         return math.inf
@@ -143,7 +142,11 @@ def _remaining_runway(requirements: RouteRequirements, take_off: TakeOff, positi
 def _describe_take_off(
     take_off: TakeOff, track: Track, distances: Floats, clearance: float, terrain: Terrain | None
 ) -> list[str]:
-    """Describe a take-off in phrases: course, launch method, climb and minimum height above ground (m)."""
+    """Describe a take-off in phrases: course, launch method, climb and minimum height above ground.
+
+    distances: distance of each row along the track, m, (t,).
+    clearance: minimum height above ground after the launch run, m.
+    """
     course, method = round(math.degrees(take_off.course)) % 360, take_off.launch.method
     notes = [f"launched on a runway on {course}°"]
     if method != "runway":
@@ -157,7 +160,7 @@ def _describe_take_off(
 
 
 def _describe_climb(track: Track, distances: Floats, terrain: Terrain | None) -> str:
-    """Describe the climb after a launch: its slope, or the height that was lost and the distance flown.
+    """Describe the climb after a launch: slope and final course, or the height lost.
 
     distances: distance of each row along the track, m, (t,).
     """

@@ -27,11 +27,11 @@ from world.arrays import Floats
 from world.errors import MissionError
 from world.radio import RadioLink
 
-# Greatest number of returns from the outages, of which one begins each second of an outage.
+# Greatest number of simulated returns during all outages.  Up to this number, one begins each second of an outage.
 _MAX_RETURNS = 3000
-# Outages shorter than this are stated to a tenth of a second, s.
+# Durations below this are printed to a tenth of a second, s.
 _SHORT_OUTAGE_S = 10.0
-# Least diffraction loss that is stated, dB.
+# Smallest diffraction loss that is printed, dB.
 _MIN_STATED_LOSS_DB = 0.1
 _METHOD = "free-space loss and Bullington's diffraction loss over the terrain, once a second"
 
@@ -40,11 +40,11 @@ _METHOD = "free-space loss and Bullington's diffraction loss over the terrain, o
 class JudgedLink:
     """Radio link along a path, and the finding on it.
 
+    finding: finding of the link rule.
     along: the link along the judged path; None if it cannot be computed.
     antenna: position of the station's antenna, m, (3,); None if `along` is None.
     leg: leg with the smallest margin; None if no margin is known.
-    returns: returns with which the autopilot reacts to the outages; None if it does not return, or without an outage
-        that it notices.
+    returns: returns with which the autopilot reacts to the outages; None if it notices no outage or does not return.
     """
 
     finding: Finding
@@ -72,7 +72,7 @@ def judge_link(
 ) -> JudgedLink:
     """Judge a radio link along the planned path if `geometric`, otherwise along the whole flown track.
 
-    fly_again: as for `judge_returns`.
+    fly_again: function that flies an uncertain return again in JSBSim, as for `judge_returns`; None not to do so.
     """
     phases = requirements.ground_phases
     whole_requirements = requirements if phases is None else phases.whole_route
@@ -104,7 +104,7 @@ def judge_link(
         reaction_text = _reaction_text(setup.autopilot.title, reactions, returns)
     elif judged_link.outages and not reactions:
         setting_text = "".join(f" ({reaction.parameter} {reaction.value:g})" for reaction in all_reactions)
-        reaction_text = f"; if the link is lost, {setup.autopilot.title} continues its mission{setting_text}"
+        reaction_text = f". If the link is lost, {setup.autopilot.title} continues its mission{setting_text}"
     leg = None if judged_link.worst < 0 else _worst_leg(requirements, aligned if not geometric else None, judged_link)
     text = _link_text(judged_link, leg)
     finding = _link_finding(
@@ -128,12 +128,11 @@ def _unknown_station_text(requirements: RouteRequirements, link: RadioLink) -> s
 
 
 def _end_of_reactions(requirements: RouteRequirements, aligned: AlignedTrack | None) -> float:
-    """Return the time from which a loss of the link no longer has an effect, s; inf without such a time.
+    """Return the time from which the autopilot ignores a loss of the link, s; inf without one.
 
     From then on, the aircraft is returning anyway, or ArduPlane is in a landing sequence
     (`Plane::failsafe_in_landing_sequence`).
-
-    aligned: None for the planned path.
+    aligned: flown track; None for the planned path.
     """
     phases = requirements.ground_phases
     setup = requirements.setup if phases is None else phases.whole_route.setup
@@ -187,7 +186,7 @@ def _judge_reaction_returns(
 
 
 def _starts_in_outages(starts: ReturnStarts, outages: Sequence[Outage], delay: float, interval: float) -> ReturnStarts:
-    """Return the starts of returns during outages, from the time at which the autopilot has noticed them.
+    """Select the starts of returns in outages, from the time when the autopilot notices them.
 
     One start before and one start after each such period is included.
 
@@ -206,7 +205,10 @@ def _starts_in_outages(starts: ReturnStarts, outages: Sequence[Outage], delay: f
 
 
 def _link_text(along: LinkAlongPath, leg: Place | None) -> str:
-    """Describe the smallest margin of the link, its place, and the outages.  leg: leg of the smallest margin."""
+    """Describe the smallest margin of the link, the outages, and the place of the smallest margin.
+
+    leg: leg of the smallest margin; None if no margin is known.
+    """
     k = along.worst
     if leg is None:
         return "the terrain below the radio path is unknown"
@@ -220,7 +222,7 @@ def _link_text(along: LinkAlongPath, leg: Place | None) -> str:
         else f"the link margin is up to {abs(points.margin[k]):.1f} dB below the required fade margin"
     )
     place = (
-        f"; it is lowest on {place_text_within(leg)} at {along.time[k]:.0f} s (east {east:.0f} m, north {north:.0f} m,"
+        f". It is lowest on {place_text_within(leg)} at {along.time[k]:.0f} s (east {east:.0f} m, north {north:.0f} m,"
         f" {points.distance[k] / 1000.0:.1f} km from the station, {sight_text})"
     )
     if along.outages:
@@ -228,7 +230,7 @@ def _link_text(along: LinkAlongPath, leg: Place | None) -> str:
         times_text = f", {count} times, at most {duration_text(along.longest_outage)} at a time" if count > 1 else ""
         text += f" for {duration_text(along.time_below_margin)}{times_text}"
     text += place
-    return text if along.is_known else f"{text}; elsewhere the terrain below the radio path is unknown"
+    return text if along.is_known else f"{text}. Elsewhere the terrain below the radio path is unknown"
 
 
 def duration_text(duration: float) -> str:
@@ -259,7 +261,7 @@ def _reaction_text(title: str, reactions: Sequence[LinkLossReaction], returns: R
         f"{ACTION_TEXTS[reaction.action]} after {reaction.delay:g} s ({reaction.parameter} {reaction.value:g})"
         for reaction in reactions
     ]
-    text = f"; if the link is lost, {title} {', then '.join(texts)}"
+    text = f". If the link is lost, {title} {', then '.join(texts)}"
     if returns is not None:
         return f"{text}: {headline(returns)}"
     has_return = any(reaction.action == "return" for reaction in reactions)
@@ -267,7 +269,10 @@ def _reaction_text(title: str, reactions: Sequence[LinkLossReaction], returns: R
 
 
 def _worst_leg(requirements: RouteRequirements, aligned: AlignedTrack | None, along: LinkAlongPath) -> Place:
-    """Return the leg on which the link has its smallest margin.  aligned: None for the planned path."""
+    """Return the leg on which the link has its smallest margin.
+
+    aligned: flown track; None for the planned path.
+    """
     time, phases = float(along.time[along.worst]), requirements.ground_phases
     if aligned is None:
         path = requirements.path

@@ -59,40 +59,42 @@ class LoiterCircle:
 
 
 def loiter_circles(requirements: RouteRequirements) -> list[LoiterCircle]:
-    """Return the loiters of a route, in flying order."""
-    arcs, items = requirements.setup.route.arc_radii, requirements.setup.route.items
+    """Return the loiters of a route, in flying order.
+
+    A loiter is a series of corners with arcs that belong to one mission item.
+    """
+    arc_radii, items = requirements.setup.route.arc_radii, requirements.setup.route.items
     loiters: list[LoiterCircle] = []
-    i = 0
-    while i < len(arcs):
-        last = i
-        while last + 1 < len(arcs) and arcs[last + 1] > 0.0 and items[last + 1] == items[i]:
+    first = 0
+    while first < len(arc_radii):
+        last = first
+        while last + 1 < len(arc_radii) and arc_radii[last + 1] > 0.0 and items[last + 1] == items[first]:
             last += 1
-        if arcs[i] > 0.0:
-            angle = float(np.abs(requirements.turns[i : last + 1]).sum())
-            loiters.append(
-                LoiterCircle(i, last, _circle_center(requirements, i), float(arcs[i]), angle / (2.0 * math.pi))
-            )
-            i = last
-        i += 1
+        if arc_radii[first] > 0.0:
+            laps = float(np.abs(requirements.turns[first : last + 1]).sum()) / (2.0 * math.pi)
+            center = _circle_center(requirements, first)
+            loiters.append(LoiterCircle(first, last, center, float(arc_radii[first]), laps))
+            first = last
+        first += 1
     return loiters
 
 
-def _circle_center(requirements: RouteRequirements, i: int) -> Floats:
-    """Return the center of the circle to which the arc of corner `i` belongs, m, (2,)."""
-    ux, uy = requirements.leg_unit(i - 1)
-    turn_sign = math.copysign(1.0, requirements.turns[i])
-    tangent = tangent_length(abs(float(requirements.turns[i])), float(requirements.radius[i]))
+def _circle_center(requirements: RouteRequirements, corner: int) -> Floats:
+    """Return the center of the circle to which the arc of a corner belongs, (east, north), m."""
+    ux, uy = requirements.leg_unit(corner - 1)
+    turn_sign = math.copysign(1.0, requirements.turns[corner])
+    tangent = tangent_length(abs(float(requirements.turns[corner])), float(requirements.radius[corner]))
     return np.array(
-        requirements.points[i, :2]
+        requirements.points[corner, :2]
         - tangent * np.array([ux, uy])
-        + turn_sign * requirements.radius[i] * np.array([uy, -ux])
+        + turn_sign * requirements.radius[corner] * np.array([uy, -ux])
     )
 
 
 def merge_loiter_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, findings: Sequence[Finding]
 ) -> tuple[Finding, ...]:
-    """Merge the findings on the corners of each loiter; on its legs, keep only each rule's worst finding."""
+    """Merge the findings on each loiter's corners, and keep each rule's worst finding on its legs."""
     joins_at_center = requirements.setup.autopilot.loiters.steers_to_center
     merged: list[Finding | None] = list(findings)
     # Indexed by rule and place: a mission of jumps has hundreds of loiters, and each thousands of findings.
@@ -101,7 +103,7 @@ def merge_loiter_findings(
         positions.setdefault((finding.rule, finding.place), []).append(k)
 
     def remaining_findings(rules: Sequence[str], places: Sequence[Place]) -> list[tuple[int, Finding]]:
-        """Return indices and findings of these rules at these places, in order, without replaced findings."""
+        """Return, in order, index and finding of these rules at these places, without findings already merged."""
         indices = sorted(k for rule in rules for place in places for k in positions.get((rule, place), ()))
         return [(k, finding) for k in indices if (finding := merged[k]) is not None and finding.rule in rules]
 
@@ -139,12 +141,10 @@ def merge_loiter_findings(
 def end_loiter_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge the loiter without end after the last waypoint.
+    """Judge the loiter without end after the last waypoint; return [] if the mission ends otherwise.
 
-    The finding fails if the wind is too strong for a circle, because the aircraft then drifts downwind.  If the wind
-    permits a circle, hazards around the loiter are reported before a flight, and nothing after a flight.
-
-    Return [] if the mission does not end in such a loiter.
+    The finding fails if the wind is too strong for a circle, because the aircraft then drifts downwind.  Otherwise,
+    hazards around the loiter leave the finding of a plan undecided, and a flight has no finding.
     """
     reach_and_hazards = end_loiter_hazards(requirements)
     if reach_and_hazards is None:
@@ -191,9 +191,9 @@ def _loiter_finding(
     if joins_at_center and (uses_parameter if aligned is None else _has_reached(requirements, aligned, circle)):
         failed_corners = []
     faults = _small_radius_faults(requirements, circle, min_radius) if is_known else []
-    open_texts = [fault.text for fault in faults if _may_pass(requirements, circle)]
-    faults = [] if open_texts else faults
-    facts = [*open_texts, f"{circle.laps:.2f} laps with a radius of {circle.radius:.0f} m"]
+    undecided_texts = [fault.text for fault in faults if _may_pass(requirements, circle)]
+    faults = [] if undecided_texts else faults
+    facts = [*undecided_texts, f"{circle.laps:.2f} laps with a radius of {circle.radius:.0f} m"]
     hazards_text, parameter_name = "", requirements.setup.autopilot.loiters.radius_name
     if uses_parameter and faults and math.isfinite(min_radius):
         # If the parameter makes the loiter too tight, the autopilot flies it wider, as at the end of a return.
@@ -217,7 +217,7 @@ def _loiter_finding(
         ok = None
         is_complete = aligned is not None and bool(aligned.passed[circle.last])
         facts.append("a part of the circle was not flown" if is_complete else "the flight did not reach its end")
-    check = UNKNOWN_AIRCRAFT if open_texts else UNKNOWN_PATH if hazards_text else ""
+    check = UNKNOWN_AIRCRAFT if undecided_texts else UNKNOWN_PATH if hazards_text else ""
     if ok and check:
         ok = None
         facts += [hazards_text] if hazards_text else []
@@ -241,7 +241,7 @@ def _loiter_finding(
 
 
 def _may_pass(requirements: RouteRequirements, circle: LoiterCircle) -> bool:
-    """Return True if a loiter that is too small may be flyable, as the aircraft's bank limit is a guess."""
+    """Return True if the largest bank limit that the aircraft may have permits the loiter's radius."""
     return circle.radius >= _min_radius(requirements, circle, possible=True) - LOITER_RADIUS_TOLERANCE_M
 
 
@@ -253,7 +253,10 @@ def _corner_faults(
     *,
     has_faults: bool,
 ) -> list[Message]:
-    """Return a message on failed corners; without a flight, only if the loiter has no fault of its own."""
+    """Return a message on failed corners as a list; [] without any.
+
+    has_faults: True if the loiter itself has a fault; planned corners are then not reported.
+    """
     if not failed_corners or (aligned is None and has_faults):
         return []
     if aligned is not None:
@@ -262,10 +265,10 @@ def _corner_faults(
 
 
 def _min_radius(requirements: RouteRequirements, circle: LoiterCircle, *, possible: bool = False) -> float:
-    """Return the radius of a loiter at the bank limit, for the courses of its arcs, m.
+    """Return the smallest radius that the bank limit permits for a loiter in this wind, m.
 
-    A loiter without end meets every course, even if the route contains only a part of its lap.
-
+    Only the courses of the loiter's arcs count.  A loiter without end has all courses, even if the route contains only
+    a part of a lap.
     possible: True for the largest bank limit that the aircraft may have.
     """
     radii = requirements.possible_min_radius if possible else requirements.min_radius
@@ -291,8 +294,8 @@ def _min_radius(requirements: RouteRequirements, circle: LoiterCircle, *, possib
 def _flown_radii(aligned: AlignedTrack, circle: LoiterCircle) -> Floats:
     """Return the distances of the track's rows from a loiter's center, m, (n,).
 
-    The rows are those from the first to the last waypoint of the circle.  If the loiter was not flown to its end, the
-    array is empty.
+    The rows are those from the first to the last corner of the loiter.  The array is empty if the flight did not pass
+    the last corner.
     """
     first, last = int(aligned.rows[circle.first]), int(aligned.rows[circle.last])
     if not aligned.passed[circle.last] or last <= first:
@@ -304,17 +307,20 @@ def _flown_radii(aligned: AlignedTrack, circle: LoiterCircle) -> Floats:
 def _flown_facts(
     requirements: RouteRequirements, aligned: AlignedTrack | None, circle: LoiterCircle, radii: Floats
 ) -> list[str]:
-    """Describe how a loiter was flown: its number of laps, if known, and its radii (m, (n,))."""
+    """Describe a flown loiter: its number of laps, if known, and its radii; [] if it was not flown.
+
+    radii: distances from the center, m, (n,).
+    """
     laps = _flown_laps(requirements, aligned, circle)
     laps_text = "" if math.isnan(laps) else f"{laps:.2f} laps "
     return [f"{laps_text}flown at {radii.min():.1f} to {radii.max():.1f} m from the center"] if radii.size else []
 
 
 def _flown_laps(requirements: RouteRequirements, aligned: AlignedTrack | None, circle: LoiterCircle) -> float:
-    """Return the number of laps around a loiter's center, flown between the stops before and after it.
+    """Return the laps flown around a loiter's center between the waypoints before and after it.
 
-    The number is NaN without a flight, if the flight did not reach the last corner of the loiter, or if the autopilot
-    follows the corners as they are drawn.
+    The number is NaN without a flight, if the flight did not reach the loiter's last corner, or if the autopilot
+    follows the drawn corners instead of circling the center.
     """
     follows_corners = not requirements.setup.autopilot.loiters.steers_to_center
     if aligned is None or follows_corners or not aligned.passed[circle.last]:
@@ -339,10 +345,7 @@ def _is_whole(requirements: RouteRequirements, aligned: AlignedTrack | None, cir
 
 
 def _uses_parameter_radius(requirements: RouteRequirements, circle: LoiterCircle) -> bool:
-    """Return True if the autopilot takes a loiter's radius from its parameter.
-
-    The mission item then has no radius that the autopilot reads.
-    """
+    """Return True if a loiter's radius comes from a parameter, because its mission item states none."""
     rules, seq = requirements.setup.autopilot.loiters, int(requirements.setup.route.items[circle.first])
     loiter = next((stated_loiter(item) for item in requirements.setup.mission.items if item.seq == seq), None)
     return rules.exits_on_heading and rules.radius != 0.0 and loiter is not None and rules.radius_of(loiter) == 0.0
@@ -351,11 +354,10 @@ def _uses_parameter_radius(requirements: RouteRequirements, circle: LoiterCircle
 def _held_bank(
     requirements: RouteRequirements, circle: LoiterCircle, min_radius: float, corner_findings: list[Finding]
 ) -> float:
-    """Return the bank held in a loiter that is tighter than the bank limit allows, rad.
+    """Return the bank held in a loiter that is tighter than the bank limit permits, rad.
 
-    The bank is the largest one-second mean of the measured bank.  Without a measurement, it is the bank that the
-    loiter's radius needs, up to the autopilot's limit.
-
+    The value is the largest measured one-second mean.  Without a measurement, it is the bank that the loiter's radius
+    needs, up to the autopilot's limit.
     min_radius: radius at the bank limit, m.
     """
     measured_banks = [fact.value for finding in corner_findings for fact in finding.facts if fact.what == "bank"]
@@ -366,7 +368,10 @@ def _held_bank(
 
 
 def _hazards_text(requirements: RouteRequirements, circle: LoiterCircle, min_radius: float) -> str:
-    """Describe the hazards too close to a loiter that is flown wider than drawn; return "" if there are none."""
+    """Describe hazards too close to a loiter that is flown wider than drawn; "" if there are none.
+
+    min_radius: radius at the bank limit, with which the loiter is flown, m.
+    """
     heights = requirements.points[circle.first : circle.last + 1, 2]
     reach = LOITER_SWING_RADII * min_radius
     hazards = find_hazards(requirements, circle.center, float(heights.min()), float(heights.max()), reach)
@@ -377,9 +382,9 @@ def _hazards_text(requirements: RouteRequirements, circle: LoiterCircle, min_rad
 
 
 def _unjudge_if_unreached_corner(aligned: AlignedTrack | None, corner_finding: Finding) -> Finding:
-    """Mark a finding as not judged if it fails only because the flight ended before its corner.
+    """Replace a failure by "not judged" if the flight ended before the finding's corner.
 
-    The completion rule judges such an end.
+    The completion rule judges the early end.
     """
     index = corner_finding.place.index
     is_reached = aligned is None or index is None or bool(aligned.passed[index])
@@ -387,9 +392,9 @@ def _unjudge_if_unreached_corner(aligned: AlignedTrack | None, corner_finding: F
 
 
 def _has_reached(requirements: RouteRequirements, aligned: AlignedTrack, circle: LoiterCircle) -> bool:
-    """Return True if the flight reached a loiter.
+    """Return True if the flight came close enough to a loiter's center to count as arrived.
 
-    The corners cannot show this: a flight that leaves the loiter when its time is over may miss all of them.
+    The corners do not show the arrival, because a flight that leaves the loiter early may miss all of them.
     """
     distances, _ = closest_approaches(aligned.track.position, circle.center)
     turn_distance = requirements.setup.autopilot.turns.distance(math.pi, float(requirements.points[circle.first, 2]))
@@ -397,7 +402,7 @@ def _has_reached(requirements: RouteRequirements, aligned: AlignedTrack, circle:
 
 
 def _small_radius_faults(requirements: RouteRequirements, circle: LoiterCircle, min_radius: float) -> list[Message]:
-    """Return a fault if a loiter is smaller than the radius at the bank limit (m)."""
+    """Return a fault if a loiter's radius is below `min_radius`, the radius at the bank limit, m."""
     if circle.radius >= min_radius - LOITER_RADIUS_TOLERANCE_M:
         return []
     speed = float(requirements.route.leg_airspeeds[circle.first])
@@ -409,13 +414,13 @@ def _small_radius_faults(requirements: RouteRequirements, circle: LoiterCircle, 
 
 
 def _failed_corner_message(requirements: RouteRequirements, circle: LoiterCircle, finding: Finding) -> Message:
-    """Return a message on a planned corner that fails, with the reason."""
+    """Make a message on a planned corner that fails, with the reason of its finding."""
     reason_text = f"{place_text(finding.place)}: {finding.reason}"
     return Message(reason_text, _corner_text(finding.place), finding.place == requirements.waypoint(circle.first))
 
 
 def _unheld_corners_message(circle: LoiterCircle, failed_corners: list[Finding]) -> Message:
-    """Return a message with the number of corners that were not held, and the worst of them."""
+    """Make a message with the number of corners that failed in flight, and the worst of them."""
     worst_corner = min(failed_corners, key=worst_first_key)
     corner_count = len({finding.place for finding in failed_corners})
     count_text = f"{corner_count} of {circle.last - circle.first + 1} corners not held; the worst is "

@@ -24,9 +24,9 @@ from world.wording import count_text
 def departure_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge a flight by unusable rows, maximum bank, minimum airspeed and ground contact.
+    """Judge loss of control by unusable rows, maximum bank, minimum airspeed and ground contact.
 
-    Return [] before a flight; without usable rows, the finding is not judged.
+    Return [] before a flight.  Without usable rows, the finding is not judged.
     """
     if geometric:
         return []
@@ -44,9 +44,9 @@ def departure_findings(
             )
         )
     if (bank > MAX_CONTROLLED_BANK_RAD).any():
-        k = int(np.argmax(bank > MAX_CONTROLLED_BANK_RAD))
+        row = int(np.argmax(bank > MAX_CONTROLLED_BANK_RAD))
         limit_text = f", more than the limit of {math.degrees(MAX_CONTROLLED_BANK_RAD):.0f}°"
-        faults.append(message(f"bank {math.degrees(bank[k]):.0f}° at {track.time[k]:.1f} s", limit_text))
+        faults.append(message(f"bank {math.degrees(bank[row]):.0f}° at {track.time[row]:.1f} s", limit_text))
     faults += airspeed_faults
     is_contact = aligned.clearance <= 0.0
     if requirements.ground_phases is not None and not aligned.passed[-1]:
@@ -89,9 +89,9 @@ def _max_finite(values: Floats) -> float:
 
 
 def _low_airspeed_faults(requirements: RouteRequirements, aligned: AlignedTrack) -> list[Message]:
-    """Return a fault at the first row with too low an airspeed for controlled flight.
+    """Return a fault at the first row with an airspeed too low for controlled flight; [] if there is none.
 
-    Return [] if there is no such row, or for an imported flight of an unknown aircraft.
+    An imported flight of an unknown aircraft is not judged.
     """
     imported_log = requirements.setup.imported_log
     if imported_log is not None and not imported_log.aircraft_known:
@@ -115,9 +115,9 @@ def _time_text(time: float) -> str:
 
 
 def _min_flying_airspeeds(requirements: RouteRequirements, altitude: Floats) -> Floats:
-    """Return the minimum airspeed of controlled flight at each altitude (m AMSL), m/s.
+    """Return the minimum airspeed of controlled flight at each altitude (m AMSL, (n,)), m/s, (n,).
 
-    For the Aerosonde it is a fixed airspeed; for other aircraft, a multiple of the minimum level speed.
+    For the Aerosonde it is a constant; for other aircraft, it is a multiple of the minimum level speed.
     """
     if requirements.setup.aircraft == "aerosonde":
         return np.full(altitude.shape, MIN_CONTROLLED_AIRSPEED_MPS)

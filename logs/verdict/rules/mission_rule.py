@@ -86,14 +86,14 @@ def mission_findings(setup: FlightSetup) -> list[Finding]:
     ]
 
 
-# Remark of a check: verdict, item (None for the whole mission), and reason.  A refusal by PX4 is a verdict only
-# if PX4 is to fly.
+# Remark of a check: result, item (None for the whole mission), and reason.  The result "refused" fails if PX4 is to
+# fly; otherwise it is undecided.
 REFUSED: Literal["refused"] = "refused"
 _Remark = tuple[bool | Literal["refused"] | None, int | None, str | Message]
 
 
 def _universal_findings(remarks_by_check: list[list[_Remark]]) -> list[Finding]:
-    """Return a finding for each of PX4's checks that fails for every autopilot, without PX4's name for it.
+    """Return a finding for each check that fails for every autopilot, without PX4's name for it.
 
     Items that only PX4 refuses are left out, because they do not concern a mission that ArduPlane flies.
     """
@@ -120,13 +120,14 @@ def _universal_findings(remarks_by_check: list[list[_Remark]]) -> list[Finding]:
 
 
 def _check_finding(check: str, remarks: list[_Remark], refuses: bool) -> Finding:
-    """Merge the remarks of a check into one finding.
+    """Merge the remarks of a check into one finding, with the reason of the gravest remark.
 
-    refuses: True if PX4 is to fly: items that it refuses then fail.
+    check: name of PX4's function.
+    refuses: True if PX4 is to fly; items that it refuses then fail.
     """
     refusal_result = False if refuses else None
     sorted_remarks = [(refusal_result if ok == REFUSED else ok, item, reason) for ok, item, reason in remarks]
-    # A failure comes first, then PX4's refusals, then mere remarks.
+    # Failures come first, then undecided remarks, then mere notes.
     sorted_remarks.sort(key=lambda remark: {False: 0, None: 1, True: 2}[remark[0]])
     ok, item, reason = sorted_remarks[0] if sorted_remarks else (True, None, "no objections")
     first_message = reason if isinstance(reason, Message) else message(reason)
@@ -144,7 +145,7 @@ def _check_finding(check: str, remarks: list[_Remark], refuses: bool) -> Finding
 
 
 def _arduplane_refusal_findings(setup: FlightSetup) -> list[Finding]:
-    """Return a finding on items that ArduPlane refuses at upload but PX4 accepts; [] for other autopilots."""
+    """Return one finding on items that only ArduPlane refuses at upload; [] for other autopilots."""
     refused_items = [
         item
         for item in setup.mission.items
@@ -185,7 +186,8 @@ def _unjoined_finding(setup: FlightSetup) -> Finding:
     more_text = f" (+{len(other_stops)} more)" if other_stops else ""
     fault = message(
         reason,
-        f": {autopilot} flies {('it anyway' if first_stop.is_circle else 'there')}, which is not judged{more_text}",
+        f": {autopilot} flies {('it anyway' if first_stop.is_circle else 'there')}, on a path that is not judged"
+        f"{more_text}",
     )
     return make_finding(
         "mission",
@@ -264,7 +266,7 @@ def _unsimulated_findings(setup: FlightSetup) -> Iterator[Finding]:
             remarks += [
                 (
                     item.seq,
-                    "the ground speed that DO_CHANGE_SPEED sets is not used in returns to launch: they are judged with"
+                    "the ground speed that DO_CHANGE_SPEED sets is not used in returns to launch; they are judged with"
                     " the parameter MIN_GROUNDSPEED",
                 )
                 for item in setup.mission.items
@@ -287,7 +289,7 @@ def _unsimulated_findings(setup: FlightSetup) -> Iterator[Finding]:
         texts = [*texts, unflown_radius]
     settings = [(None, text) for text in texts]
     for seq, text in [*remarks, *settings]:
-        # What can be done about it is not part of the headline.
+        # The text after "; " is an explanation, which is not part of the headline.
         brief, separator, explanation = text.partition("; ")
         yield make_finding(
             "mission",
@@ -315,7 +317,9 @@ def _mission_parts(setup: FlightSetup) -> MissionParts:
         has_return_path=C.DO_RETURN_PATH_START in commands,
         takes_off=procedures.take_off is not None,
         lands=procedures.approach is not None,
-        loiters_to_land=any(a.command == C.NAV_LOITER_TO_ALT and b.command in LANDINGS for a, b in pairs),
+        loiters_to_land=any(
+            item.command == C.NAV_LOITER_TO_ALT and next_item.command in LANDINGS for item, next_item in pairs
+        ),
         has_fence=bool(setup.mission.fences),
         fence_at_home=_home_fence_violation(setup),
         smallest_inclusion=min(
@@ -350,7 +354,7 @@ def _rally_distance(mission: Mission) -> float:
 
 
 def _home_fence_violation(setup: FlightSetup) -> str:
-    """Describe how home violates the mission's fence, such as "inside an exclusion polygon"; else return ""."""
+    """Describe how home violates the fence, as "inside an exclusion polygon"; "" if it does not."""
     mission, checks = setup.mission, setup.autopilot.checks
     if mission.home is None or not mission.fences:
         return ""
@@ -360,7 +364,7 @@ def _home_fence_violation(setup: FlightSetup) -> str:
 
 
 def _full_voltage(setup: FlightSetup) -> float:
-    """Return the voltage of the full battery, V; inf without a battery or for a guessed battery."""
+    """Return the voltage of the full battery, V; inf if the aircraft has no battery or a guessed one."""
     cells = 0 if setup.envelope.battery_guessed else round(setup.envelope.volts / NOMINAL_CELL_VOLTAGE_V)
     return cells * FULL_CELL_VOLTAGE_V if cells else math.inf
 
@@ -384,8 +388,8 @@ _PX4_LOCATED_COMMANDS = frozenset(
 def _check_validity(mission: Mission, refuses: bool) -> Iterator[_Remark]:
     """Yield a remark on each item that PX4 refuses at upload.
 
-    refuses: True if PX4 is to fly.  Only then a command without coordinates in a frame with coordinates is reported,
-        because every Mission Planner file contains such commands.
+    refuses: True if PX4 is to fly.  Only then are commands without coordinates in a frame with coordinates reported,
+        because every file of Mission Planner contains such commands.
     """
     for item in mission.items:
         name, support = command_name(item.command), command_support(item.command)
@@ -408,11 +412,14 @@ def _check_validity(mission: Mission, refuses: bool) -> Iterator[_Remark]:
                 f"{name} in frame {item.frame}: PX4 accepts this command only in frame {int(Frame.MISSION)}",
             )
     if mission.items and mission.items[0].command == C.NAV_LAND:
-        yield REFUSED, mission.items[0].seq, "starts with landing"
+        yield REFUSED, mission.items[0].seq, "the mission starts with a landing"
 
 
 def _height_above_home(mission: Mission, item: MissionItem) -> float:
-    """Return an item's height above home, m; NaN if unknown.  A height above terrain is returned unchanged."""
+    """Return an item's height above home, m; NaN if unknown.
+
+    A height above terrain is returned unchanged.
+    """
     if item.frame in OVER_HOME | OVER_TERRAIN:
         return item.alt
     return item.alt - mission.home.alt if mission.home is not None else math.nan
@@ -425,9 +432,9 @@ def _check_takeoff(mission: Mission) -> Iterator[_Remark]:
         if item.command in TAKEOFFS:
             height = _height_above_home(mission, item)
             if height <= 0.0:
-                yield REFUSED, item.seq, f"takeoff altitude {height:.1f} m is not above home"
+                yield REFUSED, item.seq, f"the takeoff altitude is {height:.1f} m above home, but must be above 0 m"
             if has_earlier_place:
-                yield REFUSED, item.seq, "takeoff is not the first waypoint item"
+                yield REFUSED, item.seq, "the takeoff is not the first waypoint item"
         has_earlier_place = has_earlier_place or item.command in PLACES | TAKEOFFS | LANDINGS | {C.NAV_RETURN_TO_LAUNCH}
 
 
@@ -438,14 +445,14 @@ def _check_landing(mission: Mission) -> Iterator[_Remark]:
     landings = [k for k, command in enumerate(commands) if command in LANDINGS]
     seq = [item.seq for item in mission.items]
     if len(land_starts) > 1:
-        yield REFUSED, seq[land_starts[1]], "more than one land start command"
+        yield REFUSED, seq[land_starts[1]], "the mission has more than one DO_LAND_START"
     if landings and landings[0] == 0:
-        yield REFUSED, seq[0], "starts with landing"
+        yield REFUSED, seq[0], "the mission starts with a landing"
     for k, command in enumerate(commands):
         if command == C.NAV_RETURN_TO_LAUNCH and land_starts and land_starts[0] < k:
-            yield REFUSED, seq[k], "land start item before RTL item is not possible"
+            yield REFUSED, seq[k], "a return to launch after DO_LAND_START is not possible"
     if land_starts and not any(land > land_starts[0] for land in landings):
-        yield REFUSED, seq[land_starts[0]], "invalid land start: no landing follows"
+        yield REFUSED, seq[land_starts[0]], "no landing follows DO_LAND_START"
 
 
 def _check_approach(mission: Mission, origin: GeoOrigin, limits: FeasibilityLimits) -> Iterator[_Remark]:
@@ -473,11 +480,11 @@ def _check_approach(mission: Mission, origin: GeoOrigin, limits: FeasibilityLimi
                 continue
             distance = math.sqrt(distance * distance - radius * radius)
         elif previous.command != C.NAV_WAYPOINT:
-            yield REFUSED, item.seq, "unsupported landing approach entrance: only LOITER_TO_ALT or WAYPOINT"
+            yield REFUSED, item.seq, "the approach must begin with a WAYPOINT or a LOITER_TO_ALT"
             continue
         angle = math.atan2(altitude_difference, distance)
         if angle > limits.landing_angle + PX4_LANDING_BUFFER_RAD:
-            reason = f"the landing glide slope {math.degrees(angle):.1f}° is steeper than {max_angle:.1f}°"
+            reason = f"the landing glide slope is {math.degrees(angle):.1f}°, more than the maximum of {max_angle:.1f}°"
             yield REFUSED, item.seq, reason
 
 
@@ -492,7 +499,7 @@ def _check_required_ends(mission: Mission, limits: FeasibilityLimits, refuses: b
     elif limits.stated:
         yield REFUSED, None, missing_ends
     else:
-        # A single parameter of unknown value: no verdict, and irrelevant for another autopilot.
+        # The value of the parameter is unknown, so nothing is decided.  It does not concern other autopilots.
         yield None if refuses else True, None, missing_ends
 
 
@@ -515,7 +522,8 @@ def _check_first_distance(mission: Mission, origin: GeoOrigin) -> Iterator[_Rema
         yield (
             None,
             flown_items[0].seq,
-            f"first waypoint too far away: {distance:.0f} m from home, maximum {PX4_FIRST_WAYPOINT_DISTANCE_M:.0f} m",
+            f"the first waypoint is {distance:.0f} m from home, more than the maximum of"
+            f" {PX4_FIRST_WAYPOINT_DISTANCE_M:.0f} m",
         )
 
 
@@ -529,11 +537,11 @@ def _check_gates(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
     for previous, following in itertools.pairwise(flown_items):
         has_gate = C.CONDITION_GATE in (previous.command, following.command)
         if has_gate and _distance_between(previous, following, origin) < PX4_GATE_SPACING_M:
-            yield REFUSED, following.seq, "distance between waypoint and gate too close"
+            yield REFUSED, following.seq, "the gate and the neighbouring waypoint are too close together"
 
 
 def _check_distances(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
-    """Yield remarks on gates too close to a waypoint, and on the longest leg if older PX4 releases refuse it."""
+    """Yield remarks on gates close to a waypoint, and on a distance that older PX4 releases refuse."""
     yield from _check_gates(mission, origin)
     flown_items = _flown_items(mission)
     if len(flown_items) < 2:
@@ -546,7 +554,7 @@ def _check_distances(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
         yield (
             True,
             flown_items[k + 1].seq,
-            f"{reason} {PX4_WAYPOINT_SPACING_M:.0f} m by default, newer ones have no limit",
+            f"{reason} {PX4_WAYPOINT_SPACING_M:.0f} m by default; newer releases have no limit",
         )
 
 
@@ -557,11 +565,11 @@ def _check_home_altitude(mission: Mission) -> Iterator[_Remark]:
     """
     for item in _flown_items(mission):
         if item.frame in OVER_HOME and mission.home is None:
-            reason = "the file has heights above home but no home: PX4 refuses them until the vehicle has a home"
+            reason = "the file has heights above home but no home; PX4 refuses them until the vehicle has a home"
             yield None, item.seq, reason
             return
         if _height_above_home(mission, item) < 0.0:
-            yield True, item.seq, f"waypoint {item.seq} below home: a warning"
+            yield True, item.seq, f"waypoint {item.seq} is below home, for which PX4 only warns"
 
 
 def _check_fence(setup: FlightSetup) -> Iterator[_Remark]:

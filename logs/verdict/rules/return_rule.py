@@ -44,8 +44,8 @@ from world.scenario_tables import ReturnDemand
 
 # Maximum number of simulated returns if all have to be safe: one for each second of flight, 2 ms each.
 _MAX_RETURNS = 3000
-# Angle by which a logged loiter may fall short of a full lap, rad: its rows may miss up to a second at either end, at
-# 26 m/s on 260 m.
+# Angle by which a logged loiter may fall short of a full lap, rad.  The rows may miss 1 s of the loiter, in which an
+# aircraft at 26 m/s turns by this angle on a radius of 260 m.
 _LAP_TOLERANCE_RAD = 0.1
 # Rules that judge how well a flight follows its legs.
 _LEG_RULES = frozenset({"turn", "waypoint", "corridor", "slope", "loiter"})
@@ -79,7 +79,7 @@ def return_findings(
 def flown_return_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, end_reason: str, log_complete: bool
 ) -> list[Finding]:
-    """Judge the RTL of a planfly flight, the RTL after the last item, and the scenario's requirements on returns.
+    """Judge a simulated flight's RTL, its RTL after the last item, and the scenario's requirements.
 
     end_reason: "completed" if the flight ended after its RTL loiter, otherwise the reason for its end.
     log_complete: not used, because the completion rule reports it.
@@ -123,7 +123,7 @@ def _automatic_return_findings(requirements: RouteRequirements, end: ReturnStart
         else:
             brief = f"the return after the last item {outcome_text(simulated, world.limit)}"
             text = f": {measured_text(simulated, world.limit, setup.scenario)}"
-            # The rules of clearance and energy report what is missing.
+            # The clearance and energy rules already report missing terrain data and an empty battery.
             is_reported = simulated.kind == "used" or (simulated.kind == "unknown" and setup.scenario.terrain is None)
             ok = simulated.safe or is_reported or (None if simulated.kind in UNJUDGED else False)
             text += "" if ok else f"; {judged_return_text(setup)}"
@@ -143,7 +143,7 @@ def _automatic_return_findings(requirements: RouteRequirements, end: ReturnStart
 
 
 def _requirement_findings(requirements: RouteRequirements, starts: Callable[[float], ReturnStarts]) -> list[Finding]:
-    """Judge whether RTLs and glides from the whole path meet the scenario's requirements; [] without any.
+    """Judge whether RTLs and glides meet the scenario's requirements; [] without requirements.
 
     starts: function that samples the starts of RTLs at an interval, s.
     """
@@ -180,12 +180,20 @@ _NOT_KNOWN = "it is not fully known whether the aircraft gets home as the scenar
 
 
 def _method_text(autopilot: str) -> str:
-    """Describe how returns are judged.  autopilot: title of the autopilot that returns."""
+    """Describe how returns are judged.
+
+    autopilot: title of the autopilot that returns.
+    """
     return f"by the simulated {autopilot} flying a point-mass model"
 
 
 class _RequirementResult(NamedTuple):
-    """Answer to a requirement: True if it is met or None if unknown, the reason, and the method of judging."""
+    """Answer to a requirement on returns.
+
+    ok: True if the requirement is met, False if not, None if unknown.
+    reason: explanation of the answer.
+    method: description of how the returns were judged.
+    """
 
     ok: bool | None
     reason: str
@@ -193,7 +201,11 @@ class _RequirementResult(NamedTuple):
 
 
 def _judge_rtl(world: ReturnWorld, starts: ReturnStarts, interval: float) -> _RequirementResult:
-    """Judge whether every RTL is safe."""
+    """Judge whether every RTL is safe.
+
+    starts: positions and times from which the aircraft returns.
+    interval: time between the starts, s.
+    """
     judged_returns = judge_returns(world, starts, interval)
     return _RequirementResult(
         None if judged_returns.undecided else judged_returns.safe,
@@ -205,8 +217,8 @@ def _judge_rtl(world: ReturnWorld, starts: ReturnStarts, interval: float) -> _Re
 def _judge_glides(world: ReturnWorld, starts: ReturnStarts, _: float) -> _RequirementResult:
     """Judge whether a glide from every start reaches home, a rally point, a landing site or flat ground.
 
-    Starts below the minimum height above ground are omitted: there the aircraft takes off or lands, and would descend
-    straight ahead.
+    Starts below the minimum height above ground are omitted.  The aircraft is taking off or landing there, and would
+    descend straight ahead.
     """
     is_low = heights_above_ground(world, starts) < world.limit
     glides = judge_glides(world, starts.subset(np.flatnonzero(~is_low)))
@@ -245,9 +257,10 @@ def has_completed_return_loiter(requirements: RouteRequirements, aligned: Aligne
 
 
 def _flown_rtl_findings(requirements: RouteRequirements, has_arrived: bool, reason: str = "") -> list[Finding]:
-    """Return the finding on a flown RTL: passed if the aircraft arrived, otherwise not judged; [] without an RTL.
+    """Return the finding on a flown RTL as a list; [] for a mission without an RTL.
 
-    reason: text on how the flight ended, appended if the aircraft did not arrive.
+    The finding passes if the aircraft arrived; otherwise it is not judged.
+    reason: text on how the flight ended, which is appended if the aircraft did not arrive.
     """
     outcome = "flown to its end" if has_arrived else f"the flight did not reach its end{reason}"
     return _rtl_findings(requirements, True if has_arrived else None, outcome)
@@ -268,7 +281,7 @@ def _rtl_findings(requirements: RouteRequirements, ok: bool | None, outcome: str
     unknown_reason = next((note.partition(": ")[2] for note in route.notes if RTL_NOT_CONTINUED_TEXT in note), "")
     faults = []
     if unknown_reason and requirements.setup.imported_log is None:
-        # The path flown instead does not show where the autopilot flies.
+        # The simulated path does not show where the real autopilot flies.
         faults, ok = [message("the destination of the return is unknown", f": {unknown_reason}")], None
         reason = f"{faults[0].text}; {reason}"
     return [
@@ -314,7 +327,7 @@ def without_path_following_findings(
         finding.rule == "return" and finding.place != FLIGHT and finding.ok for finding in kept_findings
     ):
         return tuple(kept_findings)
-    # Every part of the return is on some leg; a drawn leg without any part was not flown.
+    # Each part of the flown return belongs to a drawn leg.  A drawn leg without such a part was not flown.
     unflown_places = {requirements.leg(i) for i in legs if not aligned.has_flown(i)}
     return tuple(finding for finding in kept_findings if finding.ok is not None or finding.place not in unflown_places)
 

@@ -49,10 +49,7 @@ from world.wind import W20
 def slope_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge the slope of each leg; if ``geometric``, judge only the route, without a flight.
-
-    Legs of a turn-around have no finding.
-    """
+    """Judge the slope of each leg, except in turnarounds; if ``geometric``, judge only the route."""
     findings, turnaround_legs = [], requirements.turnaround_legs()
     for leg in range(requirements.legs):
         if leg in turnaround_legs:
@@ -68,9 +65,9 @@ def slope_findings(
 def _leg_finding(
     requirements: RouteRequirements, leg: int, measure: SlopeMeasure | None, *, is_complete: bool
 ) -> Finding:
-    """Judge a leg's planned slope; after a flight also its flown slope, altitude, throttle and performance.
+    """Judge a leg's planned slope and, after a flight, its flown slope, altitude and throttle.
 
-    measure: None before a flight.
+    measure: measurements of the flown leg; None before a flight.
     is_complete: True if the flight reached the last waypoint.
     """
     planned_slope = float(requirements.slopes[leg])
@@ -88,7 +85,7 @@ def _leg_finding(
         sign = math.copysign(1.0, planned_slope)
         faults = [_steep_ground_message(requirements, leg, ground)]
     aircraft_facts = _aircraft_slope_facts(requirements, leg) if arc_faults or (faults and source == "aircraft") else []
-    # A fault of the plan states the planned slope itself.
+    # The text of a planned fault already states the planned slope.
     facts = facts if faults or arc_faults else [f"slope {math.degrees(planned_slope):+.2f}°", *facts]
     slope_fit = measure.slope if measure is not None and ground is None else None
     method = "route"
@@ -96,7 +93,7 @@ def _leg_finding(
         flown_faults, flown_facts = _flown_messages(requirements, leg, measure, limit)
         faults, facts = faults + flown_faults, facts + flown_facts
         method = _fit_text(slope_fit) if slope_fit is not None else "not flown" if ground is None else "route"
-    # The arc at the leg's end may be steep only because the leg is.
+    # Faults of the arc come last, because the arc at a steep leg's end is steep, too.
     faults = faults + arc_faults
     uncertainty = "" if ground else _ability_text(requirements, leg, limit, source, has_failed=bool(faults))
     check = UNKNOWN_AIRCRAFT if uncertainty and not faults else ""
@@ -105,7 +102,7 @@ def _leg_finding(
     if measure is not None and not measure.is_finished:
         facts.append("the leg was not flown to its end" if is_complete else "the flight did not reach its end")
         ok = False if faults else None
-    # The plan decides if the leg fails by it, as the reason states.
+    # If the planned slope is too steep, the finding states its margin, otherwise the margin of the flown slope.
     deciding_fit = None if is_plan_steep else slope_fit
     return make_finding(
         "slope",
@@ -128,17 +125,18 @@ def _leg_finding(
 
 
 def _fit_text(fit: LegFit) -> str:
-    """Return the method by which a flown slope was measured."""
+    """Describe the method by which a flown slope was measured."""
     return f"least squares{'' if fit.is_fitted else ', short leg,'} over {fit.length:.0f} m"
 
 
 def _flown_messages(
     requirements: RouteRequirements, leg: int, measure: SlopeMeasure, limit: float
 ) -> tuple[list[Message], list[str]]:
-    """Return the faults and facts of a leg as flown.
+    """Return the faults and the facts of a flown leg.
 
-    If the aircraft's limits apply, the leg is judged by them and by a lack of performance in the flight; the height
-    error is then only reported.
+    With the limits of a known aircraft, only exceeded limits and a lack of performance are faults.  The flown slope and
+    the height error are then facts.
+    limit: limit of the slope, rad.
     """
     faults = [*_rate_limit_faults(requirements, leg, measure), *_performance_faults(requirements, leg, measure)]
     planned_slope = abs(float(requirements.slopes[leg]))
@@ -156,11 +154,14 @@ def _flown_messages(
 def _planned_slope_messages(
     requirements: RouteRequirements, leg: int, limit: float, source: str
 ) -> tuple[list[Message], list[str]]:
-    """Return the faults and facts of a leg's planned slope.
+    """Return the faults and the facts of a leg's planned slope.
 
-    If a leg that is too steep is only a negligible step in height, this is a fact, not a fault.  The same holds for a
-    leg that follows ground which itself falls more steeply than the limit, unless the scenario sets the limit: the
-    aircraft is then only too high.
+    limit: limit of the slope, rad.
+    source: source of the limit: "scenario" or "aircraft".
+
+    A leg that is too steep has no fault, but a fact, in two cases.  The first is a negligible step in height.  The
+    second is a leg over ground that falls more steeply than the aircraft can descend: the aircraft is then only too
+    high.
     """
     faults: list[Message] = []
     facts: list[str] = []
@@ -198,11 +199,11 @@ class _SteepGround(NamedTuple):
 
 
 def _steep_ground(requirements: RouteRequirements, leg: int, measure: SlopeMeasure | None) -> _SteepGround | None:
-    """Return the ground that a leg cannot follow; None if the height that is missed is negligible.
+    """Return the ground that rises too steeply for a leg to follow it; None if there is none.
 
-    After a flight, the missed height above ground decides, and the autopilot's climb and sink rates are limits, too.
-    Ground that falls faster than the aircraft can descend is no fault, because the aircraft is then higher than the leg
-    demands.
+    Ground is also ignored if the height that the aircraft misses is negligible.  After a flight, the measured height
+    error decides, and the autopilot's climb rate limits the slope, too.  Falling ground is no fault, because the
+    aircraft is then only higher than the leg demands.
     """
     if not follows_ground(requirements, leg):
         return None
@@ -219,7 +220,7 @@ def _steep_ground(requirements: RouteRequirements, leg: int, measure: SlopeMeasu
 
 
 def _steep_ground_message(requirements: RouteRequirements, leg: int, ground: _SteepGround) -> Message:
-    """Return a message on ground that a leg cannot follow, and on the limit."""
+    """Make a message that compares ground that a leg cannot follow with the limit of the slope."""
     limit_text = f"{ground.name} permits a climb of {math.degrees(ground.limit):.1f}°"
     if not ground.name:
         limit_text = _limit_text(requirements, leg, ground.limit, ground.source, is_climb=True)
@@ -227,14 +228,14 @@ def _steep_ground_message(requirements: RouteRequirements, leg: int, ground: _St
         f"leg {requirements.leg(leg).number} follows the ground up {math.degrees(ground.slope):.1f}°"
         f" for {_distance_text(ground.length)}"
     )
-    explanation = f"; {limit_text}; the aircraft would fly up to {ground.excess:.0f} m too low over the ground"
+    explanation = f"; {limit_text}, so the aircraft would fly up to {ground.excess:.0f} m too low over the ground"
     return message(brief, explanation, placed=True)
 
 
 def _uncertainty_text(requirements: RouteRequirements, leg: int) -> str:
-    """Explain why an uncertain aircraft model leaves a slope undecided; return "" if it is decided.
+    """Explain why an uncertain aircraft model leaves a slope undecided; return "" if the slope is decided.
 
-    Only the limits of the aircraft are considered, not a tighter limit of the scenario.
+    Only the limits of the aircraft are considered, not a lower limit of the scenario.
     """
     planned_slope, envelope = float(requirements.slopes[leg]), requirements.setup.envelope
     limits, certain_limits, verb = (
@@ -255,9 +256,11 @@ def _uncertainty_text(requirements: RouteRequirements, leg: int) -> str:
 
 
 def _limit_deviation(requirements: RouteRequirements, leg: int, limit: float, certain_limit: float) -> float:
-    """Return the standard deviation of an uncertain aircraft's limit (rad), over the ground like the limit itself.
+    """Return the standard deviation of an uncertain aircraft's slope limit, rad.
 
-    If the certain part of the limit is 0 rad, it is the deviation in still air.
+    The limit is a slope over the ground, and so is the deviation.  If nothing of the limit is certain, the deviation is
+    the one in still air.
+    certain_limit: limit reduced by the uncertainty, rad.
     """
     envelope = requirements.setup.envelope
     if certain_limit <= 0.0:
@@ -266,10 +269,12 @@ def _limit_deviation(requirements: RouteRequirements, leg: int, limit: float, ce
 
 
 def _ability_text(requirements: RouteRequirements, leg: int, limit: float, source: str, *, has_failed: bool) -> str:
-    """Explain how the aircraft's uncertainty leaves a slope undecided, or affects the suggestions.
+    """Explain how the aircraft's uncertainty leaves a slope undecided, or how it limits the suggestions.
 
-    Return "" for a certain aircraft, and for a planned slope that is too steep, because its message states the limit
-    (rad).
+    Return "" for an aircraft without uncertainty.  Return "" also for a planned slope above the limit, because its own
+    message states the limit.
+    limit, source: limit of the slope, rad, and its source.
+    has_failed: True if the leg fails.
     """
     if not has_failed:
         return _uncertainty_text(requirements, leg)
@@ -278,10 +283,9 @@ def _ability_text(requirements: RouteRequirements, leg: int, limit: float, sourc
 
 
 def _certain_limit_text(requirements: RouteRequirements, leg: int, limit: float, source: str) -> str:
-    """State how much of the limit of a slope is certain, because suggestions use only this part.
+    """State the certain part of a slope limit; suggested slopes stay within this part.
 
     Return "" if the whole limit is certain, or if the limit does not come from the aircraft.
-
     limit, source: limit of the slope, rad, and its source.
     """
     envelope, is_climb = requirements.setup.envelope, float(requirements.slopes[leg]) >= 0.0
@@ -298,7 +302,7 @@ def _certain_limit_text(requirements: RouteRequirements, leg: int, limit: float,
 def _steep_arc_faults(requirements: RouteRequirements, leg: int, measure: SlopeMeasure | None) -> list[Message]:
     """Return a fault if the fly-by arc at a leg's end is steeper than the aircraft can fly, otherwise []."""
     arc = steep_arc(requirements, leg)
-    if arc is None or (measure is not None and _is_arc_kept(arc, measure)):
+    if arc is None or (measure is not None and _is_arc_within_tolerance(arc, measure)):
         return []
     corner = leg + 1
     place = requirements.waypoint(corner)
@@ -319,10 +323,10 @@ def _steep_arc_faults(requirements: RouteRequirements, leg: int, measure: SlopeM
     return [Message(arc_text + limit, brief)]
 
 
-def _is_arc_kept(arc: SteepArc, measure: SlopeMeasure) -> bool:
-    """Return True if a flown arc loses no more height than the tolerance of a leg.
+def _is_arc_within_tolerance(arc: SteepArc, measure: SlopeMeasure) -> bool:
+    """Return True if the height that a flown arc misses is within a leg's height tolerance.
 
-    The other rules judge the airspeed and the height above ground on the arc.
+    Other rules judge the airspeed and the height above ground on the arc.
     """
     return measure.is_finished and arc.missing_height <= HEIGHT_ERROR_LIMIT_M
 
@@ -334,7 +338,7 @@ def _is_in_envelope(requirements: RouteRequirements, leg: int) -> bool:
 
 
 def _steep_leg_message(requirements: RouteRequirements, leg: int, limit: float, source: str) -> Message:
-    """Return a message on a leg's planned slope, which is too steep, and on its limit."""
+    """Make a message that compares a planned slope that is too steep with its limit (rad)."""
     planned_slope = float(requirements.slopes[leg])
     verb = "climbs" if planned_slope >= 0.0 else "descends"
     slope_text = f"{math.degrees(abs(planned_slope)):.1f}° for {_distance_text(float(requirements.runs[leg]))}"
@@ -353,10 +357,10 @@ def _steep_leg_message(requirements: RouteRequirements, leg: int, limit: float, 
 
 
 def _no_progress_text(requirements: RouteRequirements, leg: int) -> str:
-    """State ground speed and wind if the aircraft makes no progress in a climb or descent; otherwise "".
+    """State ground speed and wind if the headwind stops the aircraft in a climb or descent; otherwise "".
 
-    This is the case if the horizontal part of the airspeed, on the steepest climb or descent, is not larger than the
-    headwind.
+    The aircraft makes no progress if, at the steepest climb or descent, the horizontal part of its airspeed is not
+    larger than the headwind.
     """
     speed, envelope = float(requirements.route.leg_airspeeds[leg]), requirements.setup.envelope
     for altitude in requirements.points[leg : leg + 2, 2].tolist():
@@ -372,7 +376,7 @@ def _no_progress_text(requirements: RouteRequirements, leg: int) -> str:
 
 
 def _limit_text(requirements: RouteRequirements, leg: int, limit: float, source: str, *, is_climb: bool) -> str:
-    """Describe the limit on a leg's slope (rad) and, for the aircraft's own limit, the influence of the wind."""
+    """Describe the limit on a leg's slope (rad), for the aircraft with airspeed and wind."""
     if source == "scenario":
         return f"the scenario allows {math.degrees(limit):.1f}°"
     speed = float(requirements.route.leg_airspeeds[leg])
@@ -389,7 +393,7 @@ def _limit_text(requirements: RouteRequirements, leg: int, limit: float, source:
 
 
 def _wind_text(tailwind: float, crosswind: float) -> str:
-    """Name the larger component of a wind on a course, m/s, with its direction."""
+    """Describe the larger of two wind components (m/s), such as "5 m/s crosswind"."""
     if abs(crosswind) > abs(tailwind):
         return f"{abs(crosswind):.0f} m/s crosswind"
     return f"{abs(tailwind):.0f} m/s {'tailwind' if tailwind > 0.0 else 'headwind'}"
@@ -401,13 +405,16 @@ def _distance_text(distance: float) -> str:
 
 
 def _throttle_text(requirements: RouteRequirements, name: str) -> str:
-    """Describe a throttle limit: "throttle at full", or at the autopilot's limit if that is lower."""
+    """Describe a throttle limit, such as "throttle at full", or by the parameter that limits it.
+
+    name: "full" or "idle".
+    """
     limit_name = requirements.setup.autopilot.speeds.max_throttle_name
     return f"throttle at its limit {limit_name}" if name == "full" and limit_name else f"throttle at {name}"
 
 
 def _throttle_times(measure: SlopeMeasure) -> tuple[tuple[str, float, float, str], ...]:
-    """Return name, duration (s), speed error (m/s) and direction of the error for each throttle limit."""
+    """Return, for full and idle throttle: name, duration (s), speed error (m/s) and "slow" or "fast"."""
     return (
         ("full", measure.full_throttle_time, measure.speed_loss, "slow"),
         ("idle", measure.idle_throttle_time, measure.speed_gain, "fast"),
@@ -415,7 +422,7 @@ def _throttle_times(measure: SlopeMeasure) -> tuple[tuple[str, float, float, str
 
 
 def _flown_facts(requirements: RouteRequirements, leg: int, measure: SlopeMeasure) -> list[tuple[str, str]]:
-    """Return texts on how a leg was flown, each with the name of its quantity: (name, text)."""
+    """Describe how a leg was flown, as pairs of a quantity's name and a text."""
     facts = []
     if measure.slope is not None:
         facts.append(("slope", f"flown {math.degrees(measure.slope.value):+.2f}°"))
@@ -431,7 +438,7 @@ def _flown_facts(requirements: RouteRequirements, leg: int, measure: SlopeMeasur
         limit_name = requirements.setup.autopilot.speeds.max_pitch_name
         facts.append(("pitch", f"pitch at its limit {limit_name} for {measure.pitch_limit_time:.0f} s"))
     arc = steep_arc(requirements, leg)
-    if arc is not None and _is_arc_kept(arc, measure):
+    if arc is not None and _is_arc_within_tolerance(arc, measure):
         place = place_text(requirements.waypoint(leg + 1))
         facts.append(("arc", f"the arc at {place} misses its height by only {arc.missing_height:.1f} m"))
     return facts
@@ -458,7 +465,7 @@ def _measured_facts(requirements: RouteRequirements, leg: int, measure: SlopeMea
 
 
 def _aircraft_slope_facts(requirements: RouteRequirements, leg: int) -> list[Fact]:
-    """Return the steepest climb or descent that the aircraft can fly on a leg, as a fact of a failed finding."""
+    """Return, as a fact, the steepest climb or descent that the aircraft can fly on a leg."""
     limits = requirements.climb if float(requirements.slopes[leg]) >= 0.0 else requirements.dive
     return [Fact(AIRCRAFT_SLOPE, math.degrees(float(limits[leg])), "deg")]
 
@@ -466,8 +473,9 @@ def _aircraft_slope_facts(requirements: RouteRequirements, leg: int) -> list[Fac
 def _flown_faults(
     requirements: RouteRequirements, leg: int, measure: SlopeMeasure, limit: float, performance_faults: list[Message]
 ) -> dict[str, Message]:
-    """Return the faults of a leg as flown, by quantity: "slope", "height", "full" and "idle" (throttle).
+    """Return the faults of a flown leg by quantity: "slope", "height", and "full" or "idle" throttle.
 
+    limit: limit of the slope, rad.
     performance_faults: faults that show a lack of performance.
     """
     faults = {}
@@ -504,7 +512,7 @@ def _flown_faults(
 
 
 def _throttle_limit(planned_slope: float) -> str:
-    """Return the throttle limit that a slope may reach: "full" for a climb, "idle" for a descent."""
+    """Name the throttle limit that a slope (rad) may reach: "full" for a climb, "idle" for a descent."""
     return "full" if planned_slope >= 0.0 else "idle"
 
 
@@ -533,9 +541,9 @@ def _height_error_limit(measure: SlopeMeasure) -> float:
 
 
 def _rate_limit_slope(requirements: RouteRequirements, leg: int, *, is_climb: bool) -> tuple[float, str]:
-    """Return the slope over the ground at the autopilot's climb or sink rate limit, rad, and the limit's name.
+    """Return the slope over the ground at the autopilot's climb or sink rate limit, and its name.
 
-    The slope is infinite without a limit, and in an imported flight whose log does not state the parameter.
+    The slope is inf without a limit, and for an imported flight whose log does not contain the parameter.
     """
     setup = requirements.setup
     rate_limit = setup.autopilot.speeds.climb_limit if is_climb else setup.autopilot.speeds.sink_limit
@@ -551,7 +559,7 @@ def _rate_limit_slope(requirements: RouteRequirements, leg: int, *, is_climb: bo
 
 
 def _rate_limit_faults(requirements: RouteRequirements, leg: int, measure: SlopeMeasure) -> list[Message]:
-    """Return a fault if the autopilot's rate limit is below a leg's slope, and the flight missed the slope."""
+    """Return a fault if the autopilot's rate limit kept a flight from the leg's height."""
     planned_slope = float(requirements.slopes[leg])
     sign = 1.0 if planned_slope >= 0.0 else -1.0
     slope, name = _rate_limit_slope(requirements, leg, is_climb=planned_slope >= 0.0)

@@ -47,7 +47,7 @@ def speed_findings(
 
     If ``geometric``, findings on the autopilot's parameters come first.
     """
-    # The demanded route is computed at each access, which is too slow to repeat for each of thousands of legs.
+    # The property `demanded_route` computes the route at each access: read it once, not for each leg.
     demanded_speeds = requirements.setup.demanded_route.leg_airspeeds
     findings = [
         _speed_finding(requirements, aligned, leg, float(demanded_speeds[leg]), geometric=geometric)
@@ -100,7 +100,7 @@ def _speed_finding(
                 notes += [text] if requirements.envelope else []
                 faults += [] if requirements.envelope else [message(text)]
             if not faults and (held_speed := _find_held_speed(requirements, aligned, leg, commanded)):
-                # From here on the flown speed is judged by the command, instead of the command by the envelope.
+                # The finding then compares the flown speed with the command, not the command with the envelope.
                 mean_speed, allowed_error, source = held_speed.speed, held_speed.allowed_error, "mission"
                 limit = commanded + math.copysign(allowed_error, mean_speed - commanded)
                 at_least = mean_speed < commanded
@@ -144,8 +144,9 @@ def _command_text(demanded: float, commanded: float, min_speed: float, max_speed
 
 
 class _HeldSpeed(NamedTuple):
-    """Airspeed that was held instead of the commanded airspeed, m/s.
+    """Airspeed that was held instead of the commanded airspeed.
 
+    speed: mean airspeed, m/s.
     allowed_error: tolerated difference from the command, m/s.
     tolerance: further difference that gusts may cause, m/s.
     """
@@ -160,9 +161,9 @@ def _find_held_speed(
 ) -> _HeldSpeed | None:
     """Return the airspeed held on a leg if it is far from the command, otherwise None.
 
-    The airspeed is the mean over the second half of the leg's steady rows, because in the first half the aircraft may
-    still change its speed.  Return None also in two other cases: if the leg is too steep for the aircraft, because the
-    slope rule then names the cause; and for an imported flight, because its airspeed sensor may have the same error.
+    The airspeed is the mean over the second half of the leg's steady rows, because the aircraft may still change its
+    speed in the first half.  Return None also for a leg that is too steep, because the slope rule reports it.  Return
+    None for an imported flight, because its airspeed sensor may have the same error.
     """
     if abs(float(requirements.slopes[leg])) > slope_limit(requirements, leg)[0] + PLAN_TOLERANCE_RAD:
         return None
@@ -190,7 +191,7 @@ def _find_held_speed(
 
 
 def _uncertainty_text(requirements: RouteRequirements, leg: int, commanded: float, max_speed: float) -> str:
-    """State an uncertain maximum airspeed that leaves a commanded speed undecided or impossible; else ""."""
+    """State the uncertain maximum airspeed if the commanded speed exceeds its certain part; otherwise ""."""
     envelope = requirements.setup.envelope
     if not envelope.fastest_sd:
         return ""
@@ -203,7 +204,7 @@ def _uncertainty_text(requirements: RouteRequirements, leg: int, commanded: floa
 
 
 def _speed_range_notes(requirements: RouteRequirements, leg: int) -> list[str]:
-    """Return a note if the autopilot does not accept the speed that the mission commands on a leg."""
+    """Return a note if the autopilot does not accept a leg's commanded speed; otherwise []."""
     setup, autopilot = requirements.setup, requirements.setup.autopilot
     command, limits = float(setup.route.leg_airspeeds[leg]), autopilot.speeds.limits
     if limits is None or limits.min <= command <= limits.max:
@@ -214,7 +215,10 @@ def _speed_range_notes(requirements: RouteRequirements, leg: int) -> list[str]:
 
 
 def _short_leg_notes(requirements: RouteRequirements, leg: int, commanded: float) -> list[str]:
-    """Return a note if a leg is too short to reach its airspeed at `MAX_STEADY_ACCELERATION_MPS2`, otherwise []."""
+    """Return a note if a leg is too short to reach its airspeed; otherwise [].
+
+    The acceleration is `MAX_STEADY_ACCELERATION_MPS2`.
+    """
     previous_speed = float(requirements.route.leg_airspeeds[leg - 1]) if leg else commanded
     change, leg_length = commanded - previous_speed, float(requirements.runs[leg])
     duration = abs(change) / MAX_STEADY_ACCELERATION_MPS2
@@ -231,22 +235,22 @@ def _short_leg_notes(requirements: RouteRequirements, leg: int, commanded: float
         + previous_speed
     )
     return [
-        f"from {previous_speed:.1f} to {commanded:.1f} m/s takes about {duration:.0f} s and {needed_length:.0f} m,"
-        f" but the leg has {leg_length:.0f} m, so about {end_speed:.1f} m/s are reached"
+        f"the change from {previous_speed:.1f} to {commanded:.1f} m/s takes about {duration:.0f} s and"
+        f" {needed_length:.0f} m, but the leg has {leg_length:.0f} m, so about {end_speed:.1f} m/s are reached"
     ]
 
 
 def _nearest_mean_airspeed(aligned: AlignedTrack, leg: int, commanded: float) -> float:
-    """Return the one-second mean of the airspeed on a leg that is nearest to the command, m/s.
+    """Return the one-second mean of a leg's airspeed that is nearest to the commanded airspeed, m/s.
 
-    On a leg shorter than a second, return the mean over the leg.
+    On a leg shorter than one second, return the mean over the leg.
     """
     means = _one_second_means(aligned, aligned.leg_rows(leg))
     return float(means[np.argmin(np.abs(means - commanded))])
 
 
 def _one_second_means(aligned: AlignedTrack, rows: slice) -> Floats:
-    """Return moving one-second means of the airspeed, m/s; a single mean if the rows span less time."""
+    """Return moving one-second means of the airspeed, m/s; one mean for less than a second."""
     speed = aligned.track.airspeed[rows].astype(np.float64)
     width = max(1, min(speed.size, round(1.0 / aligned.tick)))
     sums = np.concatenate([[0.0], np.cumsum(speed)])
@@ -300,7 +304,7 @@ def _level_speed_range(
 def _measure_airspeed(
     requirements: RouteRequirements, aligned: AlignedTrack, leg: int
 ) -> tuple[float, float, float] | None:
-    """Return a leg's mean airspeed, its tolerance, and the minimum one-second mean, m/s; None if the leg is too short.
+    """Return a leg's mean airspeed, its tolerance and its minimum one-second mean, m/s, or None.
 
     The tolerance allows for gusts and for a change of slope at the start of the leg.
     """

@@ -28,7 +28,13 @@ from world.wind import W20
 
 @dataclass(frozen=True, slots=True)
 class _Margin:
-    """True airspeed and the stall speeds in this bank (rad) and in level flight, m/s."""
+    """Airspeed in a turn, compared with the stall speed in the same bank.
+
+    speed: true airspeed, m/s.
+    stall_speed: stall speed in this bank, true airspeed, m/s.
+    level_stall_speed: stall speed in level flight, true airspeed, m/s.
+    bank: rad.
+    """
 
     speed: float
     stall_speed: float
@@ -44,10 +50,10 @@ class _Margin:
 def stall_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge the minimum margin of airspeed above the stall in a bank; return [] for a route without a turn.
+    """Judge the minimum margin of airspeed above the stall in a bank; [] without a turn.
 
-    If a route's airspeed is below the stall speed in a bank that the route needs, the rule also fails after a flight.
-    It does not matter that the autopilot flew faster or banked less: this does not make the route flyable.
+    A route whose airspeed is below the stall speed in a planned turn also fails after a flight.  An autopilot that flew
+    faster or banked less does not make the route flyable.
     """
     planned = _planned_findings(requirements)
     if geometric:
@@ -59,7 +65,7 @@ def stall_findings(
 
 
 def _planned_findings(requirements: RouteRequirements) -> list[Finding]:
-    """Judge the planned turn with the smallest margin above the stall; return [] for a route without a turn."""
+    """Judge the planned turn with the smallest margin above the stall; return [] without a turn."""
     worst_margin: tuple[float, int, _Margin] | None = None
     for corner in range(1, requirements.legs):
         for speed in requirements.route.leg_airspeeds[corner - 1 : corner + 1].tolist():
@@ -78,20 +84,20 @@ def _planned_findings(requirements: RouteRequirements) -> list[Finding]:
     return [_stall_finding(margin, f"at waypoint {requirements.waypoint(corner).number}", 0.0, geometric=True)]
 
 
-def planned_bank(requirements: RouteRequirements, i: int, speed: float) -> float:
-    """Return the bank that a waypoint's turn needs at an airspeed (m/s), up to the bank limit, rad.
+def planned_bank(requirements: RouteRequirements, waypoint: int, speed: float) -> float:
+    """Return the bank that the turn at a waypoint needs at an airspeed (m/s), up to the bank limit, rad.
 
     On an arc of radius R, the bank is atan(v^2 / (g R)) at the highest ground speed v on the arc.  A short turn ends
-    before the aircraft has rolled in completely: it needs only the bank reached by then.
+    before the aircraft has rolled in completely.  It needs only the bank reached by then.
     """
-    turn = abs(float(requirements.turns[i]))
-    radius = float(requirements.radius[i])
+    turn = abs(float(requirements.turns[waypoint]))
+    radius = float(requirements.radius[waypoint])
     limit = requirements.limits.max_bank
     if turn <= 0.0 or not math.isfinite(radius):
         return 0.0
-    # The bank limit's radius belongs to the ground speed of the faster leg.
-    max_ground_speed = math.sqrt(float(requirements.min_radius[i]) * GRAVITY * math.tan(limit))
-    speed_deficit = max(requirements.route.leg_airspeeds[i - 1 : i + 1]) - speed
+    # The radius at the bank limit is computed for the airspeed of the faster leg.
+    max_ground_speed = math.sqrt(float(requirements.min_radius[waypoint]) * GRAVITY * math.tan(limit))
+    speed_deficit = max(requirements.route.leg_airspeeds[waypoint - 1 : waypoint + 1]) - speed
     bank = math.atan(max(0.0, max_ground_speed - speed_deficit) ** 2 / (GRAVITY * radius))
     # Rolling in and out again at 1 / ROLL_TIME turns by (g / v) ROLL_TIME bank^2.
     reachable_bank = math.sqrt(turn * speed / (GRAVITY * ROLL_TIME))
@@ -101,7 +107,7 @@ def planned_bank(requirements: RouteRequirements, i: int, speed: float) -> float
 def min_level_airspeed(requirements: RouteRequirements, altitude: float) -> float:
     """Return the minimum true airspeed of level flight at an altitude (m AMSL), m/s.
 
-    At this airspeed the elevator is at its stop.
+    It is limited by the elevator, which is at its stop at this airspeed.
     """
     return requirements.setup.envelope.level_speeds(altitude)[0]
 
@@ -116,8 +122,8 @@ def _flown_findings(requirements: RouteRequirements, aligned: AlignedTrack) -> l
     altitude = _window_means(track.position[:, 2], width)
     envelope = requirements.setup.envelope
     level_stall_speed = np.interp(altitude, envelope.amsl, envelope.level_speed_min)
-    # Load that the wing carried, or that it needed to hold altitude in a turn within the bank limit.
-    # An imported log may hold no load factor.
+    # Larger of the measured load factor and the one that a level turn needs.  An imported log may contain no load
+    # factor.
     load_factor = np.fmax(load, 1.0 / np.cos(np.minimum(bank, requirements.limits.max_bank)))
     stall_speed = level_stall_speed * np.sqrt(np.maximum(load_factor, 0.0))
     margins = speed - stall_speed
@@ -136,12 +142,15 @@ def _window_means(values: NDArray[np.floating], width: int) -> Floats:
 
 
 def _stall_finding(margin: _Margin, time_or_place_text: str, tolerance: float, *, geometric: bool) -> Finding:
-    """Make the finding on a margin above the stall. tolerance: accepted deficit of airspeed, m/s."""
+    """Make the finding on a margin above the stall.
+
+    tolerance: accepted deficit of airspeed, m/s.
+    """
     stall_text = (
-        f"{margin.speed:.1f} m/s {time_or_place_text}, stall {margin.stall_speed:.1f} m/s in"
+        f"airspeed {margin.speed:.1f} m/s {time_or_place_text}; the stall speed is {margin.stall_speed:.1f} m/s in"
         f" {math.degrees(margin.bank):.0f}° of bank"
     )
-    fault = message(stall_text, f" (level {margin.level_stall_speed:.1f} m/s; true airspeeds)")
+    fault = message(stall_text, f" and {margin.level_stall_speed:.1f} m/s in level flight (true airspeeds)")
     return make_finding(
         "stall",
         FLIGHT,

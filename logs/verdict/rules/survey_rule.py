@@ -46,9 +46,9 @@ from logs.verdict.tolerances import (
 )
 from world.wording import count_text
 
-# Limit of a slope where neither the aircraft nor the scenario has one.
+# Limit of a slope if neither the aircraft nor the scenario has one.
 _MAX_SLOPE_RAD = math.radians(89.0)
-# Smallest gap between photos that is stated; it is printed as 1 m.
+# Smallest gap between photos that is printed, m; it is rounded to 1 m.
 _MIN_STATED_GAP_M = 0.5
 
 
@@ -116,7 +116,7 @@ def _overlap_findings(requirements: RouteRequirements, aligned: AlignedTrack | N
 
 
 def overlap_text(measure: OverlapMeasure, check: str) -> str:
-    """Describe the minimum overlap of a survey's photos, the photo lines with it, and the required overlap.
+    """Describe a survey's minimum overlap of photos, the lines with it, and the required overlap.
 
     Return "" if the overlap is unknown.
 
@@ -144,10 +144,10 @@ def overlap_text(measure: OverlapMeasure, check: str) -> str:
 
 
 def _unflyable_turnaround_findings(requirements: RouteRequirements, survey: Survey) -> list[Finding]:
-    """Report turnarounds with hazards within reach that are too tight or too steep to be flown as drawn.
+    """Report turnarounds near hazards that are too tight or too steep to be flown as drawn.
 
     The path of such a turnaround is known only after a flight.  The turns onto the first line and off the last line
-    count as turnarounds.
+    are also turnarounds.
     """
     findings = []
     turnarounds = survey.transitions()
@@ -174,19 +174,17 @@ def _unflyable_turnaround_findings(requirements: RouteRequirements, survey: Surv
     return findings
 
 
-def _is_too_tight(requirements: RouteRequirements, i: int) -> bool:
-    """Return True if the legs at corner `i` are too short for its turn; an end of the route has no turn."""
-    turn = abs(float(requirements.turns[i]))
-    return 0 < i < requirements.legs and turn > turn_limit(requirements, i)[0] + PLAN_TOLERANCE_RAD
+def _is_too_tight(requirements: RouteRequirements, corner: int) -> bool:
+    """Return True if the legs at a corner are too short for its turn; False at the ends of the route."""
+    turn = abs(float(requirements.turns[corner]))
+    return 0 < corner < requirements.legs and turn > turn_limit(requirements, corner)[0] + PLAN_TOLERANCE_RAD
 
 
 def _off_altitude_length(requirements: RouteRequirements, first: int, last: int, end: int, tolerance: float) -> float:
-    """Return the length of route after a turnaround that is still flown off the planned altitude, m.
+    """Return the length of route after a turnaround that is flown off the planned altitude, m.
 
-    The aircraft is at the planned altitude at waypoint `first`, where the turnaround begins, and climbs or descends
-    from there no steeper than its limits.
-
-    last: waypoint at which the turnaround ends.
+    The aircraft starts the turnaround at the planned altitude, and then climbs or descends no steeper than its limits.
+    first, last: waypoints at which the turnaround begins and ends.
     end: waypoint up to which the length is measured.
     tolerance: altitude error at which the aircraft is back at the planned altitude, m.
     """
@@ -227,6 +225,7 @@ def _planned_finding(
 ) -> Finding:
     """Judge the fraction of a planned photo line that is flown straight and at its altitude.
 
+    number: number of the line in its survey, from 1.
     before: waypoint at which the turnaround before the line begins.
     """
     length = float(requirements.runs[line.first : line.last].sum())
@@ -247,12 +246,12 @@ def _planned_finding(
     if ok is None:
         faults.append(_unknown_ground_message(requirements, unknown_fraction, length, name))
     if ok is False:
-        cause, how = ("the turns at its ends leave", "straight")
+        cause, usable_state = ("the turns at its ends leave", "straight")
         if off_altitude > turn_in:
-            cause, how = ("the climb or descent before it leaves", "at its planned height above ground")
+            cause, usable_state = ("the climb or descent before it leaves", "at its planned height above ground")
         faults.append(
             message(
-                f"{name}: {cause} only {100.0 * straight_fraction:.0f} % of its {length:.0f} m {how}",
+                f"{name}: {cause} only {100.0 * straight_fraction:.0f} % of its {length:.0f} m {usable_state}",
                 f" ({cut_in:.0f} m are lost at the start and {cut_out:.0f} m at the end)",
             )
         )
@@ -267,7 +266,11 @@ def _unknown_ground_fraction(requirements: RouteRequirements, line: PhotoLine) -
 
 
 def _unknown_ground_message(requirements: RouteRequirements, fraction: float, length: float, name: str) -> Message:
-    """Return a message on the fraction of a photo line that lies outside the terrain data."""
+    """Make a message on the fraction of a photo line that lies outside the terrain data.
+
+    length: length of the line, m.
+    name: name of the line.
+    """
     terrain = requirements.setup.scenario.terrain
     source_text = "the terrain data" if terrain is None else f"the data of {terrain.source}"
     return message(f"{name}: {100.0 * fraction:.0f} % of its {length:.0f} m lies outside {source_text}")
@@ -286,14 +289,14 @@ def _turn_lead(requirements: RouteRequirements, line: PhotoLine) -> float:
 
 
 def _clip_to_length(distance: float, length: float) -> float:
-    """Return a distance limited to 0 ... length; return the length for a distance that is not finite."""
+    """Limit a distance to the range 0 to `length`, m; return `length` for a non-finite distance."""
     return min(max(distance, 0.0), length) if math.isfinite(distance) else length
 
 
 def _flown_finding(
     requirements: RouteRequirements, aligned: AlignedTrack | None, survey: Survey, line: PhotoLine, number: int
 ) -> Finding:
-    """Judge the usable fraction of a photo line as flown.
+    """Judge the usable fraction of a flown photo line.
 
     A line is not judged if it was not flown, or if its usable fraction depends on unknown ground.
     """
@@ -316,7 +319,7 @@ def _flown_finding(
 def unusable_parts_text(measure: LineMeasure) -> str:
     """List the causes that make parts of a photo line unusable, with their fractions, the largest first.
 
-    Causes below 0.5 % are left out; return "" if none remains.
+    Fractions below 0.5 % are left out.  Return "" if all are.
     """
     fractions = {
         f"not flown along the line within {measure.lateral_tolerance:.0f} m": measure.off_line,
@@ -330,7 +333,7 @@ def unusable_parts_text(measure: LineMeasure) -> str:
 
 
 def _coverage_fault(measure: LineMeasure, name: str) -> Message:
-    """Describe the usable fraction of a photo line, the causes of the loss, and the lengths lost at the line's ends."""
+    """Describe the usable fraction of a photo line, the causes of the loss, and the lost ends."""
     ends_text = f"; its first {measure.lost_at_start:.0f} m and last {measure.lost_at_end:.0f} m are lost"
     if max(measure.lost_at_start, measure.lost_at_end) < 1.0:
         ends_text = ""
@@ -351,12 +354,12 @@ def _line_finding(
     geometric: bool,
     measure: LineMeasure | None = None,
 ) -> Finding:
-    """Return the finding on a photo line.
+    """Make the finding on a photo line.
 
-    ok: result; None if the line was not flown, or, with faults, if it depends on unknown ground.
+    ok: result; None if the line was not flown, or, with faults, if the result depends on unknown ground.
     faults, facts: texts on the result.
-    geometric: True for the planned line, False for the flown one.
-    usable_fraction: usable fraction of the line's length; NaN if it was not flown.
+    usable_fraction: usable fraction of the line's length; NaN if the line was not flown.
+    geometric: True for the planned line, False for the flown line.
     measure: measurements of the flown line, which are reported as facts.
     """
     is_unknown, measurements = ok is None and bool(faults), []
@@ -381,7 +384,7 @@ def _line_finding(
         source="default",
         margin=None if is_unknown else 100.0 * (usable_fraction - PHOTO_COVERAGE_FRACTION),
         unit="%",
-        method="the turns' arcs" if geometric else "on the line, level, at its height, camera on",
+        method="arcs of the turns" if geometric else "on the line, level, at its height, camera on",
         check=GROUND_PATH if is_unknown else "",
         facts=measurements,
     )

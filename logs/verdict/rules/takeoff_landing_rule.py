@@ -21,19 +21,19 @@ from logs.verdict.tolerances import LEVEL_SLOPE_RAD, PLAN_TOLERANCE_RAD
 from logs.verdict.wording import gentle_launch_text, place_text
 from world.airfield import Launch
 
-# Verb for a flight that begins or ends in the air, without this phase.
+# Verb, by rule, that says which end of a flight is in the air if the phase is not flown.
 _PHASE_VERBS = {"takeoff": "begins", "landing": "ends"}
 _PHASE_TITLES = {"takeoff": "take-off", "landing": "landing"}
-# Check of a slope that only the aircraft's uncertainty leaves undecided.
+# Check, by rule, of a slope that is undecided because the aircraft's model is uncertain.
 _UNCERTAIN_CHECK = {"takeoff": GROUND_PATH, "landing": UNKNOWN_AIRCRAFT}
-# Result for a slope beyond the limit.
+# Result, by rule, for a slope beyond the limit.
 _RESULT_BEYOND_LIMIT = {"takeoff": None, "landing": False}
 
 
 def takeoff_findings(
     requirements: RouteRequirements, _aligned: AlignedTrack | None = None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge the climb from the ground at home to the take-off item's waypoint; return [] without a take-off item.
+    """Judge the climb from home to the take-off item's waypoint; [] without a take-off item.
 
     Return [] also if the take-off was flown, because the launch rule then judges it.
     """
@@ -51,7 +51,7 @@ def takeoff_findings(
     if launch is not None and (launch_findings := _gentle_launch_findings(requirements, launch)):
         return launch_findings
     if launch is not None and (waypoint == 0 or not has_own_position):
-        # From the ground at home to the next waypoint, on the launch course.
+        # The climb leads from the ground at home to the next waypoint, on the launch course.
         next_altitude = float(requirements.points[waypoint + 1, 2])
         return [_slope_finding(requirements, "takeoff", waypoint, waypoint + 1, route.takeoff_ground, next_altitude)]
     if waypoint == 0 or not has_own_position:
@@ -71,7 +71,7 @@ def takeoff_findings(
 def _gentle_launch_findings(requirements: RouteRequirements, launch: Launch) -> list[Finding]:
     """Return a finding if a launch accelerates the aircraft too little to start the motor, otherwise [].
 
-    Also return [] if the autopilot needs no acceleration to start the motor.
+    An autopilot that starts the motor without such an acceleration has no finding.
     """
     setup = requirements.setup
     trigger, acceleration = setup.autopilot.ground.launch_trigger, launch.acceleration(setup.default_launch_speed)
@@ -99,10 +99,10 @@ def _gentle_launch_findings(requirements: RouteRequirements, launch: Launch) -> 
 def landing_findings(
     requirements: RouteRequirements, _aligned: AlignedTrack | None = None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge the descent from the last waypoint to the landing.
+    """Judge the slope from the last waypoint to the landing; return [] without a landing item.
 
-    The finding is undecided if no waypoint of the route belongs to the landing.  Return [] for a mission without a
-    landing item, and for a landing that was flown, because the touchdown rule judges it.
+    The finding is undecided if no waypoint of the route belongs to the landing.  Return [] also for a flown landing,
+    which the touchdown rule judges.
     """
     if requirements.ground_phases is not None and requirements.ground_phases.procedures.approach is not None:
         return []
@@ -148,10 +148,11 @@ def _slope_finding(
     first_altitude: float | None,
     last_altitude: float | None,
 ) -> Finding:
-    """Judge the slope from `first_altitude` at waypoint `first` to `last_altitude` at waypoint `last`, m AMSL.
+    """Judge the slope of a take-off or a landing between two waypoints.
 
-    rule: "takeoff" or "landing".  An altitude is None if the terrain there is unknown.  If waypoint `first` belongs to
-    a loiter, the slope begins where the path leaves its circle.
+    rule: "takeoff" or "landing".
+    first, last: waypoints.  If the first belongs to a loiter, the slope begins where the path leaves the circle.
+    first_altitude, last_altitude: altitudes at these waypoints, m AMSL; None if the terrain there is unknown.
     """
     waypoint_place = requirements.waypoint(last)
     distance = requirements.straight_length(first) + float(requirements.runs[first + 1 : last].sum())
@@ -202,23 +203,23 @@ def _slope_finding(
 
 
 def _not_flown_text(requirements: RouteRequirements, rule: str) -> str:
-    """Return a clause which states that a take-off or landing is not flown; "" if it is flown."""
+    """Return a clause that says that a take-off or landing is not flown; "" if it is flown."""
     ground_phases = requirements.setup.ground_phases
     is_flown = (ground_phases.take_off if rule == "takeoff" else ground_phases.approach) is not None
     return "" if is_flown else f"; not flown, because the flight {_PHASE_VERBS[rule]} in the air"
 
 
 def _flown_text(requirements: RouteRequirements, rule: str) -> str:
-    """Return a clause which states that a flight is judged by its touchdown instead of by the slope.
+    """Return a clause that says that a flown landing is judged by its touchdown instead of its slope.
 
-    Return "" for the rule "takeoff", and for a mission whose landing is not flown.
+    Return "" for the rule "takeoff", and for a landing that is not flown.
     """
     is_flown = rule == "landing" and requirements.setup.ground_phases.approach is not None
     return " without gaining speed; a flight judges its touchdown instead" if is_flown else ""
 
 
 def _unjudged_finding(rule: str, place: Place, reason: str) -> Finding:
-    """Return the finding that a take-off or landing is not judged, which leaves the verdict undecided."""
+    """Make the finding on a take-off or landing that cannot be judged, which leaves the verdict undecided."""
     fault = message(f"the {_PHASE_TITLES[rule]} at {place_text(place)} is not judged")
     return make_finding(rule, place, ok=None, reason=reason, faults=[fault], unit="deg", check=GROUND_PATH)
 

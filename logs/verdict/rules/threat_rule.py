@@ -79,7 +79,7 @@ def threat_findings(
 
 
 def _sphere_sizes(threats: Threats, kind: SphereKind) -> tuple[Floats, Floats]:
-    """Return the radii and the exposure scales of the threats' missile or radar spheres, m: two arrays (n,)."""
+    """Return radius and exposure scale of each threat's missile or radar sphere, m, (n,) each."""
     if kind == "missile":
         return threats.kill_radius, threats.kill_scale
     return threats.detection_radius, threats.detection_scale
@@ -87,10 +87,12 @@ def _sphere_sizes(threats: Threats, kind: SphereKind) -> tuple[Floats, Floats]:
 
 @dataclass(frozen=True, slots=True)
 class _Visit:
-    """Visit to one sphere; all values are NaN if nothing was flown.
+    """Visit of a path to one sphere; all values are NaN if nothing was flown.
 
-    time_inside, exposure, closest_time: s.
-    closest: minimum distance to the sphere's center, m.
+    time_inside: time inside the sphere, s.
+    exposure: time weighted by the closeness to the sphere's center, s.
+    closest: minimum distance from the sphere's center, m.
+    closest_time: time of the minimum distance, s.
     """
 
     time_inside: float = math.nan
@@ -127,11 +129,12 @@ def _nearest_place_text(
 def _no_entry_finding(
     threat_count: int, nearest_distance: float, nearest_name: str, navigation_error: float, is_judged: bool
 ) -> Finding:
-    """Report that no missile sphere is entered.
+    """Make the finding that no missile sphere is entered.
 
+    threat_count: number of missiles and radars.
     nearest_distance: minimum distance of the path from the nearest sphere's surface, m; inf without a sphere.
     nearest_name: name of the threat of this sphere.
-    navigation_error: navigation error, m.
+    navigation_error: possible position error of the navigation, m.
     is_judged: False if nothing was flown, so that the finding is not judged.
     """
     reason = "the scenario has no threats"
@@ -172,9 +175,9 @@ def _no_entry_finding(
 def _sphere_finding(
     place: Place, planned_visit: _Visit, flown_visit: _Visit | None, radius: float, nearest_place: str
 ) -> Finding:
-    """Make the finding on a sphere: a missile's fails if it was entered, a radar's always passes.
+    """Make the finding on a sphere.  An entered missile sphere fails; a radar sphere always passes.
 
-    flown_visit: None before a flight; the planned visit is then judged.
+    flown_visit: visit of the flown track; None before a flight, and the planned visit is then judged.
     radius: radius of the sphere, m.
     nearest_place: text on the leg and position nearest to the center, or "".
     """
@@ -186,8 +189,8 @@ def _sphere_finding(
     )
     if flown_visit is not None and not is_missing:
         facts += (
-            f"; the flight was inside for {flown_visit.time_inside:.1f} s (exposure {flown_visit.exposure:.3g} s),"
-            f" closest {flown_visit.closest:.0f} m from the center"
+            f"; the flight was inside for {flown_visit.time_inside:.1f} s (exposure {flown_visit.exposure:.3g} s)."
+            f" It came within {flown_visit.closest:.0f} m of the center"
         )
         facts += f" at {flown_visit.closest_time:.1f} s{nearest_place}"
     flown_time = None if flown_visit is None else flown_visit.time_inside
@@ -196,7 +199,7 @@ def _sphere_finding(
             "threat",
             place,
             ok=True,
-            reason=f"for information only, detection is not limited: {facts}",
+            reason=f"for information only, because detection is not limited: {facts}",
             planned=planned_visit.time_inside,
             flown=flown_time,
             unit="s",

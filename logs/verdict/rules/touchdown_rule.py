@@ -36,18 +36,18 @@ from logs.verdict.wording import place_text
 from world.arrays import Floats
 from world.terrain import Terrain
 
-# Length of the strip about the touch-down over which the ground's slope is measured, m.
+# Length of ground, with the touchdown in the middle, over which the ground's slope is measured, m.
 _SLOPE_RUN_M = 10.0
 
 
 class _Landing(NamedTuple):
     """Measurements of a landing.
 
-    distance_beyond_point: distance of the touch-down beyond the landing point, m; negative before the point.
-    lateral_offset: distance of the touch-down to the right of the landing course, m.
+    distance_beyond_point: distance of the touchdown beyond the landing point, m; negative before the point.
+    lateral_offset: distance of the touchdown to the right of the landing course, m.
     touchdown, stop: positions on the strip, each as distance beyond the strip's center and to the right of it, m.
     strip_left: length of strip remaining beyond the stop, m.
-    sink, ground_sink: sink rate at the touch-down, vertical and relative to the sloping ground, m/s.
+    sink, ground_sink: sink rate at the touchdown, vertical and relative to the sloping ground, m/s.
     final_clearance: minimum height of the final above ground, m; inf without a final, NaN if unknown.
     point_height: height of the landing point above the ground, m.
     """
@@ -66,7 +66,7 @@ class _Landing(NamedTuple):
 def touchdown_findings(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge a flown landing; before a flight, only report a strip that is too short to judge the touch-down."""
+    """Judge a flown landing; before a flight, only report a strip too short to be judged."""
     ground_phases = requirements.ground_phases
     if ground_phases is None or ground_phases.procedures.approach is None:
         planned_approach = requirements.setup.ground_phases.approach if geometric else None
@@ -102,7 +102,7 @@ def touchdown_findings(
 
 
 def _short_strip_findings(place: Place, approach: Approach) -> list[Finding]:
-    """Return an undecided finding if the strip is too short to judge the touch-down, otherwise []."""
+    """Return an undecided finding if the strip is too short to judge the touchdown, otherwise []."""
     messages = _short_strip_messages(approach)
     reason = finding_reason(messages)
     return (
@@ -115,7 +115,7 @@ def _short_strip_findings(place: Place, approach: Approach) -> list[Finding]:
 def _measure_landing(
     requirements: RouteRequirements, track: Track, terrain: Terrain, approach: Approach, touchdown_row: int
 ) -> _Landing:
-    """Measure a landing that touches down at row `touchdown_row`; leave the field `point_height` unset."""
+    """Measure a landing that touches down in row `touchdown_row` of the track; `point_height` remains NaN."""
     position = np.asarray(track.position, dtype=np.float64)
     distance_beyond_point, lateral_offset = _as_floats(approach.distances_from_landing_point(position[touchdown_row]))
     touchdown, stop = (_as_floats(approach.distances_from_strip_center(position[row])) for row in (touchdown_row, -1))
@@ -137,7 +137,7 @@ def _landing_finding(
 ) -> Finding:
     """Make the finding on a measured landing.
 
-    The finding fails if there are `faults`.  It is undecided if a measure is too close to its limit.
+    The finding fails if there are `faults`.  It is undecided if the simulation is too inaccurate to decide it.
     has_gusts: True if the air is turbulent.
     """
     undecided_messages = [] if faults else _undecided_messages(approach, landing, has_gusts=has_gusts)
@@ -177,14 +177,14 @@ def _landing_point_text(approach: Approach) -> str:
 
 
 def _as_floats(values: tuple[Floats, Floats]) -> tuple[float, float]:
-    """Convert a pair of arrays with one element each to floats."""
+    """Convert two arrays of one element each to floats."""
     return float(values[0]), float(values[1])
 
 
 def _touchdown_row(track: Track, terrain: Terrain) -> int | None:
-    """Return the first row at which the aircraft is as low above ground as at its final standstill.
+    """Return the first row in which the aircraft is as low above ground as at its final standstill.
 
-    Return None if the aircraft does not stand still in the last row.
+    Return None if the aircraft is still moving in the last row.
     """
     if not len(track):
         return None
@@ -199,7 +199,7 @@ def _touchdown_row(track: Track, terrain: Terrain) -> int | None:
 
 
 def _sink_rates(track: Track, terrain: Terrain, approach: Approach, row: int) -> tuple[float, float]:
-    """Return the sink rate just before touch-down, and the sink rate relative to the sloping ground, m/s."""
+    """Return the sink rate just before touchdown, and the sink rate relative to the sloping ground, m/s."""
     row = max(0, row - 2)
     east, north, vertical_speed = (float(value) for value in track.velocity[row])
     position = np.asarray(track.position[row, :2], dtype=np.float64)
@@ -212,9 +212,9 @@ def _sink_rates(track: Track, terrain: Terrain, approach: Approach, row: int) ->
 
 
 def _final_clearance(requirements: RouteRequirements, position: Floats, terrain: Terrain, approach: Approach) -> float:
-    """Return the minimum height of the final approach above ground, up to the flare or the touch-down, m.
+    """Return the minimum height of the final approach above ground, up to the flare or the touchdown, m.
 
-    The height is inf without a final approach, NaN if the terrain is unknown.
+    The height is inf if the track has no final approach, and NaN if the terrain is unknown.
     """
     point_altitude = float(approach.point[2])
     glide = requirements.setup.autopilot.ground.glide(
@@ -230,9 +230,9 @@ def _final_clearance(requirements: RouteRequirements, position: Floats, terrain:
 
 
 def _detect_faults(approach: Approach, landing: _Landing) -> list[Message]:
-    """Return faults of a touch-down or stop off the strip, and of a landing point below the ground."""
+    """Return faults of a touchdown or stop off the strip, and of a landing point below the ground."""
     half_length, half_width = 0.5 * approach.strip.length, 0.5 * approach.strip.width
-    # On a strip shorter than the error, only a distance beyond the strip by more than the error is known.
+    # On a strip shorter than the error of the touchdown point, only a larger overrun than this error is certain.
     allowed_distance = (
         half_length - TOUCHDOWN_ERROR_M if half_length > TOUCHDOWN_ERROR_M else half_length + TOUCHDOWN_ERROR_M
     )
@@ -252,7 +252,7 @@ def _detect_faults(approach: Approach, landing: _Landing) -> list[Message]:
         brief = f"comes to rest {half_length - stop[0]:.0f} m before the strip's end"
         if stop[0] > half_length:
             brief = f"runs {stop[0] - half_length:.0f} m beyond the strip's end"
-        faults.append(message(brief, f"; {TOUCHDOWN_ERROR_M:.0f} m must be left"))
+        faults.append(message(brief, f"; {TOUCHDOWN_ERROR_M:.0f} m of the strip must be left"))
     width_text = f"; the strip is {2.0 * half_width:.0f} m wide"
     for verb, offset in (("touches down", abs(touchdown[1])), ("comes to rest", abs(stop[1]))):
         if offset > half_width:
@@ -262,7 +262,7 @@ def _detect_faults(approach: Approach, landing: _Landing) -> list[Message]:
 
 
 def _short_strip_messages(approach: Approach) -> list[Message]:
-    """Return a message if a strip is shorter than the error of the simulated touch-down."""
+    """Return a message if a strip is too short for the uncertain touchdown point; otherwise []."""
     if approach.strip.length > 2.0 * TOUCHDOWN_ERROR_M:
         return []
     brief = f"the strip is {approach.strip.length:.0f} m long"
@@ -298,7 +298,7 @@ def _undecided_messages(approach: Approach, landing: _Landing, *, has_gusts: boo
 
 
 def _describe_landing(approach: Approach, landing: _Landing) -> list[str]:
-    """Return phrases on a landing: touch-down, remaining strip, sink rate, final approach, tailwind."""
+    """Describe a landing in phrases: touchdown, remaining strip, sink rate, final approach, tailwind."""
     direction = "before" if landing.distance_beyond_point < 0.0 else "beyond"
     notes = [
         f"touches down {abs(landing.distance_beyond_point):.0f} m {direction} the landing point, "

@@ -43,47 +43,47 @@ def turn_findings(
         measures = [*measure_turns(requirements, aligned)]
     turnaround_waypoints = requirements.turnaround_waypoints()
     return [
-        _turn_finding(requirements, i, measure, aligned)
-        for i, measure in enumerate(measures, 1)
-        if i not in turnaround_waypoints
+        _turn_finding(requirements, waypoint, measure, aligned)
+        for waypoint, measure in enumerate(measures, 1)
+        if waypoint not in turnaround_waypoints
     ]
 
 
 def _turn_finding(
-    requirements: RouteRequirements, i: int, measure: TurnMeasure | None, aligned: AlignedTrack | None
+    requirements: RouteRequirements, waypoint: int, measure: TurnMeasure | None, aligned: AlignedTrack | None
 ) -> Finding:
-    """Return the finding for the turn at waypoint i.
+    """Return the finding for the turn at a waypoint.
 
     measure: measurements of the flown turn; None before a flight.
     """
-    planned_turn = abs(float(requirements.turns[i]))
-    limit, source = turn_limit(requirements, i)
-    # A neighbouring turn that needs more than the whole leg has the fault itself: going straight on needs no length.
+    planned_turn = abs(float(requirements.turns[waypoint]))
+    limit, source = turn_limit(requirements, waypoint)
+    # A negative limit means that a neighbouring turn needs more than the whole leg.  That turn has the fault.
     limit = max(limit, 0.0)
-    if requirements.runs[i - 1 : i + 1].min() < MIN_LEG_LENGTH_M:
+    if requirements.runs[waypoint - 1 : waypoint + 1].min() < MIN_LEG_LENGTH_M:
         reason = "a neighbouring leg is vertical and has no course, so the turn cannot be judged"
-        return make_finding("turn", requirements.waypoint(i), ok=None, reason=reason, unit="deg")
-    faults, facts, check, judged_turn = _judge_planned_turn(requirements, i, limit, source)
-    # If the aircraft's limits are known, the planned turn is judged by them, and the flown turn is only described.
+        return make_finding("turn", requirements.waypoint(waypoint), ok=None, reason=reason, unit="deg")
+    faults, facts, check, judged_turn = _judge_planned_turn(requirements, waypoint, limit, source)
+    # With a known aircraft, the planned turn is compared with its limits, and the flown turn is only described.
     is_judged_as_planned = measure is None or bool(requirements.envelope)
-    facts += _fly_over_notes(requirements, i, planned_turn)
+    facts += _fly_over_notes(requirements, waypoint, planned_turn)
     angle = None if measure is None else measure.angle
     tolerance = PLAN_TOLERANCE_RAD
     if measure is not None:
         if not is_judged_as_planned:
             tolerance = measure.tolerance or PLAN_TOLERANCE_RAD
             judged_turn = planned_turn if angle is None else angle
-        flown_faults = _flown_faults(requirements, i, measure, limit)
-        facts += [text for name, text in _flown_facts(requirements, i, measure) if name not in flown_faults]
+        flown_faults = _flown_faults(requirements, waypoint, measure, limit)
+        facts += [text for name, text in _flown_facts(requirements, waypoint, measure) if name not in flown_faults]
         facts += [fault.brief for fault in flown_faults.values()] if is_judged_as_planned else []
         faults += [] if is_judged_as_planned else flown_faults.values()
     ok: bool | None = False if faults else None if check else True
     if measure is not None and not measure.is_complete:
-        facts.append(_unflown_turn_text(requirements, i, measure, aligned))
+        facts.append(_unflown_turn_text(requirements, waypoint, measure, aligned))
         ok = None if ok is not False else False
     return make_finding(
         "turn",
-        requirements.waypoint(i),
+        requirements.waypoint(waypoint),
         ok=ok,
         reason=finding_reason(faults, facts if measure is not None or not faults else ()),
         faults=faults,
@@ -101,32 +101,35 @@ def _turn_finding(
 
 
 def _judge_planned_turn(
-    requirements: RouteRequirements, i: int, limit: float, source: str
+    requirements: RouteRequirements, waypoint: int, limit: float, source: str
 ) -> tuple[list[Message], list[str], str, float | None]:
-    """Judge the planned turn at waypoint i by its limit (rad).
+    """Judge the planned turn at a waypoint by its limit (rad).
 
     Return faults, facts, a check (`UNKNOWN_AIRCRAFT` or ""), and the turn (rad).  The turn is None for a negligible
     kink.
     """
-    turn = abs(float(requirements.turns[i]))
+    turn = abs(float(requirements.turns[waypoint]))
     turn_text = f"turns {math.degrees(turn):.1f}°"
     facts = [turn_text + (f" (at most {math.degrees(limit):.1f}°)" if math.isfinite(limit) else "")]
     if turn <= limit + PLAN_TOLERANCE_RAD:
         return [], facts, "", turn
-    lateral = negligible_kink_distance(requirements, i)
+    lateral = negligible_kink_distance(requirements, waypoint)
     if lateral is not None:
         facts.append(f"a negligible kink: a flyable path without this waypoint passes it at {lateral:.1f} m")
         return [], facts, "", None
     # The message states the turn and its limit.
-    sharp_turn = _sharp_turn_message(requirements, i, turn, limit, source)
+    sharp_turn = _sharp_turn_message(requirements, waypoint, turn, limit, source)
     # The aircraft's bank limit may be a guess.
-    if source == "aircraft" and turn <= float(requirements.possible_turn_limit[i]) + PLAN_TOLERANCE_RAD:
+    if source == "aircraft" and turn <= float(requirements.possible_turn_limit[waypoint]) + PLAN_TOLERANCE_RAD:
         return [], [sharp_turn.text], UNKNOWN_AIRCRAFT, turn
     return [sharp_turn], [], "", turn
 
 
 def _method_text(measure: TurnMeasure | None) -> str:
-    """Describe how the course change of a turn was obtained; the measure is None before a flight."""
+    """Describe how the course change of a turn was obtained.
+
+    measure: measurements of the flown turn; None before a flight.
+    """
     if measure is None:
         return "route"
     fit_text = "least-squares courses of both legs" if measure.is_fitted else "course change over the turn"
@@ -134,7 +137,7 @@ def _method_text(measure: TurnMeasure | None) -> str:
 
 
 def _unflown_turn_text(
-    requirements: RouteRequirements, i: int, measure: TurnMeasure, aligned: AlignedTrack | None
+    requirements: RouteRequirements, waypoint: int, measure: TurnMeasure, aligned: AlignedTrack | None
 ) -> str:
     """Explain why a turn was not flown: the flight ended before it, or the autopilot skipped a leg.
 
@@ -142,10 +145,12 @@ def _unflown_turn_text(
     """
     if measure.corner is not None:
         return "its legs were not flown one after the other"
-    if aligned is None or int(aligned.track.leg.max()) < i:
+    if aligned is None or int(aligned.track.leg.max()) < waypoint:
         return "the flight did not get past it"
-    active_times = [float(np.count_nonzero(aligned.track.leg == leg)) * aligned.tick for leg in (i - 1, i)]
-    leg = i if active_times[1] <= active_times[0] else i - 1
+    active_times = [
+        float(np.count_nonzero(aligned.track.leg == leg)) * aligned.tick for leg in (waypoint - 1, waypoint)
+    ]
+    leg = waypoint if active_times[1] <= active_times[0] else waypoint - 1
     active_time, leg_length = min(active_times), float(requirements.runs[leg])
     radius = acceptance_condition(requirements, leg + 1).radius
     return (
@@ -155,14 +160,15 @@ def _unflown_turn_text(
     )
 
 
-def _fly_over_notes(requirements: RouteRequirements, i: int, turn: float) -> list[str]:
-    """Return a note if a waypoint is flown over because a fly-by arc would miss its acceptance radius, else [].
+def _fly_over_notes(requirements: RouteRequirements, waypoint: int, turn: float) -> list[str]:
+    """Return a note if a fly-by arc would miss the acceptance radius; otherwise [].
 
+    The waypoint is then flown over.
     turn: course change, rad.
     """
-    radius = float(requirements.radius[i])
-    acceptance = float(requirements.setup.route.points["acceptance_radius"][i])
-    if not requirements.setup.route.fly_over[i] or not acceptance or not math.isfinite(radius):
+    radius = float(requirements.radius[waypoint])
+    acceptance = float(requirements.setup.route.points["acceptance_radius"][waypoint])
+    if not requirements.setup.route.fly_over[waypoint] or not acceptance or not math.isfinite(radius):
         return []
     offset = fly_by_offset(turn, radius)
     if offset <= acceptance:
@@ -175,32 +181,34 @@ def _fly_over_notes(requirements: RouteRequirements, i: int, turn: float) -> lis
 
 
 def _sharp_turn_message(
-    requirements: RouteRequirements, i: int, planned_turn: float, limit: float, source: str
+    requirements: RouteRequirements, waypoint: int, planned_turn: float, limit: float, source: str
 ) -> Message:
-    """Explain why the planned turn at waypoint i is too sharp.
+    """Explain why the planned turn at a waypoint is too sharp.
 
     The message states the scenario's limit, or the length of leg that the turn needs.  All angles are in rad.
     """
     turn_text = f"turns {math.degrees(planned_turn):.1f}°"
     if source == "scenario":
         return message(f"{turn_text}, more than the scenario's limit of {math.degrees(limit):.1f}°")
-    speed = float(max(requirements.route.leg_airspeeds[i - 1 : i + 1]))
+    speed = float(max(requirements.route.leg_airspeeds[waypoint - 1 : waypoint + 1]))
     bank_text = bank_limit_text(requirements.setup)
-    radius = float(requirements.radius[i])
+    radius = float(requirements.radius[waypoint])
     if not math.isfinite(radius):
         return message(f"{turn_text} where the wind is too strong to hold the course of a leg at {speed:.0f} m/s")
-    if requirements.setup.route.arc_radii[i] > 0.0:
+    if requirements.setup.route.arc_radii[waypoint] > 0.0:
         return message(
             f"circles with radius {radius:.0f} m",
             f"; at {speed:.0f} m/s and {bank_text} the smallest turn radius on these courses"
-            f" in this wind is {requirements.min_radius[i]:.0f} m",
+            f" in this wind is {requirements.min_radius[waypoint]:.0f} m",
         )
     length_text = "no leg would be long enough"
-    if requirements.length_after[i] < MAX_FLY_BY_OFFSET_RADII * radius:
-        length_text = f"the turn takes {requirements.length_after[i]:.0f} m of each leg"
-        if requirements.setup.route.fly_over[i]:
-            length_text = f"the turn takes {requirements.length_after[i]:.0f} m of the next leg, after the waypoint"
-    length_before, length_after = requirements.runs[i - 1], requirements.runs[i]
+    if requirements.length_after[waypoint] < MAX_FLY_BY_OFFSET_RADII * radius:
+        length_text = f"the turn takes {requirements.length_after[waypoint]:.0f} m of each leg"
+        if requirements.setup.route.fly_over[waypoint]:
+            length_text = (
+                f"the turn takes {requirements.length_after[waypoint]:.0f} m of the next leg, after the waypoint"
+            )
+    length_before, length_after = requirements.runs[waypoint - 1], requirements.runs[waypoint]
     legs_text = f"its legs of {length_before:.0f} m and {length_after:.0f} m"
     room_text = (
         f"{legs_text} have room for only {math.degrees(limit):.1f}°" if limit > 0.0 else f"{legs_text} have no room"
@@ -211,14 +219,14 @@ def _sharp_turn_message(
     )
 
 
-def _flown_facts(requirements: RouteRequirements, i: int, measure: TurnMeasure) -> list[tuple[str, str]]:
-    """Return the measured quantities of a flown turn and their texts."""
+def _flown_facts(requirements: RouteRequirements, waypoint: int, measure: TurnMeasure) -> list[tuple[str, str]]:
+    """Describe a flown turn, as pairs of a measured quantity's name and a text."""
     facts = []
     if measure.angle is not None and measure.tolerance is not None:
         facts.append(("course change", f"flown course change {math.degrees(measure.angle):.2f}°"))
     if measure.peak_bank is not None and measure.held_bank is not None:
         facts.append(("bank", f"bank up to {math.degrees(measure.peak_bank):.1f}°"))
-    if measure.radius is not None and measure.radius < STRAIGHT_RADIUS_RATIO * requirements.radius[i]:
+    if measure.radius is not None and measure.radius < STRAIGHT_RADIUS_RATIO * requirements.radius[waypoint]:
         facts.append(("radius", f"radius {measure.radius:.0f} m"))
     if measure.corner is not None:
         facts.append(("nearest pass", f"nearest pass {measure.corner.distance:.1f} m, at {measure.corner.time:.1f} s"))
@@ -234,7 +242,7 @@ def _flown_facts(requirements: RouteRequirements, i: int, measure: TurnMeasure) 
 
 
 def _measured_facts(measure: TurnMeasure | None) -> list[Fact]:
-    """Return the measurements of a flown turn as facts; unknown values are left out, and None gives no facts."""
+    """Return the known measurements of a flown turn as facts; [] before a flight."""
     if measure is None:
         return []
     bank = None if measure.held_bank is None else math.degrees(measure.held_bank)
@@ -248,8 +256,10 @@ def _measured_facts(measure: TurnMeasure | None) -> list[Fact]:
     return [Fact(quantity, value, unit) for quantity, value, unit in numbers if value is not None]
 
 
-def _flown_faults(requirements: RouteRequirements, i: int, measure: TurnMeasure, limit: float) -> dict[str, Message]:
-    """Return the faults of a flown turn by quantity: those of `_flown_facts`, and "circles".
+def _flown_faults(
+    requirements: RouteRequirements, waypoint: int, measure: TurnMeasure, limit: float
+) -> dict[str, Message]:
+    """Return the faults of a flown turn by quantity: names of `_flown_facts`, or "circles".
 
     limit: largest course change, rad.
     """
@@ -260,12 +270,12 @@ def _flown_faults(requirements: RouteRequirements, i: int, measure: TurnMeasure,
             f"flown course change {flown_angle:.1f}°, more than the limit of {max_angle:.1f}°"
         )
     max_bank = requirements.limits.max_bank + BANK_TOLERANCE_RAD
-    # A gust, and the roll into the turn, change the bank for a moment only: the mean over a second is judged.
+    # The one-second mean is judged, because gusts and the roll into the turn change the bank only for a moment.
     if measure.held_bank is not None and measure.held_bank > max_bank:
         faults["bank"] = message(
             f"bank {math.degrees(measure.held_bank):.1f}°, more than the limit of {math.degrees(max_bank):.1f}°"
         )
-    if (tight_turn := _tight_turn_fault(requirements, i, measure)) is not None:
+    if (tight_turn := _tight_turn_fault(requirements, waypoint, measure)) is not None:
         faults["radius"] = tight_turn
     if measure.overshoot is not None and measure.overshoot > OVERSHOOT_TOLERANCE_M:
         passed_text = "its arc" if measure.corner is None else "its next leg"
@@ -281,18 +291,20 @@ def _flown_faults(requirements: RouteRequirements, i: int, measure: TurnMeasure,
     return faults
 
 
-def _tight_turn_fault(requirements: RouteRequirements, i: int, measure: TurnMeasure) -> Message | None:
-    """Return a fault if a turn passed its waypoint closer than an arc at the bank limit would, else None.
+def _tight_turn_fault(requirements: RouteRequirements, waypoint: int, measure: TurnMeasure) -> Message | None:
+    """Return a fault if a turn was tighter than an arc at the bank limit, otherwise None.
 
-    Legs that are too short for their turn are joined by a tighter arc.  A flight along this arc exceeded the bank limit
-    or slowed down.
+    The arc between legs that are too short for their turn is tighter than the bank limit permits.  A flight along this
+    arc exceeded the bank limit or slowed down.
     """
-    turn, setup = abs(float(requirements.turns[i])), requirements.setup
-    min_radius = float(requirements.min_radius[i])
-    # planfly's guidance has the same limit: a sharper corner with short legs has no arc to follow.
+    turn, setup = abs(float(requirements.turns[waypoint])), requirements.setup
+    min_radius = float(requirements.min_radius[waypoint])
+    # planfly's guidance also has no arc to follow at a sharper corner with short legs.
     min_distance = fly_by_offset(turn, min_radius) if turn < SHARPEST_FLY_BY_RAD else math.inf
     # An autopilot that does not keep to the arc may pass the waypoint at any distance.
-    follows_arc = setup.autopilot.turns.keeps_to_arcs and setup.imported_log is None and not setup.route.fly_over[i]
+    follows_arc = (
+        setup.autopilot.turns.keeps_to_arcs and setup.imported_log is None and not setup.route.fly_over[waypoint]
+    )
     if measure.min_distance is None or not math.isfinite(min_distance) or not follows_arc:
         return None
     tolerance = CORNER_CUT_FRACTION * min_distance + CORNER_CUT_TOLERANCE_M[setup.scenario.wind.turbulence]
@@ -315,7 +327,6 @@ RULE = Rule(
             "U_TURN_RAD",
             "MAX_FLY_BY_OFFSET_RADII",
             "BANK_TOLERANCE_RAD",
-            "POSSIBLE_BANK_RAD",
             "POSSIBLE_BANK_RAD",
             "OVERSHOOT_TOLERANCE_M",
             "SETTLED_CROSS_TRACK_M",

@@ -28,25 +28,27 @@ def waypoint_findings(
 ) -> list[Finding]:
     """Judge the distance of the track, or of the planned path (``geometric``), from each waypoint."""
     turnaround_waypoints = requirements.turnaround_waypoints()
-    judged_waypoints = [i for i in range(len(requirements.points)) if i not in turnaround_waypoints]
+    judged_waypoints = [
+        waypoint for waypoint in range(len(requirements.points)) if waypoint not in turnaround_waypoints
+    ]
     if geometric:
-        return [_planned_finding(requirements, i) for i in judged_waypoints]
+        return [_planned_finding(requirements, waypoint) for waypoint in judged_waypoints]
     apexes = requirements.apexes()
-    return [_flown_finding(requirements, aligned, i, apexes) for i in judged_waypoints]
+    return [_flown_finding(requirements, aligned, waypoint, apexes) for waypoint in judged_waypoints]
 
 
-def _planned_finding(requirements: RouteRequirements, i: int) -> Finding:
+def _planned_finding(requirements: RouteRequirements, waypoint: int) -> Finding:
     """Judge whether the fly-by arc passes within the acceptance distance of its waypoint."""
-    condition = acceptance_condition(requirements, i)
-    offset = float(requirements.fly_by_offset[i])
+    condition = acceptance_condition(requirements, waypoint)
+    offset = float(requirements.fly_by_offset[waypoint])
     faults, fact = [], f"the fly-by path passes {offset:.0f} m away"
-    if requirements.setup.route.fly_over[i]:
+    if requirements.setup.route.fly_over[waypoint]:
         fact = "flown over"
     elif not requirements.setup.autopilot.turns.follows_path:
-        fact = _turn_text(requirements, i, condition)
+        fact = _turn_text(requirements, waypoint, condition)
     elif offset > condition.radius + ROUNDING_M:
-        turn = math.degrees(abs(float(requirements.turns[i])))
-        radius = float(requirements.radius[i])
+        turn = math.degrees(abs(float(requirements.turns[waypoint])))
+        radius = float(requirements.radius[waypoint])
         faults.append(
             message(
                 f"the arc of the {turn:.0f}° corner passes the waypoint {offset:.0f} m away",
@@ -55,7 +57,7 @@ def _planned_finding(requirements: RouteRequirements, i: int) -> Finding:
         )
     return make_finding(
         "waypoint",
-        requirements.waypoint(i),
+        requirements.waypoint(waypoint),
         ok=not faults,
         reason=finding_reason(faults) if faults else fact,
         faults=faults,
@@ -69,12 +71,12 @@ def _planned_finding(requirements: RouteRequirements, i: int) -> Finding:
     )
 
 
-def _turn_text(requirements: RouteRequirements, i: int, condition: AcceptanceCondition) -> str:
+def _turn_text(requirements: RouteRequirements, waypoint: int, condition: AcceptanceCondition) -> str:
     """Describe where an autopilot without fly-by arcs turns at a waypoint."""
     autopilot, turn_distance, unread_text = requirements.setup.autopilot, condition.radius, ""
     if condition.source == "mission" and not autopilot.turns.reads_acceptance:
-        turn = abs(float(requirements.turns[i])) if 0 < i < requirements.legs else math.pi
-        turn_distance = autopilot.turns.distance(turn, float(requirements.points[i, 2]))
+        turn = abs(float(requirements.turns[waypoint])) if 0 < waypoint < requirements.legs else math.pi
+        turn_distance = autopilot.turns.distance(turn, float(requirements.points[waypoint, 2]))
         unread_text = f"; {autopilot.title} does not read the mission's {condition.radius:.0f} m"
     return (
         f"{autopilot.title} turns to the next leg {turn_distance:.0f} m before the waypoint, or once the aircraft has"
@@ -82,25 +84,27 @@ def _turn_text(requirements: RouteRequirements, i: int, condition: AcceptanceCon
     )
 
 
-def _flown_finding(requirements: RouteRequirements, aligned: AlignedTrack | None, i: int, apexes: Floats) -> Finding:
-    """Judge the closest approach of the track to waypoint i.
+def _flown_finding(
+    requirements: RouteRequirements, aligned: AlignedTrack | None, waypoint: int, apexes: Floats
+) -> Finding:
+    """Judge the closest approach of the track to a waypoint.
 
     A waypoint to which the flight was not yet flying when it ended is not judged.
 
     apexes: points of the planned path nearest to the waypoints, m, (w, 3).
     """
-    condition, setup = acceptance_condition(requirements, i), requirements.setup
-    offset, max_distance = float(requirements.fly_by_offset[i]), condition.radius + condition.tolerance
+    condition, setup = acceptance_condition(requirements, waypoint), requirements.setup
+    offset, max_distance = float(requirements.fly_by_offset[waypoint]), condition.radius + condition.tolerance
     distance, reason = math.nan, "not reached: nothing was flown"
     ok: bool | None = None
     facts: tuple[Fact, ...] = ()
     faults: list[Message] = []
     if aligned is not None:
-        distance, height_error = _closest_approach(requirements, aligned, i, float(apexes[i, 2]))
+        distance, height_error = _closest_approach(requirements, aligned, waypoint, float(apexes[waypoint, 2]))
         facts = (Fact("height error", height_error, "m"),)
         ok = distance <= max_distance
         crossing_offset = (
-            math.inf if ok or setup.autopilot.turns.follows_path else _crossing_offset(requirements, aligned, i)
+            math.inf if ok or setup.autopilot.turns.follows_path else _crossing_offset(requirements, aligned, waypoint)
         )
         if crossing_offset <= setup.corridor:
             ok = True
@@ -110,14 +114,14 @@ def _flown_finding(requirements: RouteRequirements, aligned: AlignedTrack | None
             reason += f" (the fly-by path passes {offset:.0f} m away)"
         if math.isfinite(crossing_offset):
             reason += f"; the line across the leg at the waypoint was crossed {crossing_offset:.0f} m to the side"
-        if i > 0 and not aligned.passed[i]:
+        if waypoint > 0 and not aligned.passed[waypoint]:
             last_leg = requirements.leg(aligned.leg_at(len(aligned.track) - 1))
             text = (
                 f": the flight ended on {place_text_within(last_leg)} {math.hypot(distance, height_error):.0f} m away"
             )
             faults = [message("not reached", text)]
             ok, reason = False, finding_reason(faults)
-            if not aligned.passed[i - 1]:
+            if not aligned.passed[waypoint - 1]:
                 # The aircraft was not flying to this waypoint, so its distance from the waypoint means nothing.
                 distance, ok, facts = math.nan, None, ()
                 reason = f"not reached: the flight ended on {place_text(last_leg)}"
@@ -125,7 +129,7 @@ def _flown_finding(requirements: RouteRequirements, aligned: AlignedTrack | None
             reason = f"missed: {reason}; {_acceptance_text(condition)}"
     return make_finding(
         "waypoint",
-        requirements.waypoint(i),
+        requirements.waypoint(waypoint),
         ok=ok,
         reason=reason,
         faults=faults,
@@ -142,24 +146,24 @@ def _flown_finding(requirements: RouteRequirements, aligned: AlignedTrack | None
     )
 
 
-def _crossing_offset(requirements: RouteRequirements, aligned: AlignedTrack, i: int) -> float:
-    """Return the distance from waypoint `i` at which the track first crossed the end line of the leg, m.
+def _crossing_offset(requirements: RouteRequirements, aligned: AlignedTrack, waypoint: int) -> float:
+    """Return the distance from a waypoint at which the track first crossed the end line of the leg, m.
 
     The end line runs through the waypoint, across the leg.  Return inf if the track did not cross it, or for the first
     waypoint.
     """
-    if i == 0:
+    if waypoint == 0:
         return math.inf
-    last = int(aligned.rows[i + 1]) if i + 1 < len(requirements.points) else len(aligned.track) - 1
+    last = int(aligned.rows[waypoint + 1]) if waypoint + 1 < len(requirements.points) else len(aligned.track) - 1
     distances_along, lateral_offsets = project_onto_leg(
-        requirements, i - 1, aligned.track.position[int(aligned.rows[i - 1]) : last + 1]
+        requirements, waypoint - 1, aligned.track.position[int(aligned.rows[waypoint - 1]) : last + 1]
     )
-    rows_past = np.flatnonzero(distances_along >= requirements.runs[i - 1])
+    rows_past = np.flatnonzero(distances_along >= requirements.runs[waypoint - 1])
     return abs(float(lateral_offsets[rows_past[0]])) if rows_past.size else math.inf
 
 
 def _acceptance_text(condition: AcceptanceCondition) -> str:
-    """Describe the acceptance distance and its source."""
+    """Describe the acceptance radius of a waypoint, its source and its tolerance."""
     radius_owner = {"mission": "the mission's", "autopilot": "the autopilot's"}.get(
         condition.source, "the fly-by path's"
     )
@@ -169,19 +173,19 @@ def _acceptance_text(condition: AcceptanceCondition) -> str:
 
 
 def _closest_approach(
-    requirements: RouteRequirements, aligned: AlignedTrack, i: int, reference_altitude: float
+    requirements: RouteRequirements, aligned: AlignedTrack, waypoint: int, reference_altitude: float
 ) -> tuple[float, float]:
-    """Return the track's minimum horizontal distance from waypoint `i`, and the altitude error there, m.
+    """Return the track's minimum horizontal distance from a waypoint, and the altitude error there, m.
 
-    The altitude error is relative to `reference_altitude` (m AMSL); of several equally close places, the smallest
-    error is taken.
+    The altitude error is relative to `reference_altitude` (m AMSL).  If several places are equally close, the error is
+    the smallest one.
     """
-    first = int(aligned.rows[i - 1]) if i else 0
-    last = int(aligned.rows[i + 1]) if i + 1 < len(requirements.points) else len(aligned.track) - 1
+    first = int(aligned.rows[waypoint - 1]) if waypoint else 0
+    last = int(aligned.rows[waypoint + 1]) if waypoint + 1 < len(requirements.points) else len(aligned.track) - 1
     position = aligned.track.position[first : max(last, first + 1) + 1]
-    distance, fraction = closest_approaches(position, requirements.points[i])
+    distance, fraction = closest_approaches(position, requirements.points[waypoint])
     if not distance.size:
-        offset = aligned.track.position[-1] - requirements.points[i]
+        offset = aligned.track.position[-1] - requirements.points[waypoint]
         return math.hypot(offset[0], offset[1]), float(offset[2])
     # Among equally close segments take the one nearest in altitude.
     nearest_rows = np.flatnonzero(distance <= distance.min() + EQUAL_DISTANCE_TOLERANCE_M)
@@ -196,7 +200,7 @@ def _closest_approach(
 def explain_by_circles(
     requirements: RouteRequirements, aligned: AlignedTrack | None, findings: Sequence[Finding]
 ) -> tuple[Finding, ...]:
-    """Extend the reason of each failed finding by the circles that the autopilot flew at its waypoints."""
+    """Add to each failed finding's reason the circles that the autopilot flew at its waypoints."""
     circles = [] if aligned is None else waypoint_circles(requirements, aligned)
     if aligned is None or not circles:
         return tuple(findings)
@@ -215,7 +219,7 @@ def explain_by_circles(
         elif finding.ok is False and place.index is not None and place.kind == "waypoint":
             waypoints = range(place.index, place.index + 1)
         elif finding.ok is False and finding.rule == "completion" and not aligned.passed[-1]:
-            # The waypoint that the aircraft did not leave, or did not reach.
+            # The first waypoint that was not passed, and the one before it, at which the aircraft may still circle.
             last = int(np.argmin(aligned.passed))
             waypoints = range(last - 1, last + 1)
         text = circles_text(requirements, [circle for circle in circles if circle.waypoint in waypoints])

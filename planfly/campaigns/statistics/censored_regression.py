@@ -45,7 +45,7 @@ Bools = NDArray[np.bool_]
 
 # Largest exponent for which exp does not overflow.
 _MAX_EXPONENT = 700.0
-# Lower limit of probabilities that are divided by.
+# Lower limit of probabilities in a denominator.
 _MIN_PROBABILITY = 1e-300
 
 
@@ -53,16 +53,16 @@ class BinaryLink(Protocol):
     """Link function; all methods take predictors in an array of any shape and return the same shape."""
 
     def log_cdf(self, x: Floats) -> Floats:
-        """Return the logarithm of the probability of failure."""
+        """Return the logarithm of the probability of failure at the linear predictor x."""
 
     def log_survival(self, x: Floats) -> Floats:
-        """Return the logarithm of the probability of success."""
+        """Return the logarithm of the probability of success at the linear predictor x."""
 
     def survival(self, x: Floats) -> Floats:
         """Return the probability of success at the linear predictor x."""
 
     def density(self, x: Floats) -> Floats:
-        """Return the derivative of the probability of failure."""
+        """Return the derivative of the probability of failure by the linear predictor x."""
 
     def information(self, x: Floats, width: float = 0.0) -> Floats:
         """Return the Fisher information of a flight about its predictor.
@@ -72,26 +72,26 @@ class BinaryLink(Protocol):
         """
 
     def derivatives(self, x: Floats, has_failed: Bools) -> tuple[Floats, Floats]:
-        """Return first and second derivative of the log-probability of the outcome."""
+        """Return first and second derivative of the log-probability of the outcome by the linear predictor x."""
 
     def log_density(self, x: Floats) -> Floats:
         """Return the logarithm of `density`."""
 
     def density_derivatives(self, x: Floats) -> tuple[Floats, Floats]:
-        """Return first and second derivative of `log_density`."""
+        """Return first and second derivative of `log_density` by the linear predictor x."""
 
 
 class _Probit:
     """Link of a normally distributed threshold."""
 
     def log_cdf(self, x: Floats) -> Floats:
-        """Return the logarithm of the normal probability of failure."""
+        """Return the logarithm of the normal probability of failure at the linear predictor x."""
         from scipy.special import log_ndtr
 
         return log_ndtr(x)
 
     def log_survival(self, x: Floats) -> Floats:
-        """Return the logarithm of the normal probability of success."""
+        """Return the logarithm of the normal probability of success at the linear predictor x."""
         return self.log_cdf(-x)
 
     def survival(self, x: Floats) -> Floats:
@@ -101,7 +101,7 @@ class _Probit:
         return ndtr(-x)
 
     def density(self, x: Floats) -> Floats:
-        """Return the standard normal density."""
+        """Return the standard normal density at the linear predictor x."""
         return np.exp(-0.5 * x * x) / np.sqrt(2.0 * np.pi)
 
     def information(self, x: Floats, width: float = 0.0) -> Floats:
@@ -120,21 +120,21 @@ class _Probit:
         return end_information + np.maximum(pass_information, 0.0)
 
     def derivatives(self, x: Floats, has_failed: Bools) -> tuple[Floats, Floats]:
-        """Return first and second derivative of the log-probability of each outcome."""
+        """Return first and second derivative of the log-probability of each outcome by the linear predictor x."""
         from scipy.special import log_ndtr
 
         sign = np.where(has_failed, 1.0, -1.0)
         z = sign * x
-        # By logarithms, as Phi underflows to 0 long before the derivative of its logarithm does.
+        # Use logarithms, because Phi underflows to 0 long before the derivative of its logarithm does.
         ratio = np.exp(-0.5 * z * z - 0.5 * np.log(2.0 * np.pi) - log_ndtr(z))
         return sign * ratio, -ratio * (z + ratio)
 
     def log_density(self, x: Floats) -> Floats:
-        """Return the logarithm of the standard normal density."""
+        """Return the logarithm of the standard normal density at the linear predictor x."""
         return -0.5 * x * x - 0.5 * np.log(2.0 * np.pi)
 
     def density_derivatives(self, x: Floats) -> tuple[Floats, Floats]:
-        """Return first and second derivative of `log_density`."""
+        """Return first and second derivative of `log_density` by the linear predictor x."""
         return -x, np.full_like(x, -1.0)
 
 
@@ -171,7 +171,7 @@ class _ComplementaryLogLog:
         return failure_information + pass_information + upper_rate * upper_rate * np.exp(-upper_rate)
 
     def derivatives(self, x: Floats, has_failed: Bools) -> tuple[Floats, Floats]:
-        """Return first and second derivative of the log-probability of each outcome."""
+        """Return first and second derivative of the log-probability of each outcome by the linear predictor x."""
         rate = np.exp(np.clip(x, -_MAX_EXPONENT, 0.5 * _MAX_EXPONENT))
         first = _rate_ratio(rate)
         second = first * (1.0 - rate - first)
@@ -182,7 +182,7 @@ class _ComplementaryLogLog:
         return x - np.exp(np.minimum(x, _MAX_EXPONENT))
 
     def density_derivatives(self, x: Floats) -> tuple[Floats, Floats]:
-        """Return first and second derivative of `log_density`."""
+        """Return first and second derivative of `log_density` by the linear predictor x."""
         rate = np.exp(np.minimum(x, 0.5 * _MAX_EXPONENT))
         return 1.0 - rate, -rate
 
@@ -224,7 +224,7 @@ _SEED = 1
 
 
 def importance_sample(log_density: Callable[[Floats], Floats], mean: Floats, covariance: Floats, count: int) -> Floats:
-    """Return equally likely points of a distribution in random order, (count, k).
+    """Sample a distribution of which the log-density is known: equally likely points in random order, (count, k).
 
     The points are spread more evenly in the first coordinate than in the others.
     log_density: log-density (n,) of points (n, k), up to a constant; -inf for zero density.
@@ -248,7 +248,7 @@ def importance_sample(log_density: Callable[[Floats], Floats], mean: Floats, cov
 
 @lru_cache
 def _t_points(size: int, count: int) -> tuple[Floats, Floats]:
-    """Return points of the standard t distribution, (count, size), and their log-density, (count,)."""
+    """Return points of the standard t distribution, (count, size), and their log-density up to a constant, (count,)."""
     from scipy.stats import chi2, norm, qmc
 
     # With a power of two points, Sobol's sequence is balanced.
@@ -397,7 +397,7 @@ class _Posterior:
         self._prior_mean[1] = np.log(_WIND_MEDIAN)
 
     def start_point(self) -> Floats:
-        """Return the start point of Newton's method."""
+        """Return the start point of Newton's method, (k,)."""
         point = np.zeros(self.deviations.size)
         point[:2] = _START_COEFFICIENTS
         if self.margin_coefficient:
@@ -453,19 +453,19 @@ class _Posterior:
         mean = mode.copy()
         mean[0] += best_known_wind * np.exp(mode[1])
 
-        def constants(points: Floats) -> Floats:
-            """Convert the predictor at the best-known wind, the first coordinate of points, to the constant."""
+        def with_constants(points: Floats) -> Floats:
+            """Replace the first coordinate of points, the predictor at the best-known wind, by the constant."""
             changed_points = points.copy()
             changed_points[:, 0] -= best_known_wind * self.coefficients(points)[:, 1]
             return changed_points
 
         points = importance_sample(
-            lambda points: self.log_density(constants(points)),
+            lambda points: self.log_density(with_constants(points)),
             mean,
             change_of_variables @ covariance @ change_of_variables.T,
             _SAMPLE_SIZE,
         )
-        return self.coefficients(constants(points))[:, : self.size]
+        return self.coefficients(with_constants(points))[:, : self.size]
 
     def slope_and_curvature(self, point: Floats) -> tuple[Floats, Floats]:
         """Return the gradient (k,) and Hessian (k, k) of the negative log-density at a point (k,)."""
@@ -495,7 +495,7 @@ class _Posterior:
 
 
 def _find_mode(posterior: _Posterior, point: Floats) -> RegressionFit:
-    """Find the mode of a posterior from a start point, and return the fit: mode, covariance and evidence.
+    """Find the mode of a posterior from a start point; return the fit with mode, covariance and evidence.
 
     The search is Newton's method with halved steps.  Where the loss is not convex, which happens only with margins
     alone, the absolute eigenvalues of the curvature are used (Nocedal and Wright, Numerical Optimization, 2nd edition,

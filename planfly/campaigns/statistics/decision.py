@@ -127,7 +127,7 @@ def _binomial_interval(successes: int, trials: int, confidence: float, method: s
 
 # Weight of the part far from the target.
 _JEFFREYS_WEIGHT = 0.001
-# Loss of the mixture without a failure, in the logarithm of 1 / alpha: one flight at P = 0.99.
+# Evidence that the mixture loses if no flight fails, as a logarithm; it costs one more flight at P = 0.99.
 _MIXTURE_LOSS = 0.009
 # Number of bisection steps.
 _BISECTIONS = 60
@@ -147,7 +147,7 @@ class StoppingBound:
 
     @property
     def min_flights(self) -> int:
-        """Number of flights that reach the target without a failure."""
+        """Number of flights without a failure that reach the target."""
         return math.ceil((self._required_evidence + _MIXTURE_LOSS) / -math.log(self.target))
 
     @property
@@ -167,7 +167,7 @@ class StoppingBound:
             min_failures, max_failures = (
                 (failures, max_failures) if evidence >= self._required_evidence else (min_failures, failures)
             )
-        # Slightly less, to cover rounding.
+        # Use slightly less than the solution, to cover rounding.
         return self._mixture_parts(scale, 0.999 * min_failures)
 
     @staticmethod
@@ -190,7 +190,10 @@ class StoppingBound:
         return _log_mixture(self.parts, successes, failures) - likelihood
 
     def excludes(self, successes: int, failures: int, p: float, *, above: bool) -> bool:
-        """Return True if p is excluded and lies below the fraction of successes; above it if `above` is False."""
+        """Return True if the success probability is proven to be above p, or below p if `above` is False.
+
+        p: tested success probability, 0 to 1.
+        """
         fraction = successes / max(1, successes + failures)
         is_beyond = fraction > p if above else fraction < p
         return is_beyond and self.evidence(successes, failures, p) >= self._required_evidence
@@ -221,7 +224,7 @@ class StoppingBound:
     def bounds(self, tally: Tally) -> Interval:
         """Return the interval for a tally; lost and undecided flights widen it.
 
-        They count as failures for the lower bound, and as successes for the upper bound.
+        Lost and undecided flights are failures for the lower bound, and successes for the upper bound.
         """
         lower = self.interval(tally.flyable, tally.failed + tally.unknown).low
         upper = self.interval(tally.flyable + tally.unknown, tally.failed).high
@@ -287,8 +290,8 @@ class Goal:
 class Estimate:
     """Estimate of the probability.
 
-    lower, upper: bounds, each with the goal's confidence; for a goal that stops, both at once and at every number of
-    flights.
+    lower, upper: bounds of the probability, each with the goal's confidence.  If the goal stops the campaign, both
+    bounds hold together at every number of flights.
     interval: two-sided interval, with the goal's confidence.
     """
 
@@ -308,7 +311,7 @@ class Estimator:
 
     @property
     def min_flights(self) -> int:
-        """Smallest number of flights that may decide."""
+        """Smallest number of flights that may decide the goal."""
         return self._bound.min_flights if self._bound is not None else self._goal.flights
 
     def decides(self, tally: Tally) -> bool:
@@ -320,9 +323,10 @@ class Estimator:
         return is_reached or bound.excludes(tally.flyable + tally.unknown, tally.failed, target, above=False)
 
     def deciding_flights(self, tally: Tally) -> int | None:
-        """Return the number of flights that would decide the target if the shares of all outcomes stay as now.
+        """Return the number of flights that would decide the target if the fractions of all outcomes stay the same.
 
-        Return None for more than `MAX_DECIDING_FLIGHTS`. tally: at least one flight; the target is undecided.
+        Return None for more than `MAX_DECIDING_FLIGHTS`.
+        tally: at least one flight, with which the target is undecided.
 
         >>> Estimator(Goal(0.95, False, 20)).deciding_flights(Tally(20, 0))
         59
@@ -331,7 +335,7 @@ class Estimator:
         too_few, enough = tally.flown, 2 * tally.flown
 
         def decides(flights: int) -> bool:
-            """Return True if this number of flights decides the target; rounding counts against a decision."""
+            """Return True if this number of flights decides the target; numbers are rounded against a decision."""
             is_above = target is not None and share >= target
             flyable = math.floor(share * flights + 1e-9) if is_above else math.ceil(share * flights - 1e-9)
             undecided = min(flights - flyable, math.ceil(flights * tally.undecided / tally.flown))
@@ -362,7 +366,7 @@ class Estimator:
         return Estimate(tally, lower, upper, interval, self._goal_status(lower, upper))
 
     def _goal_status(self, lower: float, upper: float) -> Answer:
-        """Compare the bounds of the probability with the target."""
+        """Return the answer to the goal, which follows from the bounds of the probability."""
         target = self._goal.target
         if target is None:
             return "no target"
@@ -379,9 +383,9 @@ class Estimator:
 # "Global sensitivity measures from given data", EJOR 226, 2013).  The chance difference of small groups is subtracted,
 # as in Kelley's epsilon squared (PNAS 21, 1935), so that a quantity without effect has an index of 0.
 
-# Minimum number of flights for an index.  Without any effect, a campaign of eight quantities names one in 2 to 4 % of
-# seeded draws with 8 to 30 flights alike, so the power decides: a quantity that explains 70 % of the variance is named
-# in 97 % of the draws with 20 flights, in 80 % with 15, and in 44 % with 10.
+# Minimum number of flights for an index.  In seeded draws, a quantity that explains 70 % of the variance was named in
+# 97 % of campaigns with 20 flights, in 80 % with 15, and in 44 % with 10.  Without any effect, campaigns with eight
+# quantities and 8 to 30 flights name a quantity in 2 to 4 % of the draws.
 MIN_FLIGHTS_FOR_INDEX = 20
 # Maximum number of groups.
 _MAX_GROUPS = 64

@@ -217,8 +217,8 @@ def fit_modes(
 
     >>> from planfly.campaigns.statistics.censored_regression import PROBIT
     >>> speeds = np.linspace(0.0, 20.0, 200)
-    >>> ways = [frozenset({"slope"}) if speed > 12.0 else frozenset() for speed in speeds]
-    >>> (mode,) = fit_modes(make_regressors(speeds, np.empty((200, 0))), ways, PROBIT)
+    >>> failed_modes = [frozenset({"slope"}) if speed > 12.0 else frozenset() for speed in speeds]
+    >>> (mode,) = fit_modes(make_regressors(speeds, np.empty((200, 0))), failed_modes, PROBIT)
     >>> round(float(10.0 - mode.mean[0] / mode.mean[1]), 1)
     12.0
     """
@@ -248,7 +248,7 @@ def fit_modes(
 def failure_probabilities(modes: Sequence[FailureMode], terms: Floats) -> Floats:
     """Return the probability that each flight fails in any mode, (n,).
 
-    It follows from the mean coefficients of the modes.
+    The probability is computed with the mean coefficients of the modes.
 
     terms: regressors of each flight, see `make_regressors`, (n, 2 + d).
     """
@@ -270,19 +270,19 @@ def boundary_speed(modes: Sequence[FailureMode], draws: Floats, failing_fraction
         (mode.link, make_regressors(WIND_ORIGIN_MPS, draws) @ mode.mean, float(mode.mean[1])) for mode in modes
     ]
 
-    def exceeds_fraction(speed: float) -> bool:
+    def reaches_fraction(speed: float) -> bool:
         """Return True if at least the failing fraction is expected to fail in a wind, m/s."""
         success: Floats = np.ones(len(draws))
         for link, predictor, wind_slope in mode_predictors:
             success *= link.survival(predictor + wind_slope * (speed - WIND_ORIGIN_MPS))
         return bool(1.0 - success.mean() >= failing_fraction)
 
-    if not exceeds_fraction(max_speed):
+    if not reaches_fraction(max_speed):
         return max_speed
     lower, upper = 0.0, max_speed
     while upper - lower > 1e-3:
         speed_between = 0.5 * (lower + upper)
-        lower, upper = (lower, speed_between) if exceeds_fraction(speed_between) else (speed_between, upper)
+        lower, upper = (lower, speed_between) if reaches_fraction(speed_between) else (speed_between, upper)
     return 0.5 * (lower + upper)
 
 
@@ -322,5 +322,5 @@ def boundary_slopes(modes: Sequence[FailureMode], draws: Floats, speed: float) -
     speed: wind speed at the boundary, m/s.
     """
     failing = failure_fraction(modes, draws, speed)
-    # If more wind does not cause more failures, nothing is known about the boundary.
+    # If more wind does not cause more failures, the boundary is unknown, and its derivatives become very large.
     return [-slope / max(failing.wind_slope, 1e-9) for slope in failing.slopes]

@@ -23,7 +23,7 @@ class ProportionDifference(NamedTuple):
 
 
 def paired_difference(only_first: int, only_second: int, pairs: int, confidence: float = 0.95) -> ProportionDifference:
-    """Return the probability of success of the second of paired trials, minus that of the first.
+    """Return the success probability of the second of two paired trials minus that of the first trial.
 
     The interval is Tango's score interval (Statistics in Medicine 17, 1998).  The p-value is from McNemar's exact test.
 
@@ -40,11 +40,11 @@ def paired_difference(only_first: int, only_second: int, pairs: int, confidence:
     value = (only_second - only_first) / pairs
 
     def is_excluded(candidate: float) -> bool:
-        """Return True if the score test rejects a difference."""
+        """Return True if the score test rejects a candidate for the difference."""
         numerator = abs(only_second - only_first - pairs * candidate)
         return numerator > quantile * _score_deviation(only_first, only_second, pairs, candidate)
 
-    def bound(excluded: float) -> float:
+    def find_bound(excluded: float) -> float:
         """Return the bound of the interval that lies between the estimate and an excluded difference."""
         if not is_excluded(excluded):
             return excluded
@@ -56,7 +56,7 @@ def paired_difference(only_first: int, only_second: int, pairs: int, confidence:
 
     discordant = only_first + only_second
     p_value = float(binomtest(only_first, discordant).pvalue) if discordant else 1.0
-    return ProportionDifference(value, Interval(bound(-1.0), bound(1.0)), p_value)
+    return ProportionDifference(value, Interval(find_bound(-1.0), find_bound(1.0)), p_value)
 
 
 def _score_deviation(only_first: int, only_second: int, pairs: int, difference: float) -> float:

@@ -84,9 +84,9 @@ def boundary_quantiles(
 
 
 def _boundary_speeds(modes: Sequence[FailureMode], draws: Floats, failing_fraction: float, max_speed: float) -> Floats:
-    """Return the boundary for each posterior sample of the modes' coefficients, (n,), m/s.
+    """Return the boundary for each posterior sample of the modes' coefficients, m/s, (n,).
 
-    draws: (m, d); only the first few are used to bracket the boundary.
+    draws: possible draws, (m, d); the boundary is first bracketed with only some of them.
     """
     # The posteriors of the modes are independent: samples of different modes can be combined in any order.
     samples = [
@@ -99,14 +99,14 @@ def _boundary_speeds(modes: Sequence[FailureMode], draws: Floats, failing_fracti
     lower, upper = np.zeros(len(samples[0])), np.full(len(samples[0]), max_speed)
     while (upper - lower).max() > _BRACKET_WIDTH_MPS:
         speed_between = 0.5 * (lower + upper)
-        is_above = bracket_fractions.logarithms(speed_between) > np.log(failing_fraction)
+        is_above = bracket_fractions.log_fractions(speed_between) > np.log(failing_fraction)
         lower = np.where(is_above, lower, speed_between)
         upper = np.where(is_above, speed_between, upper)
     speed: Floats = 0.5 * (lower + upper)
     previous_speed = speed - _BRACKET_WIDTH_MPS
-    previous_error = all_fractions.logarithms(previous_speed) - np.log(failing_fraction)
+    previous_error = all_fractions.log_fractions(previous_speed) - np.log(failing_fraction)
     for _ in range(_SECANT_STEPS):
-        error = all_fractions.logarithms(speed) - np.log(failing_fraction)
+        error = all_fractions.log_fractions(speed) - np.log(failing_fraction)
         wind_slope = np.maximum(
             (error - previous_error) / np.where(speed == previous_speed, 1.0, speed - previous_speed), 1e-9
         )
@@ -117,18 +117,21 @@ def _boundary_speeds(modes: Sequence[FailureMode], draws: Floats, failing_fracti
 class _FailureFractions:
     """Fraction of flights that fail, for each posterior sample of the modes' coefficients.
 
-    samples: coefficients of each mode, (n, 2 + d).
-    draws: (m, d).
+    samples: sampled coefficients of each mode, (n, 2 + d).
+    draws: possible draws, (m, d), over which the fraction is averaged.
     """
 
     def __init__(self, modes: Sequence[FailureMode], samples: list[Floats], draws: Floats) -> None:
         self._modes, self._samples = modes, samples
-        self._at_origin = [make_regressors(WIND_ORIGIN_MPS, draws) @ sample.T for sample in samples]
+        self._predictors_at_origin = [make_regressors(WIND_ORIGIN_MPS, draws) @ sample.T for sample in samples]
 
-    def logarithms(self, speeds: Floats) -> Floats:
-        """Return the logarithm of each sample's failing fraction, (n,), at a wind for each sample, m/s."""
-        success = np.ones_like(self._at_origin[0])
-        for mode, sample, predictor in zip(self._modes, self._samples, self._at_origin, strict=True):
+    def log_fractions(self, speeds: Floats) -> Floats:
+        """Return the logarithm of each sample's failing fraction, (n,).
+
+        speeds: wind for each sample, m/s, (n,).
+        """
+        success = np.ones_like(self._predictors_at_origin[0])
+        for mode, sample, predictor in zip(self._modes, self._samples, self._predictors_at_origin, strict=True):
             success *= mode.link.survival(predictor + sample[:, 1] * (speeds - WIND_ORIGIN_MPS))
         return np.log(np.maximum(1.0 - success.mean(axis=0), _MIN_PROBABILITY))
 
@@ -335,7 +338,7 @@ _LARGEST_WIND_TOLERANCE_MPS = 0.3
 
 
 def next_flights(direction: Direction, count: int) -> list[tuple[float, int]]:
-    """Return wind (m/s) and draw of the next `count` flights of a direction.
+    """Return the wind, m/s, and the index of the draw of the next `count` flights of a direction.
 
     As long as all flights have the same outcome, the wind is chosen by bisection.  After that, the flights are chosen
     that are expected to reduce the variance of the boundary most.
@@ -367,7 +370,7 @@ def _bisect_speed(direction: Direction) -> float:
 
 
 def _next_draws(direction: Direction, count: int, other_draws: list[int]) -> list[int]:
-    """Return the first draws that are neither flown nor in `other_draws`."""
+    """Return the first `count` indices of draws that are neither flown nor in `other_draws`."""
     used_draws = {*direction.draws, *other_draws}
     draws: list[int] = []
     index = 0
@@ -379,14 +382,14 @@ def _next_draws(direction: Direction, count: int, other_draws: list[int]) -> lis
 
 
 def _extreme_draws(direction: Direction) -> list[int]:
-    """Return the draws with the largest and the smallest value of each quantity that have not been flown."""
+    """Return the indices of the draws with the largest and smallest value of each quantity, if not yet flown."""
     numbers = direction.numbers.first_draws(_EXTREME_DRAW_POOL)
     extreme_draws = [int(select(numbers[:, k])) for k in range(numbers.shape[1]) for select in (np.argmax, np.argmin)]
     return [draw for draw in dict.fromkeys(extreme_draws) if draw not in set(direction.draws)]
 
 
 def _choose_most_informative(direction: Direction, count: int) -> list[tuple[float, int]]:
-    """Return the wind (m/s) and the draw of the `count` most informative flights of a direction.
+    """Return the wind, m/s, and the index of the draw of the `count` most informative flights of a direction.
 
     Each flight is chosen as if the previous ones had been flown.
     """
@@ -461,7 +464,7 @@ class _ExpectedPosterior:
         return self._fit.weight * expected_gains
 
     def include_flight(self, row: Floats) -> None:
-        """Update the covariances with the information expected from a flight that is not flown yet.
+        """Update the covariances as if a flight with its expected information had been flown.
 
         row: terms of the flight, (2 + d,).
         """

@@ -143,7 +143,7 @@ export class Panel {
     if (!now) return undefined;
     const box = clear(this.boxes.verdict), stale = flight && flight.rev !== now.rev;
     if (now.planning) return box.append(element("section", { class: "card" }, element("h2", {}, "Planning a path"), element("p", { class: "more" }, "or drag an end to plan by hand")));
-    box.append(this.answerOf("Geometry", answerText(now.verdict), now.verdict, "every leg and corner against what the aircraft can do"));
+    box.append(this.answerOf("Geometry", answerText(now.verdict), now.verdict, "each leg and corner compared with the aircraft's limits"));
     if (flight) {
       const part = this.answerOf("Flown", answerText(flight.verdict, stale), flight.verdict, `${flight.autopilot}, ${duration(flight.seconds)}${stale ? ", before the last change" : ""}`);
       part.classList.toggle("stale", Boolean(stale));
@@ -166,7 +166,7 @@ export class Panel {
     box.append(element("div", { class: "asks" },
       element("h2", {}, "Ask more"),
       ...this.ask("returns", "Can it return home?", "a return to launch from every point of the route"),
-      ...this.ask("campaign", "How likely in this weather?", "24 flights, each somewhat different"),
+      ...this.ask("campaign", "How likely in this weather?", "24 flights with varied conditions"),
       ...this.ask("battery", "How large a battery?", "24 flights with their returns; the reserve is kept in 95 of 100"),
       ...this.ask("ground_risk", "Whom does it fly over?", "12 flights: volumes by SORA 2.5"),
       ...(this.about?.settings.forecast ? this.ask("window", "When can I take off?", "10 flights at each hour of the next 12 in the forecast") : [])));

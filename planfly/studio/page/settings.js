@@ -51,7 +51,7 @@ function flown(settings, offered, send) {
     field(`${labels.airspeed} (${settings.airspeed_kind}), m/s`, needed("airspeed", settings.airspeed, 0.5)),
     field(`${labels.wind_speed}, m/s`, needed("wind_speed", settings.wind_speed, 0.5)),
     field(`${labels.wind_from}, °`, needed("wind_from", settings.wind_from, 5)),
-    ...(settings.forecast ? [element("p", { class: "more" }, `The wind is that of the ${settings.forecast}; its mean at the start stands above. A wind entered here replaces it.`)] : []),
+    ...(settings.forecast ? [element("p", { class: "more" }, `The wind comes from the ${settings.forecast}; the fields above show its mean at the start. A wind entered there replaces it.`)] : []),
     field(labels.turbulence, list("set-turbulence", same(offered.turbulence, settings.turbulence), settings.turbulence, need("turbulence"))),
   ];
 }

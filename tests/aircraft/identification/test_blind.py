@@ -92,7 +92,7 @@ def test_biases_come_from_the_earlier_part() -> None:
 def test_rows_between_two_times() -> None:
     """The part before a time and the part from it on make up the record."""
     record = replace(_steady_record(0.0), source="log")
-    before, after = record.between(-np.inf, 20.0), record.between(20.0, np.inf)
+    before, after = record.part_between(-np.inf, 20.0), record.part_between(20.0, np.inf)
     assert len(before.time) + len(after.time) == len(record.time)
     assert before.time[-1] < 20.0 <= after.time[0]
     assert after.source == "log"

@@ -8,9 +8,9 @@ import pytest
 
 from aircraft.identification.draws import draw_aircraft
 from aircraft.identification.estimate import (
-    aligned_signals,
     combine_with_prior,
     fit_parameters,
+    make_aligned_signals,
     total_covariance,
 )
 from aircraft.identification.parameters import INDEX, NAMES, PARAMETERS, prior_means
@@ -83,7 +83,7 @@ def test_without_the_current_a_battery_that_is_not_the_stated_one_leaves_climb_a
         replace(record, current=unknown[: len(record.time)], voltage=unknown[: len(record.time)])
         for record in flown.records
     ]
-    signals = aligned_signals(records, flown.estimate.clocks, flown.base)
+    signals = make_aligned_signals(records, flown.estimate.clocks, flown.base)
     found = []
     for volts in (0.94, 1.0, 1.06):
         motor = replace(flown.base.motor, voltage=volts * flown.base.motor.voltage)
@@ -148,7 +148,7 @@ def test_shifts_are_what_plain_sums_say() -> None:
 
 def test_what_noise_hides_is_given_back_to_the_moments() -> None:
     flown = flown_truth()
-    nominal = fit_parameters(aligned_signals(flown.records, flown.estimate.clocks, flown.base), flown.base)
+    nominal = fit_parameters(make_aligned_signals(flown.records, flown.estimate.clocks, flown.base), flown.base)
     moments = np.array([parameter.group in ("pitch", "roll", "yaw") for parameter in PARAMETERS])
     shifts = flown.estimate.shifts
     shift = shifts["noise of the accelerometers"]
@@ -187,7 +187,7 @@ def test_a_mass_that_is_wrong_by_10_percent_leaves_the_climb() -> None:
     """Only thrust and drag over mass are seen: the angle stays, and the drag in newtons goes with the mass."""
     flown = flown_truth()
     heavy = scale_base_model(flown.base, 1.1 * flown.base.mass, flown.base.span, flown.base.area)
-    changed = fit_parameters(aligned_signals(flown.records, flown.estimate.clocks, heavy), heavy)
+    changed = fit_parameters(make_aligned_signals(flown.records, flown.estimate.clocks, heavy), heavy)
     before = performance(flown.base, flown.estimate.values, 25.0, DENSITY)
     after = performance(heavy, changed.values, 25.0, DENSITY)
     assert math.degrees(abs(float(after.climb[0] - before.climb[0]))) < 0.4

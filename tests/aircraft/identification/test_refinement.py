@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from aircraft.identification.alignment import Signals
-from aircraft.identification.estimate import aligned_signals, combine_with_prior
+from aircraft.identification.estimate import combine_with_prior, make_aligned_signals
 from aircraft.identification.parameters import INDEX, NAMES, PARAMETERS, prior_sds
-from aircraft.identification.refinement import IS_MOMENT, Refinement, refine_moments, without_collinear_directions
+from aircraft.identification.refinement import IS_MOMENT, Refinement, refine_moments, remove_collinear_directions
 from aircraft.identification.regression import fit_with_prior
 from tests.aircraft.identification.flown_truth import flown_truth
 
@@ -17,7 +17,7 @@ MOMENTS = [name for name in NAMES if IS_MOMENT[INDEX[name]]]
 
 def flown_signals() -> Signals:
     flown = flown_truth()
-    return aligned_signals(flown.records, flown.estimate.clocks, flown.base)
+    return make_aligned_signals(flown.records, flown.estimate.clocks, flown.base)
 
 
 def refine(signals: Signals, **factors: float) -> Refinement:
@@ -66,7 +66,7 @@ def test_a_rudder_that_is_mixed_to_the_ailerons_keeps_its_prior() -> None:
     slopes = np.column_stack([aileron, 0.15 * aileron + 0.005 * noise])
     y = aileron + 1.7 * 0.15 * aileron + 0.01 * generator.normal(size=2000)
     mean, sd, blocks = np.ones(2), np.ones(2), np.arange(2000) // 20
-    found = fit_with_prior(without_collinear_directions(slopes), y, mean, sd, blocks)
+    found = fit_with_prior(remove_collinear_directions(slopes), y, mean, sd, blocks)
     assert found.estimate == pytest.approx([1.103, 1.015], abs=0.01)
     assert np.sqrt(found.covariance[1, 1]) > 0.9
     # With it, the rudder is taken for nothing, and surely so.
@@ -77,4 +77,4 @@ def test_a_rudder_that_is_mixed_to_the_ailerons_keeps_its_prior() -> None:
 def test_surfaces_that_move_apart_are_estimated() -> None:
     generator = np.random.default_rng(2)
     slopes = generator.normal(size=(500, 2)) * np.array([1.0, 0.01])
-    assert without_collinear_directions(slopes) == pytest.approx(slopes, abs=1e-12)
+    assert remove_collinear_directions(slopes) == pytest.approx(slopes, abs=1e-12)

@@ -18,10 +18,10 @@ from flight.autopilots.autopilot import Autopilot, AutopilotProgram, StoredAutop
 from flight.autopilots.catalog import (
     AUTOPILOTS,
     Entry,
+    autopilot_from_log,
     autopilot_names,
-    autopilot_of_log,
+    find_program_class,
     load_autopilot,
-    program_class_for,
     restore_autopilot,
     stored_name,
 )
@@ -37,7 +37,7 @@ from world.scenario_tables import ArduPlaneVersion, Px4Version
 AEROSONDE = load_aircraft("aerosonde")
 GIVEN = {f"P{k}": float(k) for k in range(40)}
 PROGRAM = AutopilotProgram("ArduPlane V4.6.0 (7fbc1660)", "0826d539" + "e" * 56, GIVEN, {"P1": 1.0, "P2": 2.5})
-MINE = ArduPilotParameters.of_text("WP_RADIUS 50\nFOO 1\n", "mine.parm")
+MINE = ArduPilotParameters.from_text("WP_RADIUS 50\nFOO 1\n", "mine.parm")
 
 
 @dataclass(frozen=True)
@@ -78,14 +78,14 @@ def test_what_a_scenario_asks_of_its_returns_and_a_file_denies_is_refused(tmp_pa
         if not refused:
             assert arduplane(scenario).parameters.by_origin("file") == {"RTL_ALTITUDE": 180.0}
             continue
-        with pytest.raises(ScenarioError, match=r"tight: returns \(RTL_ALTITUDE\): 180: .*mine.parm states RTL_ALT"):
+        with pytest.raises(ScenarioError, match=r"tight: returns \(RTL_ALTITUDE\): 180: .*mine.parm sets RTL_ALT"):
             load_autopilot(scenario, AEROSONDE)
 
 
 @pytest.mark.parametrize(("lower", "file", "most"), [(3.5, "", -1.0), (2.5, "", 10.0), (3.5, "TECS_LAND_PMAX 7", 7.0)])
 def test_on_a_lower_field_the_nose_is_held_down_in_the_flare(lower: float, file: str, most: float) -> None:
-    made = ArduPlane(ArduPilotParameters.of_text(f"RTL_AUTOLAND 2\n{file}\n", "mine.parm"))
-    asked = made.with_parameters(**made.returns.parameters_of(RtlSettings(lands=True, field_depth=lower)))
+    made = ArduPlane(ArduPilotParameters.from_text(f"RTL_AUTOLAND 2\n{file}\n", "mine.parm"))
+    asked = made.with_parameters(**made.returns.make_parameters(RtlSettings(lands=True, field_depth=lower)))
     assert asked.parameters.landing_pitch_max == pytest.approx(math.radians(most))
 
 
@@ -139,7 +139,7 @@ def test_one_without_parameters_takes_no_file_of_them() -> None:
         (ArduPlane(MINE), None),
         (ArduPlaneSitl(MINE, PROGRAM), None),
         (Other("l1"), "other"),
-        (Px4(px4_parameters.Px4Parameters.of_text("NAV_ACC_RAD 50\nFOO 1\n", "mine.params", "1.16")), "px4"),
+        (Px4(px4_parameters.Px4Parameters.from_text("NAV_ACC_RAD 50\nFOO 1\n", "mine.params", "1.16")), "px4"),
         (Px4(px4_parameters.Px4Parameters.defaults()), "px4"),
     ],
 )
@@ -155,7 +155,7 @@ def test_a_name_of_another_version_is_not_restored() -> None:
 
 
 def test_a_program_is_flown_in_the_place_of_its_law() -> None:
-    kind = program_class_for(Path("arduplane"))
+    kind = find_program_class(Path("arduplane"))
     flown = kind.with_model(ArduPlane(MINE), Path("arduplane"))
     assert flown == ArduPlaneSitl(MINE)
     assert flown.model == ArduPlane(MINE)
@@ -163,11 +163,11 @@ def test_a_program_is_flown_in_the_place_of_its_law() -> None:
 
 
 def test_a_log_says_who_wrote_it() -> None:
-    flown, notes = autopilot_of_log("ArduPlane V4.3.7", {"WP_RADIUS": 60.0}, "a.BIN") or (None, ())
+    flown, notes = autopilot_from_log("ArduPlane V4.3.7", {"WP_RADIUS": 60.0}, "a.BIN") or (None, ())
     assert flown is not None
     assert (flown.turns.acceptance_radius, flown.version) == (60.0, "4.6")
     assert notes == ("flown by ArduPlane 4.3, but simulated with 4.6",)
-    assert autopilot_of_log("PX4 v1.14.0", {"WP_RADIUS": 60.0}, "a.ulg") is None
+    assert autopilot_from_log("PX4 v1.14.0", {"WP_RADIUS": 60.0}, "a.ulg") is None
 
 
 def test_a_program_is_named_by_its_version_its_digest_and_what_was_changed() -> None:

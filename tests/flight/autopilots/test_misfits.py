@@ -22,7 +22,7 @@ from aircraft.catalog import load_aircraft
     ],
 )
 def test_arduplanes(text: str, misfits: tuple[str, ...]) -> None:
-    found = arduplane.ArduPilotParameters.of_text(text, "a.param").contradictions
+    found = arduplane.ArduPilotParameters.from_text(text, "a.param").contradictions
     assert len(found) == len(misfits)
     # Which of two values of one file is named first does not matter.
     for one, expected in zip(found, misfits, strict=True):
@@ -42,7 +42,7 @@ def test_arduplanes(text: str, misfits: tuple[str, ...]) -> None:
     ],
 )
 def test_px4s(text: str, misfits: tuple[str, ...]) -> None:
-    assert px4.Px4Parameters.of_text(text, "a.params").contradictions == misfits
+    assert px4.Px4Parameters.from_text(text, "a.params").contradictions == misfits
 
 
 def test_a_file_is_compared_with_the_aircraft_and_the_aircraft_with_nothing(tmp_path: Path) -> None:

@@ -54,7 +54,7 @@ def test_every_form_gives_the_same(text: str, tmp_path: Path) -> None:
         ("1\t1\tWP_RADIUS\tinf\t9", "a.parm:1: WP_RADIUS: 'inf': expected a finite number"),
         ("WP_RADIUS 0x5a", "a.parm:1: WP_RADIUS: '0x5a': expected a finite number"),
         ("WP_RADIUS 90\nTHR_MAX 100\nWP_RADIUS 90", "a.parm:3: WP_RADIUS: already on line 1: name each"),
-        ("# nothing\n\n", "a.parm: no parameter; expected lines of a name and a value"),
+        ("# nothing\n\n", "a.parm: no parameter; expected lines with a name and a value"),
     ],
 )
 def test_faults_are_one_line(text: str, said: str) -> None:
@@ -91,6 +91,6 @@ def test_of_several_components_the_autopilots_counts(order: tuple[int, int]) -> 
 
 def test_a_name_that_is_too_long_is_read_and_known_to_no_law() -> None:
     """PITCH_LIM_MAX_DEG has 17 characters; MAVLink carries 16."""
-    made = ArduPilotParameters.of_text("PITCH_LIM_MAX_DEG,15.00\nROLL_LIMIT_DEG,35\n", "x8rev.param")
+    made = ArduPilotParameters.from_text("PITCH_LIM_MAX_DEG,15.00\nROLL_LIMIT_DEG,35\n", "x8rev.param")
     assert made.unused == ("PITCH_LIM_MAX_DEG",)
     assert made.by_origin("file") == {"ROLL_LIMIT_DEG": 35.0}

@@ -77,7 +77,7 @@ def test_a_file_says_whose_it_is(text: str, autopilot: str, vehicle: str) -> Non
 def test_a_file_with_names_of_both_is_neithers() -> None:
     found = origin("FW_AIRSPD_TRIM 15\nNAV_ACC_RAD 30\nTECS_CLMB_MAX 5\n")
     assert (found.autopilot, found.mixed) == ("", True)
-    assert found.evidence == "FW_AIRSPD_TRIM is PX4's and TECS_CLMB_MAX ArduPilot's"
+    assert found.evidence == "FW_AIRSPD_TRIM is PX4's and TECS_CLMB_MAX is ArduPilot's"
 
 
 @pytest.mark.parametrize(
@@ -92,9 +92,13 @@ def test_a_file_with_names_of_both_is_neithers() -> None:
         (
             "WPNAV_SPEED 500\n",
             "ardupilot",
-            "parameters of a multicopter or helicopter (ArduPilot): planfly flies fixed-",
+            "the parameters are for a multicopter or helicopter (ArduPilot): planfly simulates only fixed-",
         ),
-        ("MPC_XY_P 1\n", "px4", "parameters of a multicopter or helicopter (PX4): planfly flies fixed-wing aircraft"),
+        (
+            "MPC_XY_P 1\n",
+            "px4",
+            "the parameters are for a multicopter or helicopter (PX4): planfly simulates only fixed-wing",
+        ),
     ],
 )
 def test_a_file_of_another_autopilot_or_vehicle_is_refused(
@@ -111,7 +115,7 @@ def test_a_file_without_a_known_name_is_refused_unless_it_is_the_autopilots_own(
     for text, refused in (("FOO 1\nBAR 2\n", True), ("BATT_CAPACITY 5000\n", False)):
         entries = parse_parameters(text, "a.param")
         if refused:
-            with pytest.raises(ParameterError, match=r"a\.param: FOO, BAR: not known to the simulated ArduPlane"):
+            with pytest.raises(ParameterError, match=r"a\.param: FOO, BAR: not used by the simulated ArduPlane"):
                 refuse_unknown_parameters(Path("a.param"), "ardupilot", entries, {})
         else:
             refuse_unknown_parameters(Path("a.param"), "ardupilot", entries, {})

@@ -25,7 +25,7 @@ def test_a_missing_model(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("<p> aero/beta-rad </p>", "<p> aero/side-angle </p>", "property aero/side-angle is read, and neither"),
+        ("<p> aero/beta-rad </p>", "<p> aero/side-angle </p>", "property aero/side-angle is read, but neither"),
         ("<p> aero/beta-rad </p>", "<p> propulsion/engine[7]/thrust-lbs </p>", "propulsion/engine[7]/thrust-lbs"),
         ("motor/battery-current-a", "motor/amperes", "the model does not define the property motor/battery-current-a"),
     ],

@@ -46,9 +46,9 @@ def test_a_model_that_changes_after_it_was_read_is_checked_again(model: Aircraft
         ("<propulsion/>", '<propulsion><engine file="electric"/></propulsion>', "includes another file"),
         ("<input> command/elevator-rad", '<input port="1"> command/elevator-rad', "<input> opens a port"),
         ("</flight_control>", '<output type="SOCKET"/></flight_control>', "<output> opens a port"),
-        ("<p> aero/beta-rad </p>", "<p> aero/side-angle </p>", "property aero/side-angle is read, and neither"),
-        ("> aero/alpha-rad </indep", "> aero/alfa </indep", "property aero/alfa is read, and neither"),
-        ("<input> command/rudder-rad", "<input> -command/rudder", "property command/rudder is read, and neither"),
+        ("<p> aero/beta-rad </p>", "<p> aero/side-angle </p>", "property aero/side-angle is read, but neither"),
+        ("> aero/alpha-rad </indep", "> aero/alfa </indep", "property aero/alfa is read, but neither"),
+        ("<input> command/rudder-rad", "<input> -command/rudder", "property command/rudder is read, but neither"),
     ],
 )
 def test_models_are_refused_with_file_and_line(model: Aircraft, old: str, new: str, message: str) -> None:

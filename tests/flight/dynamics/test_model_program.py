@@ -186,7 +186,7 @@ def test_extremes_ignore_what_is_not_a_number_as_jsbsim_does(
             "hysteresis",
         ),
         (model(fcs="<actuator name='a/b'><input>command/a</input><lag>command/a</lag></actuator>"), "'command/a'"),
-        (model(fcs=_computed("forces/hold-down")), "computes forces/hold-down, a property of JSBSim's own"),
+        (model(fcs=_computed("forces/hold-down")), "computes forces/hold-down, which JSBSim uses itself"),
         (model(fcs=_computed("inertia/pointmass-weight-lbs")), "computes inertia/pointmass-weight-lbs"),
         (model(fcs=_computed("external_reactions/t/x")), "computes external_reactions/t/x"),
         (model(fcs=_computed("a/b/malfunction/fail_zero")), "computes a/b/malfunction/fail_zero"),

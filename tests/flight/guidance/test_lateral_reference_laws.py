@@ -11,7 +11,7 @@ from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from flight.guidance.lateral_reference_laws import (
     WAYPOINT,
     field_course,
-    has_l1_reached,
+    has_reached_leg_end,
     l1_acceleration,
     l1_angles,
     l1_length,
@@ -50,12 +50,12 @@ def test_l1_far_away_and_at_its_corners() -> None:
     assert math.isnan(l1_angles(_at(0.0, -500.0), *LEG, 100.0)[1])
     assert math.isnan(l1_angles(_at(0.0, 1100.0), *LEG, 100.0)[1])
     # Half of a right angle turns at half the distance; a waypoint flown over at its own.
-    assert has_l1_reached(_at(0.0, 956.0), A, B, 200.0, 90.0)
-    assert not has_l1_reached(_at(0.0, 954.0), A, B, 200.0, 90.0)
+    assert has_reached_leg_end(_at(0.0, 956.0), A, B, 200.0, 90.0)
+    assert not has_reached_leg_end(_at(0.0, 954.0), A, B, 200.0, 90.0)
     over = B.copy()
     over.fly_over = True
-    assert not has_l1_reached(_at(0.0, 999.0), A, over, 200.0, 90.0)
-    assert has_l1_reached(_at(30.0, 1000.1), A, over, 200.0, 90.0)
+    assert not has_reached_leg_end(_at(0.0, 999.0), A, over, 200.0, 90.0)
+    assert has_reached_leg_end(_at(30.0, 1000.1), A, over, 200.0, 90.0)
 
 
 def test_the_field_points_to_its_path() -> None:

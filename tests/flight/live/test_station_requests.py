@@ -274,7 +274,7 @@ def test_parameters_that_fly_are_set_on_the_ground_and_the_mission_is_judged_ane
     assert len(fake.orders) == judged
     fake.send(command(400, 1.0), command(176, 1.0, 10.0))
     value, text = setting(b"THR_MIN", 5.0)
-    assert (value, "THR_MIN 5 refused in flight" in text) == (0.0, True)
+    assert (value, "THR_MIN 5: refused, because parameters are fixed during a flight" in text) == (0.0, True)
 
 
 def parameters_of_a_law() -> Parameters:

@@ -68,7 +68,7 @@ def test_what_the_mission_passes_is_left_out_and_named() -> None:
     assert [item.x for item in mission.fences] == [item.x for k, item in enumerate(whole.fences) if k != 4]
     assert [item.seq for item in mission.fences] == list(range(len(whole.fences) - 1))
     (said,) = (note for note in notes if note.startswith("omitted from the fence"))
-    assert f": {threats.names[first]};" in said
+    assert f": {threats.names[first]}. " in said
 
 
 @pytest.mark.parametrize("kind", ["fence", "rally", "plan"])
@@ -91,7 +91,7 @@ def test_mission_planners_fence_has_a_home_line() -> None:
 
 def test_a_polygon_with_too_few_corners_is_refused() -> None:
     text = "QGC WPL 110\n0 0 0 5002 3 0 0 0 36.5 -84.2 0 1\n1 0 0 5002 3 0 0 0 36.6 -84.2 0 1\n"
-    with pytest.raises(MissionError, match="fence item 0: p1 3: fewer corners follow"):
+    with pytest.raises(MissionError, match="fence item 0: p1 3: the polygon has fewer corners"):
         parse_mission(text, "a.fence")
 
 
@@ -148,7 +148,7 @@ FAULTS = {
     "a bow tie": (polygon(2, EXCLUSION, BOW), "fence item 2: crosses or touches itself"),
     "two corners": (polygon(0, EXCLUSION, BOW[:2]), "fence item 0: 2 corners: at least three"),
     "no radius": ([item(5, Command.NAV_FENCE_CIRCLE_EXCLUSION, 0.0, 0.0, 0.0)], "fence item 5: radius 0 m"),
-    "too few follow": (polygon(0, EXCLUSION, BOW)[:3], "fence item 0: p1 4: fewer corners follow"),
+    "too few follow": (polygon(0, EXCLUSION, BOW)[:3], "fence item 0: p1 4: the polygon has fewer corners"),
 }
 
 
@@ -265,4 +265,4 @@ def test_what_is_to_be_stayed_in_is_never_left_out() -> None:
     plan = planned(**TABLES)
     mission, notes = with_fences(plan_mission(plan, 25.0, math.radians(30.0)), plan.scenario, lambda _: True)
     assert [item.command for item in mission.fences] == [5001] * 8
-    assert any("above or below: mast;" in note for note in notes)
+    assert any("above or below: mast." in note for note in notes)

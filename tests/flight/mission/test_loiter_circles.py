@@ -268,7 +268,10 @@ def test_a_circle_left_when_its_time_is_over_is_drawn_no_longer() -> None:
 
 def test_what_comes_after_the_last_waypoint_is_said() -> None:
     rules = LoiterRules(80.0, "NAV_LOITER_RAD", ends_in_circle=True)
-    note = "item 2: after the last waypoint the aircraft circles it without end, with NAV_LOITER_RAD, 80 m: flown once"
+    note = (
+        "item 2: after the last waypoint the aircraft loiters around it without end, with NAV_LOITER_RAD, 80 m: one lap"
+        " is flown"
+    )
     assert any(line.startswith(note) for line in laid_for(rules, wp(0, -1500), wp(0, 0)).notes)
     for last in (wp(0, 0, command=17, p="0 0 150 0"), "3 20 0 0 0 0 0 0 0", wp(0, 0, command=21)):
         assert not any("without end" in line for line in laid_for(rules, wp(0, -1500), wp(900, -1500), last).notes)

@@ -67,12 +67,12 @@ def test_a_landing_without_a_strip_tells_its_course_wind_and_ground() -> None:
     """Landed to the east: what rises to the north falls to the right."""
     (said,) = landed_on(sloped(0.03, 0.02), Wind(4.0, math.radians(90.0)))
     assert said == (
-        "item 4: lands on course 90°, against 4.0 m/s of wind; over 200 m around the landing point the ground rises"
-        " by 3.0% in the landing direction, and falls by 2.0% to the right; touchdown and roll-out"
+        "item 4: lands on course 90°, against 4.0 m/s of wind. Over 200 m around the landing point the ground rises"
+        " by 3.0% in the landing direction, and falls by 2.0% to the right. Touchdown and roll-out"
         " are not judged, because the scenario has no [landing]"
     )
     assert (
-        "around the landing point the ground is level; touchdown and roll-out"
+        "around the landing point the ground is level. Touchdown and roll-out"
         in landed_on(sloped(0.0, 0.0), Wind(0.0, 0.0))[0]
     )
     assert (
@@ -80,7 +80,7 @@ def test_a_landing_without_a_strip_tells_its_course_wind_and_ground() -> None:
         in landed_on(sloped(0.03, 0.0), Wind(0.0, 0.0))[0]
     )
     (said,) = landed_on(None, Wind(4.0, math.radians(270.0)))
-    assert "with 4.0 m/s of tailwind; the terrain there is unknown; touchdown and roll-out are not judged" in said
+    assert "with 4.0 m/s of tailwind. The terrain there is unknown. Touchdown and roll-out are not judged" in said
     assert landed_on(sloped(0.0, 0.0), Wind(0.0, 0.0), LandingStrip(2500.0, 2000.0)) == []
 
 

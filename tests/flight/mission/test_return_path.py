@@ -102,8 +102,8 @@ def laid(
     """Waypoints (n, 3) from 500 m up at the origin, flown to on a course (degrees), and their arcs (n,)."""
     back = math.radians(course)
     before = [
-        STOP.at((-1000.0 * math.sin(back), -1000.0 * math.cos(back), 500.0)),
-        STOP.at((0.0, 0.0, 500.0)),
+        STOP.placed_at((-1000.0 * math.sin(back), -1000.0 * math.cos(back), 500.0)),
+        STOP.placed_at((0.0, 0.0, 500.0)),
     ]
     there = ReturnTarget(target, "home", "", math.hypot(*target[:2]), base)
     points = rtl_waypoints(before, STOP, there, rules, ABLE)
@@ -308,7 +308,7 @@ def test_a_height_that_is_never_flown_is_refused() -> None:
 
 def test_a_return_that_holds_its_height_comes_down_over_its_target() -> None:
     rules = ReturnRules(holds_height=True, transit_height=100.0)
-    begin = [STOP.at((0.0, 9000.0, 900.0)), STOP.at((0.0, 8000.0, 900.0))]
+    begin = [STOP.placed_at((0.0, 9000.0, 900.0)), STOP.placed_at((0.0, 8000.0, 900.0))]
     target = choose_target(rules, begin[-1].map_position, HOME, ())
     ups = [point.map_position[2] for point in rtl_waypoints(begin, STOP, target, rules, ABLE)]
     # Level until the circle about home, down to 100 m over it there.
@@ -323,7 +323,7 @@ def test_a_return_that_holds_its_height_comes_down_over_its_target() -> None:
 def test_a_return_climbs_first_and_descends_over_its_target_to_another_height() -> None:
     """Home is 300 m up: it climbs to 300 m over it, and descends to 100 m; it never ends higher than it flew."""
     rules = ReturnRules(holds_height=True, transit_height=300.0)
-    begin = [STOP.at((0.0, 9000.0, 350.0)), STOP.at((0.0, 8000.0, 350.0))]
+    begin = [STOP.placed_at((0.0, 9000.0, 350.0)), STOP.placed_at((0.0, 8000.0, 350.0))]
     target = choose_target(rules, begin[-1].map_position, HOME, ())
     assert (target.transit_altitude, target.position[2]) == (600.0, 400.0)
     ups = [point.map_position[2] for point in rtl_waypoints(begin, STOP, target, rules, ABLE)]

@@ -196,8 +196,8 @@ def test_a_file_without_home_keeps_its_first_item() -> None:
     assert mission.home is None
     assert [item.seq for item in mission.items] == [1, 2, 3]
     assert mission.warnings[0] == (
-        "a.waypoints:2: no home line (seq 0): the mission has no home and begins with this item, as in Mission Planner;"
-        " QGroundControl and MAVProxy treat it as home and do not fly it"
+        "a.waypoints:2: no home line (seq 0): the mission has no home and begins with this item, as in Mission Planner."
+        " QGroundControl and MAVProxy treat this item as home and do not fly it"
     )
     for kind in ("waypoints", "plan"):
         again = parse_mission(mission_text(mission, kind), f"a.{kind}")

@@ -113,7 +113,7 @@ def test_a_camera_that_is_none_is_left_out_and_said_to_be(calc: dict[str, Any], 
     assert (plan.camera is None, plan.turn_around) == (bool(text), 30.0 if text else 0.0)
     said = [one for one in mission.warnings if "CameraCalc" in one]
     assert said == (
-        [f"a.plan: mission.items.0: {text}: its camera is ignored, and no overlap is judged"] if text else []
+        [f"a.plan: mission.items.0: {text}: the camera is ignored, and no overlap is judged"] if text else []
     )
 
 
@@ -244,7 +244,9 @@ def test_items_are_counted_by_their_order_and_jumps_go_to_the_item_named() -> No
     mission = parse_mission(plan_with(simple(2, 36.4), simple(5, 36.5), jump), "a.plan")
     assert [item.seq for item in mission.items] == [1, 2, 3]
     assert mission.items[2].params[0] == 2.0
-    assert mission.warnings == ("a.plan: the doJumpId are not 1 to 3: items are numbered by their order instead",)
+    assert mission.warnings == (
+        "a.plan: the values of doJumpId are not 1 to 3: items are numbered by their order instead",
+    )
 
 
 @pytest.mark.parametrize(("altitude", "known"), [(None, False), (0.0, True), (310.0, True)])
@@ -269,8 +271,7 @@ def test_a_height_that_is_counted_from_the_terrain_and_not_calculated_is_above_t
     mission = parse_mission(plan_with(simple(1, 36.4), late, done), "a.plan")
     assert [(item.frame, item.alt) for item in mission.items] == [(3, 100.0), (10, 150.0), (0, 100.0)]
     assert mission.warnings == (
-        "a.plan: mission.items.1: QGroundControl has not calculated its altitude: taken as 150 m above the terrain"
-        " there",
+        "a.plan: mission.items.1: QGroundControl has not calculated its altitude: flown 150 m above the terrain there",
     )
 
 

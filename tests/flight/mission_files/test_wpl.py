@@ -119,8 +119,8 @@ def test_items_whose_seq_does_not_rise_are_counted_as_pymavlink_counts_them(tmp_
         (loader.wp(k).seq, pytest.approx(loader.wp(k).x)) for k in range(1, loader.count())
     ]
     assert [stop.item for stop in make_itinerary(mission).stops] == [1, 2, 2, 4]
-    assert [said for said in mission.warnings if "not higher" in said] == [
-        "a.waypoints:4: sequence number 3 is not higher than the one before (2 such lines in all): items are"
+    assert [said for said in mission.warnings if "not above" in said] == [
+        "a.waypoints:4: sequence number 3 is not above the previous line's number (2 such lines in all): items are"
         " numbered by line instead, as ground stations do, and jumps use these numbers"
     ]
 
@@ -146,7 +146,10 @@ def test_a_home_at_0_0_is_left_out_and_said(kind: str) -> None:
         (
             "3 22 15 0 0 0 36.5 -84.2 310",
             Home(36.5, -84.2, 310.0),
-            ["home in frame 3: its height is taken as above mean sea level; the file probably has no home line"],
+            [
+                "home in frame 3: its height is read as an altitude above mean sea level."
+                " Probably the file has no home line"
+            ],
         ),
         ("3 22 15 0 0 0 0 0 100", None, ["home is at 0, 0, which stands for no position"]),
         ("2 178 0 22 0 0 0 0 0", None, ["home is at 0, 0, which stands for no position"]),

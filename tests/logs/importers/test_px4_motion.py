@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from aircraft.identification.estimate import aligned_signals, estimate_clocks, fit_parameters
+from aircraft.identification.estimate import estimate_clocks, fit_parameters, make_aligned_signals
 from logs.importers.motion import MotionLog
 from logs.importers.motion_log import read_motion
 from logs.importers.open_log import open_log
@@ -301,7 +301,7 @@ def test_the_same_flight_gives_the_same_aircraft(tmp_path: Path) -> None:
     )
     # PX4 logs its servo outputs at 25 Hz, with another delay than ArduPlane.
     found, expected = (
-        fit_parameters(aligned_signals(each, clocks, flown.base), flown.base)
+        fit_parameters(make_aligned_signals(each, clocks, flown.base), flown.base)
         for each, clocks in ((records, estimate_clocks(records, flown.base)), (flown.records, flown.estimate.clocks))
     )
     assert found.with_current

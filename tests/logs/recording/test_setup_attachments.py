@@ -152,7 +152,7 @@ def test_no_field_of_a_setup_is_left_behind() -> None:
 
 
 def test_arduplanes_parameters_come_back_with_who_states_them(tmp_path: Path, track: Track) -> None:
-    parameters = ArduPilotParameters.of_text("NAVL1_PERIOD 16.3\nLIM_ROLL_CD 3210\nFS_LONG_ACTN 0\n", "mine.parm")
+    parameters = ArduPilotParameters.from_text("NAVL1_PERIOD 16.3\nLIM_ROLL_CD 3210\nFS_LONG_ACTN 0\n", "mine.parm")
     setup = dataclasses.replace(make_setup(with_plan=False), autopilot=ArduPlane(parameters), nav="gnss")
     log = read_log(record(tmp_path / "a.mcap", setup, track))
     assert log.setup.autopilot.parameters == parameters

@@ -108,7 +108,7 @@ def test_a_logs_aircraft_need_not_be_on_this_machine(monkeypatch: pytest.MonkeyP
 def test_the_kind_of_an_airspeed_and_who_states_it() -> None:
     """ArduPlane and PX4 fly equivalent airspeeds, planfly's guidance true ones."""
     setup = make_setup()
-    mine = ArduPilotParameters.of_text("AIRSPEED_CRUISE 21\n", "mine.parm")
+    mine = ArduPilotParameters.from_text("AIRSPEED_CRUISE 21\n", "mine.parm")
     unstated = setup.in_scenario(replace(setup.scenario, flight=FlightTable()))
     said = [
         lines_of(replace(unstated, autopilot=autopilot))[0].partition(" kg, ")[2]
@@ -202,7 +202,7 @@ def test_all_names_of_a_parameter_file_without_effect_are_data() -> None:
     """A line names four of them; the conditions name all."""
     names = [f"CAM{k}_FEEDBACK" for k in range(9)]
     law = ArduPlane(
-        ArduPilotParameters.of_text("\n".join(f"{name} 1" for name in names) + "\nWP_RADIUS 60\n", "a.parm")
+        ArduPilotParameters.from_text("\n".join(f"{name} 1" for name in names) + "\nWP_RADIUS 60\n", "a.parm")
     )
     assert judging_conditions(replace(make_setup(), autopilot=law)).unused_parameters == tuple(names)
     assert judging_conditions(make_setup()).unused_parameters == ()

@@ -70,7 +70,7 @@ def test_a_real_autopilot_that_flew_is_data_too(setup: FlightSetup, track: Track
 
 def test_parameters_are_data_with_who_states_them(setup: FlightSetup, track: Track) -> None:
     assert json.loads(verdict_json(judge(setup, track)))["parameters"] is None
-    mine = ArduPilotParameters.of_text("LIM_ROLL_CD 3000\nFOO 1\n", "mine.parm")
+    mine = ArduPilotParameters.from_text("LIM_ROLL_CD 3000\nFOO 1\n", "mine.parm")
     data = json.loads(verdict_json(judge(replace(setup, autopilot=ArduPlane(mine)), track)))["parameters"]
     assert (data["file"], data["unused"]) == ("mine.parm", ["FOO"])
     assert data["not_flown"] == ["TERRAIN_FOLLOW"]

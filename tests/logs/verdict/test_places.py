@@ -89,7 +89,7 @@ def test_a_verdict_has_the_levels_that_were_asked(autopilot: FlightSetup) -> Non
     three = asked["geometry", "airframe", "autopilot"]
     assert three.lines[-2:] == (
         "By geometry only: flyable; flight and geometry agree on every finding that both judge",
-        "Uav alone (planfly's guidance, exact navigation): flyable; both flights agree",
+        "UAV alone (planfly's guidance, exact navigation): flyable; both flights agree",
     )
 
 

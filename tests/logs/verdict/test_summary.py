@@ -92,7 +92,7 @@ def test_who_flew_is_said_with_the_parameters_that_decide_most() -> None:
         " TECS_HDEM_TCONST 3 s)"
     ) in lines
     assert not [line for line in lines if line.startswith("Parameters")]
-    mine = ArduPilotParameters.of_text("WP_RADIUS 50\n" + "".join(f"FOO{k} 1\n" for k in range(6)), "mine.parm")
+    mine = ArduPilotParameters.from_text("WP_RADIUS 50\n" + "".join(f"FOO{k} 1\n" for k in range(6)), "mine.parm")
     lines = lines_by(mine)
     assert any("with the parameters of mine.parm (WP_RADIUS 50 m" in line for line in lines)
     known = len(mine.values) - 1
@@ -100,9 +100,9 @@ def test_who_flew_is_said_with_the_parameters_that_decide_most() -> None:
         f"Parameters: 1 from the file, 0 from the aircraft, {known} from ArduPlane's defaults;"
         " not used: FOO0, FOO1, FOO2, FOO3, +2 more"
     ) in lines
-    landing = lines_by(ArduPilotParameters.of_text("WP_RADIUS 50", "mine.parm").changed("assumed", RTL_AUTOLAND=1.0))
+    landing = lines_by(ArduPilotParameters.from_text("WP_RADIUS 50", "mine.parm").changed("assumed", RTL_AUTOLAND=1.0))
     assert any(line.startswith("Parameters: 1 from the file, 1 assumed for the landing, 0 from") for line in landing)
-    returns = ArduPilotParameters.of_text("RTL_AUTOLAND 1\nTERRAIN_FOLLOW 1\n", "mine.parm")
+    returns = ArduPilotParameters.from_text("RTL_AUTOLAND 1\nTERRAIN_FOLLOW 1\n", "mine.parm")
     lines = lines_by(returns)
     assert any(line.endswith("defaults; read but not simulated: TERRAIN_FOLLOW") for line in lines)
 
@@ -112,7 +112,7 @@ def test_a_name_one_letter_from_a_parameter_has_its_own_note() -> None:
     setup = make_setup(((0.0, 0.0, 100.0), (900.0, 0.0, 100.0)))
 
     def misspelled(text: str, is_flown: bool = True) -> list[str]:
-        by = replace(setup, autopilot=ArduPlane(ArduPilotParameters.of_text(text, "mine.param")))
+        by = replace(setup, autopilot=ArduPlane(ArduPilotParameters.from_text(text, "mine.param")))
         level = "flown" if is_flown else "geometric"
         lines = summary_lines([], by, level, (LevelAnswer("autopilot", True, "flyable"),), judging_conditions(by))
         return [line for line in lines if line.startswith("Not a parameter")]

@@ -83,7 +83,7 @@ def test_other_tables_are_changed_key_by_key_and_positions_as_a_whole() -> None:
         ),
         (
             {"threats": [[900.0, 90.0, 60.0, 0.0], [900.0, 90.0, np.nan, 300.0]]},
-            "^threats row 1: kill_radius_m nan: expected a number: 0 for no such zone, None for a value .* not stated$",
+            "^threats row 1: kill_radius_m nan: expected a number: 0 for .*, None for a missing value$",
         ),
         ({"threats": {**COLUMNS, "detection_radius_m": np.array([np.nan, 300.0])}}, "row 0: detection_radius_m nan: "),
         ({"threats": {**COLUMNS, "kill_scale_m": np.array([20.0, np.nan])}}, "row 1: kill_scale_m nan: "),

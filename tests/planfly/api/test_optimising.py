@@ -163,6 +163,7 @@ def test_it_is_the_planners_own_step(monkeypatch: pytest.MonkeyPatch) -> None:
         (([[0.0]], [[1.0]]), "shapes"),
         (([], []), "shapes"),
         (([0.0], [0.0]), "lower below upper"),
+        (([-1e308], [1e308]), "lower below upper by a finite difference"),
         (([0.0], [np.inf]), "finite"),
     ],
 )

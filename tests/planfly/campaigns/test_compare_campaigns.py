@@ -50,8 +50,10 @@ def test_flights_with_the_same_draws_are_pairs(
     assert found.inputs == ("wind.speed_mps 9.0 instead of 5.0",)
     lines = comparison_lines(found)
     assert lines[0].startswith("flights of the second campaign are less likely to be flyable: -0.2000 (-0.3447 to")
-    assert "  fails   clearance: more often, in 0 and 14 flights (+28.0 %)" in lines
-    assert "  fails   slopes: less often, in 3 and 0 flights (-6.0 %)" in lines
+    assert (
+        "  fails   clearance: more often: 0 flights of the first, 14 of the second (+28.0 percentage points)" in lines
+    )
+    assert "  fails   slopes: less often: 3 flights of the first, 0 of the second (-6.0 percentage points)" in lines
     answer = answered(capsys, 0, "compare", str(first), str(second))
     assert (answer["answer"], answer["pairs"], answer["campaigns"][1]["flyable"]) == ("less likely", 50, 36)
 
@@ -62,8 +64,8 @@ def test_one_line_says_which_method_decides_where_two_disagree(base: CampaignBas
     found = planfly.compare_campaigns(first, fly(base, tmp_path / "b", 40, {}))
     assert (found.answer, found.difference.p_value) == ("more likely", 0.0625)
     note = (
-        "the interval shows a difference, and decides the answer; McNemar's exact test shows none (p = 0.062, 0.05 is"
-        " the limit)"
+        "the interval shows a difference, but McNemar's exact test shows none (p = 0.062, limit 0.05); the interval"
+        " decides the answer"
     )
     assert found.notes == (note,)
     assert comparison_lines(found)[-1] == f"  note    {note}"
@@ -79,7 +81,7 @@ def test_other_draws_are_other_samples(base: CampaignBase, tmp_path: Path) -> No
     assert found.pairs == 0
     (hint,) = [line for line in comparison_lines(found) if line.startswith("  paired  no: ")]
     assert hint.endswith(
-        "; with the same --seed and --spread they are compared in pairs, which shows smaller differences"
+        ". Campaigns with the same --seed and --spread are compared in pairs, which shows smaller differences"
     )
     assert [round(bound, 4) for bound in found.difference.interval] == [0.0524, 0.3339]
     assert found.answer == "more likely"
@@ -93,9 +95,11 @@ def test_the_flights_that_both_have_are_compared_and_a_stopped_campaign_is_noted
     second = fly(base, tmp_path / "b", 30, {}, Goal(0.9, True, 5000))
     found = planfly.compare_campaigns(first, second)
     assert (found.pairs, found.answer, found.inputs) == (20, "no difference shown", ())
-    assert found.notes[0] == "only 20 flights that both campaigns have are compared, in the difference and by rule"
+    assert found.notes[0] == (
+        "the difference and the counts by rule compare only the 20 flights that both campaigns have"
+    )
     assert "only approximate" in found.notes[1]
-    assert "  differs nothing but planfly's code, if anything" in comparison_lines(found)
+    assert "  differs no input; planfly's code may differ" in comparison_lines(found)
 
 
 def test_a_campaign_is_compared_with_a_campaign_only(
@@ -122,7 +126,7 @@ def test_undecided_flights_fail_no_rule_and_are_noted(base: CampaignBase, tmp_pa
     found = planfly.compare_campaigns(first, tmp_path / "b")
     assert found.second.tally == Tally(17, 0, 0, 3)
     assert found.rules == []
-    assert "3 flights not judged in full: the difference counts them as not flyable" in found.notes
+    assert "the difference counts 3 flights not judged in full as not flyable" in found.notes
 
 
 def _made(folder: Path) -> Path:
@@ -137,7 +141,10 @@ def test_rules_are_compared_on_the_flights_that_both_campaigns_have(base: Campai
     found = planfly.compare_campaigns(first, fly(base, tmp_path / "b", 10, same))
     assert (found.difference.value, found.only_first, found.only_second) == (0.0, 0, 0)
     assert found.rules == [("clearance", 4, 4)]
-    assert "  fails   clearance: as often, in 4 and 4 flights (+0.0 %)" in comparison_lines(found)
+    assert (
+        "  fails   clearance: as often: 4 flights of the first, 4 of the second (+0.0 percentage points)"
+        in comparison_lines(found)
+    )
 
 
 def test_a_table_whose_rows_were_changed_is_not_compared(base: CampaignBase, tmp_path: Path) -> None:

@@ -35,7 +35,7 @@ def test_each_flight_comes_back_once_and_a_foreign_worker_is_refused(
         monkeypatch.setattr("planfly.campaigns.dask_pool.fingerprint", lambda name: {"planfly": "0.0.1"})
         other = DaskPool(client, base, made_flight)
         once = iter([FlightRequest(0)])
-        with pytest.raises(WorkerError, match=r"worker .*://.*: planfly .* not 0.0.1 as here"):
+        with pytest.raises(WorkerError, match=r"worker .*://.*: planfly .* expected 0.0.1 as in this process"):
             list(other.fly(lambda: next(once, None)))
         other.close()
 

@@ -93,7 +93,7 @@ def test_too_few_flights_have_no_upper_end(flights: int, has_upper_end: bool) ->
 def test_an_interval_without_an_upper_end_says_so(base: CampaignBase) -> None:
     """24 flights are fewer than the 72 of the least interval with an upper end."""
     line = answer_line(battery_result(base, [energy_row(80.0)] * 24, own=200.0))
-    assert " at 95% confidence, no upper bound with 24 flights" in line
+    assert " at 95% confidence, 24 flights are too few for an upper bound" in line
 
 
 @pytest.mark.parametrize(("crashes", "is_known"), [(5, True), (6, False)])
@@ -102,7 +102,7 @@ def test_flights_that_do_not_complete_leave_it_unknown(base: CampaignBase, crash
     result = battery_result(base, rows, own=200.0)
     assert math.isfinite(result.capacity) == is_known
     assert (
-        "6 of 100 flights do not complete the mission; most frequent end: ground contact" in answer_line(result)
+        "6 of 100 flights do not complete the mission; most frequent reason: ground contact" in answer_line(result)
     ) != is_known
     if not is_known:
         assert result.is_enough is None
@@ -165,7 +165,7 @@ def test_a_return_of_unknown_energy_leaves_it_unknown(base: CampaignBase) -> Non
     assert math.isnan(result.capacity)
     assert result.is_enough is None
     assert answer_line(result).startswith("not judged: in 6 of 100 flights a return leaves the known terrain")
-    assert "it is not judged whether the aircraft's battery of 888 Wh is enough" in battery_lines(result)
+    assert "the aircraft's battery of 888 Wh is not judged, because the needed one is unknown" in battery_lines(result)
 
 
 def test_a_return_that_hits_something_is_no_matter_of_the_battery(base: CampaignBase) -> None:
@@ -218,7 +218,7 @@ def test_a_higher_return_of_px4_needs_a_larger_battery(tmp_path: Path) -> None:
     assert rows[650].return_energy - rows[450].return_energy > 11.0 * 9.81 * 200.0 / 3600.0
     lines = battery_lines(battery_result(base, [energy_row(80.0)] * 20, own=888.0))
     assert "returns to launch are simulated by PX4's control laws flying a point mass" in lines
-    assert any("RTL_RETURN_ALT (650 m above its destination)" in line for line in lines)
+    assert any("RTL_RETURN_ALT (650 m above the destination)" in line for line in lines)
     assert not any("ArduPlane" in line for line in lines)
 
 

@@ -196,11 +196,13 @@ def test_lines_and_table_say_what_counts_and_what_it_is_not(base: CampaignBase) 
 
 def test_the_autopilot_whose_returns_count_is_named(base: CampaignBase) -> None:
     rows = [row(50.0, 40.0, 60.0)] * 20
-    assert any("returns to launch by ArduPlane's rules every 10 s" in line for line in risk_lines(volumes(base, rows)))
+    assert any(
+        "a return to launch by ArduPlane's rules starts every 10 s" in line for line in risk_lines(volumes(base, rows))
+    )
     autopilot = Px4(Px4Parameters.load(base.uav.aircraft))
     px4 = replace(base, uav=replace(base.uav, autopilot=autopilot))
     lines = risk_lines(volumes(px4, rows, glide_ratio=10.0))
-    assert any("returns to launch by PX4's rules every 10 s" in line for line in lines)
+    assert any("a return to launch by PX4's rules starts every 10 s" in line for line in lines)
     assert "engine-out glides follow ArduPlane's rules, because PX4's are not simulated" in lines
     assert any(line.startswith("RTL_TYPE 1: a return goes to ") for line in lines)
     assert not any("ArduPlane" in line for line in risk_lines(volumes(px4, rows)))

@@ -129,7 +129,7 @@ def test_a_direction_in_which_every_flight_fails_does_not_fail_the_mission_in_ca
     found = search.result()
     assert found.calm is None
     assert found.answer == "not judged"
-    assert found.reasons[2] == "10 flights of at least 150"
+    assert found.reasons[2] == "10 of at least 150 flights"
     lines = wind_lines(found)
     assert lines[0].startswith("not judged: 4 of 4 directions have too few flights (6 to 10 flights)")
     assert lines[1] == (
@@ -163,7 +163,7 @@ def test_flights_that_are_not_judged_in_full_are_no_failures(wind_base: Campaign
     assert found.judged == (False, False, False, False)
     lines = wind_lines(found)
     assert lines[0] == (
-        "not judged: 7 of 163 flights are not judged in full; reason of the first: loiters (state the bank limit)"
+        "not judged: 7 of 163 flights are not judged in full; first reason: loiters (state the bank limit)"
     )
     assert lines[1].startswith("not judged: 2 of 4 directions have too few flights (0 flights)")
     assert not any("best estimate" in line or "the weakest wind" in line for line in lines)
@@ -193,7 +193,7 @@ def test_a_mission_that_is_not_judged_in_calm_air_is_not_searched(wind_base: Cam
     assert found.answer == "not judged"
     assert found.undecided == tuple((number, "loiters (a guess)") for number in range(3))
     lines = wind_lines(found)
-    assert lines[0] == ("not judged: 3 of 3 flights are not judged in full; reason of the first: loiters (a guess)")
+    assert lines[0] == ("not judged: 3 of 3 flights are not judged in full; first reason: loiters (a guess)")
     assert lines[-1] == "3 flights in calm air only, because none of them is flyable"
     assert not any("fail" in line for line in lines)
 

@@ -18,7 +18,7 @@ def test_the_same_is_let_in_and_each_difference_is_named() -> None:
     mine = fingerprint("aerosonde")
     check_fingerprint(mine, dict(mine), "w")
     for name in ("planfly", "sources", "model", "jsbsim", "numpy"):
-        with pytest.raises(WorkerError, match=f"worker tcp://w:1: {name} other, not"):
+        with pytest.raises(WorkerError, match=f"worker tcp://w:1: {name} other, expected"):
             check_fingerprint(mine, mine | {name: "other"}, "tcp://w:1")
 
 

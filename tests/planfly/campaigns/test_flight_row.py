@@ -282,7 +282,7 @@ def test_a_flight_names_what_it_does_not_judge_unless_it_fails() -> None:
 
 
 def test_a_flight_that_only_an_open_setting_leaves_undecided_is_no_failure(tmp_path: Path) -> None:
-    """COM_FLT_TIME_MAX ends a mission and is not judged."""
+    """COM_FLT_TIME_MAX may end the mission, which is not judged."""
     mission, scenario = write_short(tmp_path)
     params = tmp_path / "a.params"
     params.write_text("# Stack: PX4 Pro\n1\t1\tCOM_FLT_TIME_MAX\t500\t6\n1\t1\tMIS_TKO_LAND_REQ\t0\t6\n")
@@ -292,7 +292,7 @@ def test_a_flight_that_only_an_open_setting_leaves_undecided_is_no_failure(tmp_p
     px4_base = open_campaign(str(mission), default_dispersions(), {"scenario": scenario, "seed": 1})
     row = fly_one(px4_base, 0)
     assert (row.outcome, row.failures) == ("undecided", ())
-    assert row.undecided_text == "mission (COM_FLT_TIME_MAX 500 ends a mission and is not judged)"
+    assert row.undecided_text == "mission (COM_FLT_TIME_MAX 500 may end the mission, which is not judged)"
 
 
 def test_an_empty_battery_has_nothing_left(base: CampaignBase) -> None:

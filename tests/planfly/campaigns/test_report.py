@@ -56,7 +56,7 @@ def test_files_are_written_and_cleared_and_no_others(
 def test_a_flight_that_comes_out_otherwise_is_told(base: CampaignBase, tmp_path: Path) -> None:
     row = fly_one(base, 1)
     fly_row_again(base, row, tmp_path / "a.mcap")
-    with pytest.raises(PlanflyError, match=r"has a different outcome here than where it was flown: [a-z_]+"):
+    with pytest.raises(PlanflyError, match=r"flight 1 differs from the stored flight.* differing columns: [a-z_]+"):
         fly_row_again(base, made_flight(base, 1), tmp_path / "a.mcap")
 
 
@@ -208,7 +208,7 @@ def test_the_rule_that_decides_is_named_for_each_direction(base: CampaignBase, t
     assert rules == [[("clearance", 3), ("slope", 4)], [("slope", 3)], [("clearance", 3), ("slope", 3)], []]
     assert directions[1]["failed_by_rule"][0]["places"][0]["where"] == "leg 4"
     page = (tmp_path / "winds.html").read_text()
-    cells = re.findall(r'<td class="n">([a-z]*)</td><td class="n">no: [^<]* of at least 150</td></tr>', page)
+    cells = re.findall(r'<td class="n">([a-z]*)</td><td class="n">no: [^<]* of at least 150 flights</td></tr>', page)
     assert cells == ["slopes", "slopes", "clearance", ""]
 
 
@@ -216,10 +216,12 @@ def test_what_flights_show_by_themselves_where_none_failed() -> None:
     """Of 132 in the largest wind 0.05 ** (1 / 132) at 95 %; fewer of one direction show less."""
     flights = (*((3, 20.0, True) for _ in range(132)), (3, 10.0, True), (0, 20.0, False))
     (line,) = (one for one in wind_lines(replace(FOUND, flights=flights)) if " no flight failed" in one)
-    assert line == ("in 1 of 4 directions no flight failed: in each, at least 132 flights in 20 m/s show P >= 0.978")
+    assert line == (
+        "in 1 of 4 directions no flight failed: at least 132 flights in 20 m/s from each of them show P >= 0.978"
+    )
     flights += tuple((2, 20.0, True) for _ in range(58))
     (line,) = (one for one in wind_lines(replace(FOUND, flights=flights)) if " no flight failed" in one)
-    assert "in 2 of 4 directions no flight failed: in each, at least 58 flights" in line
+    assert "in 2 of 4 directions no flight failed: at least 58 flights" in line
     assert line.endswith("P >= 0.95")
     failed = replace(FOUND, flights=((3, 20.0, False), (0, 10.0, True)))
     assert not any(" no flight failed" in one for one in wind_lines(failed))
@@ -235,7 +237,7 @@ def test_directions_for_which_flights_did_not_last_are_said() -> None:
     assert wind_lines(fewer)[0].startswith("not judged: 1 of 1 direction has too few flights")
     flights = (*settled.flights, *((1, *flight[1:]) for flight in settled.flights))
     wide = replace(settled, boundaries=(boundary, WindBoundary(7.0, 6.5, 7.5, False)), flights=flights)
-    assert wide.reasons == ("", "an interval of 1.00 m/s; at most 0.5 m/s is required")
+    assert wide.reasons == ("", "interval 1.00 m/s wide; at most 0.5 m/s is required")
     assert (wide.judged, wide.answer) == ((True, False), "not judged in full")
     assert repr(wide) == "<WindsResult 2 directions, 1 of them not judged, 7.0 m/s the lowest; 300 flights>"
     assert wind_lines(wide)[0].startswith("not judged in full: 1 of 2 directions has too few flights")
@@ -249,7 +251,7 @@ def test_the_cases_of_continuous_integration_are_the_answer_and_each_direction()
     assert [(case.name, case.result) for case in directions] == [
         (f"from {angle}°", "skipped") for angle in (0, 90, 180, 270)
     ]
-    assert directions[0].message == "not judged: 2 flights of at least 150"
+    assert directions[0].message == "not judged: 2 of at least 150 flights"
     settled = tuple((k, 5.0, True) for k in range(4) for _ in range(MIN_FLIGHTS_PER_DIRECTION))
     narrow = tuple(WindBoundary(5.0, 4.9, 5.1, False) for _ in range(4))
     judged = winds_suite("m", replace(FOUND, flights=settled, boundaries=narrow))
@@ -277,8 +279,8 @@ def test_data_picture_and_page(base: CampaignBase, tmp_path: Path) -> None:
     assert data["directions"][3]["beyond"] is True
     assert (data["answer"], data["reason"]) == ("not judged", wind_lines(FOUND)[0])
     assert [(one["judged"], one["reason"]) for one in data["directions"]] == [
-        (False, "2 flights of at least 150"),
-        *[(False, "1 flight of at least 150")] * 3,
+        (False, "2 of at least 150 flights"),
+        *[(False, "1 of at least 150 flights")] * 3,
     ]
     assert data["lost"] == [1]
     assert (tmp_path / "winds.png").read_bytes()[:4] == b"\x89PNG"
@@ -309,10 +311,10 @@ def test_the_summary_comes_back_and_no_process_stays(base: CampaignBase, tmp_pat
         estimate = Estimator(GOAL).estimate(store.tally())
     children = multiprocessing.active_children()
     # The made flights come out otherwise when they are flown: the error of the other process is this one's.
-    with pytest.raises(Exception, match="flight 0 has a different outcome"):
+    with pytest.raises(Exception, match="flight 0 differs from the stored flight"):
         finish_campaign(base, GOAL, estimate, tmp_path, "planfly campaign x")
     assert multiprocessing.active_children() == children
-    with open_store(base, GOAL, tmp_path, resume=True) as store, pytest.raises(StoreError, match="held by another"):
+    with open_store(base, GOAL, tmp_path, resume=True) as store, pytest.raises(StoreError, match="locked by another"):
         finish_campaign(base, GOAL, estimate, tmp_path, "planfly campaign x")
 
 

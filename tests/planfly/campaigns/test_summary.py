@@ -135,8 +135,8 @@ def test_failed_rules_come_first_in_the_ranking_also_without_a_margin(base: Camp
     ]
     closest = {row.draw.index: closest_text(row) for row in summary.worst}
     assert closest == {
-        0: "slopes failed at leg 2, not by a margin",
-        1: "slopes failed at leg 2, not by a margin",
+        0: "slopes failed at leg 2 by an unknown margin",
+        1: "slopes failed at leg 2 by an unknown margin",
         2: "corridor at leg 1: -2.0 m",
         3: "clearance at leg 1: -0.5 m, within the tolerance",
     }
@@ -178,7 +178,7 @@ def test_a_flight_that_failed_by_an_unknown_margin_counts_as_beyond_the_limit(
         summary = summary_of_margins(base, tmp_path / name, flights)
         line = campaign_lines(summary)[-1]
         assert (
-            line == f"  decides slopes: {text}; none of the varied quantities has a significant effect on this margin"
+            line == f"  decides slopes: {text}. None of the varied quantities has a significant effect on this margin"
         )
         data = json.loads(summary_json(summary))
         assert (data["margin_of_one_in_twenty"], data["margin_unit"]) == (low_margin, "deg")
@@ -196,7 +196,7 @@ def test_only_what_is_shown_to_explain_the_margin_is_named_also_of_the_aircraft(
     seeds = [draw_flight(drawn.dispersions, drawn.seed, index).seed for index in range(40)]
     summary = summary_of_margins(drawn, tmp_path, [(5.0 * float(thrust[seed % 64]), False) for seed in seeds])
     assert [driver.quantity for driver in summary.deciding[0].drivers] == ["ident/thrust"]
-    assert "; causes of the margin's variance: the aircraft's thrust (" in campaign_lines(summary)[-1]
+    assert ". Causes of the margin's variance: the aircraft's thrust (" in campaign_lines(summary)[-1]
     sensitivities = {entry["quantity"]: entry for entry in json.loads(summary_json(summary))["sensitivities"]}
     assert {name for name, entry in sensitivities.items() if entry["shown"]} == {"ident/thrust"}
     assert {"ident/lift-slope", "mass", "wind_speed"} < set(sensitivities)
@@ -219,7 +219,7 @@ def test_all_rules_that_most_flights_fail_are_explained(base: CampaignBase, tmp_
     assert [entry.rule for entry in summary.deciding] == ["slope", "clearance"]
     slope, clearance = (line for line in campaign_lines(summary) if line.startswith("  decides"))
     assert "slopes: 5 of 40 flights fail this rule, by an unknown margin" in slope
-    assert "causes of the margin's variance: terrain height (" in clearance
+    assert "Causes of the margin's variance: terrain height (" in clearance
     data = json.loads(summary_json(summary))
     assert (data["deciding_rule"], [entry["deciding_rule"] for entry in data["tied_rules"]]) == ("slope", ["clearance"])
 
@@ -232,7 +232,7 @@ def test_an_undecided_target_names_the_flights_that_would_decide_it(base: Campai
             store.add(with_margins(base, index, ("clearance", 9.0)))
         summary = summarise_campaign(base, goal, Estimator(goal).estimate(store.tally()), store)
     assert summary.estimate.answer == "undecided"
-    assert "  59 flights without a failure would decide this" in campaign_lines(summary)
+    assert "  59 flights without a failure would decide the target" in campaign_lines(summary)
     assert json.loads(summary_json(summary))["deciding_flights"] == 59
     assert summary.unjudged_return == ""
     lines = campaign_lines(replace(summary, unjudged_return="the mission has no home"))
@@ -246,7 +246,7 @@ def test_too_few_flights_show_no_sensitivities(base: CampaignBase, tmp_path: Pat
         assert [entry.rule for entry in summary.deciding] == ["clearance"]
         assert summary.deciding[0].sensitivities == ()
         assert (
-            "; at least 20 judged flights are needed to find what the margin depends on" in campaign_lines(summary)[-1]
+            ". At least 20 judged flights are needed to find what the margin depends on" in campaign_lines(summary)[-1]
         )
         assert "What the smallest margin depends on" not in campaign_page(base, summary, store, "").decode()
 
@@ -306,7 +306,7 @@ def test_undecided_flights_are_no_failures_and_name_the_reason_of_the_first(base
     assert lines[0] == (
         "P >= 0.9 is undecided: 1 of 20 flights is flyable, 19 not judged in full, P from 0.0500 to 1.0000"
     )
-    assert "  Not judged: 19 of 20 flights; reason of the first: mission (open 1)" in lines
+    assert "  Not judged: 19 of 20 flights; first reason: mission (open 1)" in lines
     assert not any(line.startswith("  failed") for line in lines)
     assert not any("decides mission" in line for line in lines)
     data = json.loads(summary_json(summary))

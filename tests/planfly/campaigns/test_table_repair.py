@@ -236,12 +236,14 @@ def test_a_checksum_is_of_values_as_sqlite_gives_them_back() -> None:
 
 
 def test_many_damaged_flights_are_counted() -> None:
-    assert Examination([3], [], is_sound=False).text().startswith("is damaged; intact flights: 1;")
+    assert Examination([3], [], is_sound=False).describe().startswith("is damaged; intact flights: 1;")
     assert (
         Examination([0, 2], [1], is_sound=False, last_known=2)
-        .text()
+        .describe()
         .startswith("flight 1 is damaged and was removed, and any flights after flight 2 are lost; intact flights: 2;")
     )
-    found = Examination([], [], is_sound=False, last_known=-1).text()
+    found = Examination([], [], is_sound=False, last_known=-1).describe()
     assert found.startswith("is damaged, and no flight was found; intact flights: 0;")
-    assert Examination([], list(range(20))).text().startswith("flights 0, 1, 2, 3, 4, 5, 6, 7 and 12 more are damaged")
+    assert (
+        Examination([], list(range(20))).describe().startswith("flights 0, 1, 2, 3, 4, 5, 6, 7 and 12 more are damaged")
+    )

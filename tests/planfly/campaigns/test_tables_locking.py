@@ -161,16 +161,16 @@ def test_a_held_table_is_refused_and_loses_nothing(base: CampaignBase, tmp_path:
     with opened(path) as store:
         store.add(all_fly(base, 0))
         if holder == "another store":
-            with pytest.raises(StoreError, match="held by another process"):
+            with pytest.raises(StoreError, match="locked by another process"):
                 opened(path, resume=True)
-            with pytest.raises(StoreError, match="held by another process"):
+            with pytest.raises(StoreError, match="locked by another process"):
                 check_not_locked(path)
     if holder == "another program":
         other = sqlite3.connect(path, isolation_level=None)
         other.execute("BEGIN IMMEDIATE")
-        with pytest.raises(StoreError, match="held by another process"):
+        with pytest.raises(StoreError, match="locked by another process"):
             opened(path, resume=True)
-        with pytest.raises(StoreError, match="held by another process"):
+        with pytest.raises(StoreError, match="locked by another process"):
             check_not_locked(path)
         other.close()
     check_not_locked(path)

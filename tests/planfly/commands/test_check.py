@@ -275,7 +275,7 @@ def test_a_gap_in_seq_is_a_note_of_the_verdict(
     Path("gap.waypoints").write_text("\n".join(["QGC WPL 110", *lines]) + "\n")
     notes = [
         "Note: gap.waypoints:4: the sequence numbers have a gap before 3 (1 gap in all): ",
-        "Note: gap.waypoints:5: sequence number 3 is not higher than the one before (1 such line in all): ",
+        "Note: gap.waypoints:5: sequence number 3 is not above the previous line's number (1 such line in all): ",
     ]
     main(["check", "gap.waypoints", *more, "--json", "a.json", "--junit", "a.xml"])
     printed = capsys.readouterr().out

@@ -77,7 +77,7 @@ def test_the_same_log_gives_the_same_bytes(tmp_path: Path) -> None:
 def test_a_track_alone_needs_a_plan(tmp_path: Path, capsys: Output) -> None:
     log = kml(tmp_path / "a.kml")
     assert main(["check", str(log)]) == 2
-    said = "contains no mission; --plan names the mission that was planned"
+    said = "contains no mission; name the planned mission with --plan"
     assert capsys.readouterr().err == f"planfly: {log}: {said}\n"
 
 
@@ -202,7 +202,7 @@ def test_a_mission_that_is_in_the_log_in_part_is_judged_in_part(tmp_path: Path, 
             continue
         # Of one waypoint, or none, there is nothing to judge.
         where = " beyond item 1" if lost == 12 else ""
-        says = f"{log}: not judged{where}: {named}; --plan names the mission that was planned"
+        says = f"{log}: not judged{where}: {named}; name the planned mission with --plan"
         assert (code, error) == (2, f"planfly: {says}\n")
 
 

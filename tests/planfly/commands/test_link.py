@@ -143,7 +143,7 @@ def test_the_command_prints_answers_and_draws(log: Path, capsys: pytest.CaptureF
     place = ["--station", f"{origin.lat_deg},{origin.lon_deg}"]
     assert main(["link", str(log), *radio, *place, "--out", "drawn", "--json", "answer.json"]) == 4
     out = capsys.readouterr().out
-    assert "it is lowest on leg 0, to item 2, at 0 s" in out
+    assert "It is lowest on leg 0, to item 2, at 0 s" in out
     answer = json.loads(Path("answer.json").read_text(encoding="utf-8"))
     assert (answer["ok"], answer["exit_code"], answer["where"]) == (False, 4, "leg 0, to item 2")
     names = ("link.png", "link-map.png", "link-coverage.tif")
@@ -180,7 +180,7 @@ def test_the_coverage_has_the_margin_of_the_path_below_it(log: Path) -> None:
 def test_the_returns_from_an_outage_are_those_of_planfly_returns() -> None:
     """Judge each of ArduPlane's returns without the link as `planfly returns` judges it."""
     flight = example_log()
-    parameters = ArduPilotParameters.of_text("FS_GCS_ENABL 1\nFS_LONG_ACTN 1\n", "mine.param")
+    parameters = ArduPilotParameters.from_text("FS_GCS_ENABL 1\nFS_LONG_ACTN 1\n", "mine.param")
     origin = flight.setup.scenario.origin
     mission = replace(flight.setup.mission, home=Home(origin.lat_deg, origin.lon_deg, 0.0))
     setup = replace(flight.setup, autopilot=ArduPlane(parameters), mission=mission)

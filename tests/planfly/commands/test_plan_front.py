@@ -49,7 +49,7 @@ def test_a_front_without_choices_says_so(tmp_path: Path, capsys: pytest.CaptureF
     text = capsys.readouterr().out
     assert text.startswith("front of 1 safe plan\n")
     assert (
-        "  note    1 of the 10 requested: no other plan that was found gains more than 0.1% in length or energy, 1% in "
+        "  note    1 of the 10 requested plans: no further plan gains more than 0.1% in length or energy, 1% in "
         "exposure or 1 m in height above ground\n"
     ) in text
     assert [file.name for file in folder.glob("plan-*")] == ["plan-1.json"]
@@ -88,4 +88,6 @@ def test_a_front_that_its_budget_ended_says_so() -> None:
     front = plan_front(scenario, limits, 10, seed=1, default=default, stop=lambda: "budget")
     # The search stops after the first seed, which is the default plan.
     assert (front.ended, front.evaluations, len(front.plans)) == ("budget", 1, 1)
-    assert fewer_plans_line(front).startswith("1 of the 10 requested: stopped by the time budget after 1 evaluation;")
+    assert fewer_plans_line(front).startswith(
+        "1 of the 10 requested plans: the search was stopped by the time budget after 1 evaluation;"
+    )

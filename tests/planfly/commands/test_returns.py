@@ -152,7 +152,7 @@ def test_px4_returns_by_its_own_parameters(behind: Path, capsys: pytest.CaptureF
         out = capsys.readouterr().out
         assert not any(name in out for name in ARDUPLANES)
         assert "causes of a return: the pilot's RTL, RC lost (NAV_RCL_ACT 2)" in out
-        assert f"Below RTL_RETURN_ALT ({height} m above its destination) it first climbs to that height" in out
+        assert f"An aircraft below RTL_RETURN_ALT ({height} m above the destination) first climbs to this height" in out
         assert "returns are simulated in the mean wind, by PX4's control laws flying a point mass" in out
         assert "PX4's own return without the engine is not simulated" in out
         assert ("would help: RTL_RETURN_ALT 4" in out) is (height == 100)

@@ -151,7 +151,7 @@ def test_nobody_there_is_one_line(here: Path, capsys: pytest.CaptureFixture[str]
         ({"length": 10**20}, "Content-Length: 100,000,000,000,000,000,000: expected 1 to"),
         ({"garbage": True}, "the server's answer is not a readable GeoTIFF"),
         ({"moved": ("N46", "N47")}, "does not cover the area of its name: expected latitude 46..47, longitude 8..9"),
-        ({"odd": True}, "cannot be fetched: bytes 0-65535 were requested, and the server sent bytes 1-65535/"),
+        ({"odd": True}, "cannot be fetched: bytes 0-65535 were requested, but the server sent bytes 1-65535/"),
         ({"status": 404}, "the server has no tile for this area: open sea, or not a server of Copernicus GLO-30 tiles"),
     ],
 )

@@ -99,8 +99,8 @@ def test_an_interruption_says_what_is_kept_and_how_to_go_on(
         (["--resume", "--out", "campaign"], "there is no campaign to continue"),
         (["--out", "campaign"], "contains another campaign; --overwrite replaces it"),
         ([], "--resume continues it"),
-        (["--resume"], "held by another process"),
-        (["--overwrite"], "held by another process"),
+        (["--resume"], "locked by another process"),
+        (["--overwrite"], "locked by another process"),
     ],
 )
 def test_one_line_and_nothing_lost(
@@ -122,7 +122,7 @@ def test_one_line_and_nothing_lost(
     Path("campaign", "campaign.sqlite").write_bytes(b"another one's")
     before = table(Path("out", WINDS_DATABASE))
     holder = sqlite3.connect(Path("out", WINDS_DATABASE), isolation_level=None)
-    if words == "held by another process":
+    if words == "locked by another process":
         holder.execute("BEGIN IMMEDIATE")
     capsys.readouterr()
     assert main([*line, "--out", "out", *more]) == 2

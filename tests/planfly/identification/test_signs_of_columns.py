@@ -8,7 +8,7 @@ import pytest
 
 from aircraft.catalog import load_aircraft
 from aircraft.identification.alignment import Clocks
-from aircraft.identification.estimate import aligned_signals, fit_parameters
+from aircraft.identification.estimate import fit_parameters, make_aligned_signals
 from logs.importers.motion_log import read_motion
 from planfly.identification.base_numbers import base_model
 from planfly.identification.checks import check_estimate
@@ -25,8 +25,8 @@ def _check_signs(table: Path) -> None:
     """Estimate an Ultra Stick from a part of a flight, and check the estimate."""
     aircraft = load_aircraft("ultrastick25e")
     base, log = base_model(aircraft), read_motion(table)
-    part = flight_records(log, aircraft)[0].between(START_S, END_S)
-    signals = aligned_signals([part], [Clocks(servo_lag=base.servo_lag)], base)
+    part = flight_records(log, aircraft)[0].part_between(START_S, END_S)
+    signals = make_aligned_signals([part], [Clocks(servo_lag=base.servo_lag)], base)
     check_estimate(fit_parameters(signals, base), base, {}, table.name)
 
 

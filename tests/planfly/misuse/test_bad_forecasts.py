@@ -188,7 +188,7 @@ NETCDF: dict[str, tuple[Writer, tuple[str, ...]]] = {
     ),
     "geopotential heights that fall": (
         nc(lambda: aloft(heights=np.array([1500.0, 780.0, 100.0])[:, np.newaxis, np.newaxis])),
-        ("gh: the height of a pressure level is not above that of a higher pressure",),
+        ("gh: the height of a pressure level is not above the height of a higher pressure",),
     ),
     "other times": (
         nc(lambda: winds(hours=(24.0, 25.0, 26.0, 27.0))),

@@ -65,7 +65,7 @@ def test_a_strip_whose_height_only_the_map_knows_is_too_short() -> None:
     (text,) = said_of(landing_plan(length_m=200.0))
     assert math.hypot(55.0, 8.0) == pytest.approx(55.6, abs=0.05)
     assert "only 79 % of the landings" in text
-    assert "and the touchdown point one of 56 m" in text
+    assert "the standard deviation of the touchdown point along the strip is 56 m." in text
     # 2 x (30 m + 1.96 x 55.6 m) = 278 m; with a survey 2 x (30 m + 1.96 x 8 m) = 91.4 m.
     assert (
         "survey its altitude and state [landing] height_sd_m (then 100 m are enough), or use a strip of 280 m" in text

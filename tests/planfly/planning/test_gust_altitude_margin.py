@@ -113,7 +113,7 @@ def test_a_climb_leaves_less_and_the_plan_says_how_much_it_lacks() -> None:
     (problem,) = ensure_altitude_margin(plan, uav).certificate.problems
     lacks = needed(uav, 0.5) - 30.0
     assert (
-        f"downdrafts may take the aircraft {lacks:.0f} m into the clearance of 50 m on leg 1; less turbulence"
+        f"downdrafts may move the aircraft {lacks:.0f} m into the clearance of 50 m on leg 1. Less turbulence"
         in problem
     )
 
@@ -152,7 +152,7 @@ def test_an_end_that_lies_too_low_is_named_and_nothing_is_searched_for(over: flo
         found, uav, None if over > 0.0 else lambda limits: pytest.fail("searched for another")
     )
     (problem,) = plan.certificate.problems
-    assert ("at its start; less turbulence" in problem) is (over < 0.0)
+    assert ("at its start. Less turbulence" in problem) is (over < 0.0)
     assert ("a start that is 1 m higher would help" in problem) is (over < 0.0)
 
 
@@ -177,7 +177,7 @@ def test_below_a_height_limit_more_climb_is_left_in_place_of_height() -> None:
     assert not find_shortfalls(plan, uav)
     level = plan_along(uav, scenario, [scenario.start, scenario.destination])
     (problem,) = ensure_altitude_margin(level, uav).certificate.problems
-    assert "or a higher limit on its height would help" in problem
+    assert "or a higher limit on the height would help" in problem
 
 
 @pytest.mark.parametrize(("ground", "enough"), [(3000.0, True), (4600.0, False)])
@@ -233,7 +233,7 @@ MAST = {"name": "mast", "kind": "exclusion", "east_m": 4000.0, "north_m": 0.0, "
 @pytest.mark.parametrize(
     ("tables", "into"),
     [
-        ({"threats": [SAM]}, "the reach of sam"),
+        ({"threats": [SAM]}, "the kill zone of sam"),
         ({"zones": [MAST | {"ceiling_amsl_m": GROUND + 100.0}]}, "mast"),
     ],
     ids=["missile", "zone"],
@@ -245,7 +245,7 @@ def test_what_lies_below_counts(tables: dict[str, Any], into: str) -> None:
     plan = plan_along(uav, scenario, [scenario.start, scenario.destination])
     assert plan.safe
     (problem,) = ensure_altitude_margin(plan, uav).certificate.problems
-    assert f"downdrafts may take the aircraft {needed(uav) - 20.0:.0f} m into {into} on leg 0;" in problem
+    assert f"downdrafts may move the aircraft {needed(uav) - 20.0:.0f} m into {into} on leg 0." in problem
     made = make_plan(scenario, uav, SEED)
     assert made.safe
     assert ensure_altitude_margin(made, uav) is made
@@ -462,13 +462,13 @@ def test_a_plan_below_a_maximum_height_is_made_anew() -> None:
     assert not find_shortfalls(plan, uav)
     assert np.interp(4000.0, plan.waypoints[:, 0], plan.waypoints[:, 2]) < 145.0
     (problem,) = make_plan(band_of(161.0), uav, SEED).certificate.problems
-    assert "in moderate turbulence updrafts may take the aircraft" in problem
+    assert "in moderate turbulence, updrafts may move the aircraft" in problem
     assert "above the allowed 161 m above ground at its start" in problem
     assert "an aircraft that sinks faster or a start that is 2 m lower would help" in problem
     held = band_of(164.0)
     (problem,) = ensure_altitude_margin(plan_path(held, uav.limits, seed=SEED), load_uav(held)).certificate.problems
     assert "on leg " in problem
-    assert "an aircraft that sinks faster or a higher limit on its height would help" in problem
+    assert "an aircraft that sinks faster or a higher limit on the height would help" in problem
 
 
 def test_an_end_too_near_the_maximum_height_is_not_searched_for() -> None:

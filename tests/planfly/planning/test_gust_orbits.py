@@ -108,7 +108,7 @@ def test_a_plan_that_is_made_anew_for_updrafts_has_few_waypoints_too() -> None:
     assert find_shortfalls(first, uav)
     plan = make_plan(scenario, uav, SEED)
     assert expected_orbits(plan, uav.autopilot, limits) <= MAX_EXPECTED_ORBITS
-    assert plan.safe or "updrafts may take the aircraft" in plan.certificate.problems[0]
+    assert plan.safe or "updrafts may move the aircraft" in plan.certificate.problems[0]
 
 
 def test_a_plan_that_needs_more_says_what_would_help(airframe_of_x8: Uav) -> None:
@@ -120,7 +120,7 @@ def test_a_plan_that_needs_more_says_what_would_help(airframe_of_x8: Uav) -> Non
     plan = limit_waypoint_orbits(found, uav)
     assert not plan.feasible
     (problem,) = plan.certificate.problems
-    assert "in moderate turbulence PX4 circles at a waypoint if gusts push it off the waypoint's altitude" in problem
+    assert "in moderate turbulence, PX4 circles at a waypoint if gusts push it off the waypoint's altitude" in problem
     value = float(problem.split("NAV_FW_ALT_RAD of ")[1].split(" m ")[0])
     enough, less = (tight.with_parameters(NAV_FW_ALT_RAD=asked) for asked in (value, value - 5.0))
     assert expected_orbits(plan, enough, uav.limits) <= MAX_EXPECTED_ORBITS
@@ -142,7 +142,7 @@ def test_fewer_and_sharper_corners_stay_in_the_corridor(aside: float, taken: boo
     assert (settled is corner) is taken
     assert settled.feasible is taken
     wide = [
-        problem for problem in settled.certificate.problems if "m off the legs at the corner of waypoint 1" in problem
+        problem for problem in settled.certificate.problems if "m from the legs at the corner of waypoint 1" in problem
     ]
     assert (len(wide), taken) in ((0, True), (1, False))
 

@@ -27,7 +27,7 @@ with warm_up():
         wrap(4.0)
 """
 SAID = "compiling numeric kernels, which later runs load"
-WAY_OUT = "NUMBA_CACHE_DIR=FOLDER names one that can"
+WAY_OUT = "set NUMBA_CACHE_DIR to a folder that can be written"
 
 
 @pytest.fixture

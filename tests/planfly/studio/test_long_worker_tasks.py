@@ -78,7 +78,7 @@ def test_a_campaign_names_what_fails_as_the_verdict_does(
     answer = long_worker_tasks.run_campaign_task(opened(tmp_path), lambda *_: None)
     assert answer["lines"][0] == "loss of control fails in 3"
     # As the command states it: 0.025 ** (1 / 3) is 0.292 (Clopper and Pearson).
-    assert answer["headline"] == "0 of 3 flights are flyable: 0% to 71% at 95 %"
+    assert answer["headline"] == "0 of 3 flights are flyable (probability 0% to 71% at 95 % confidence)"
 
 
 def test_a_battery_is_found(few_flights: None, tmp_path: Path) -> None:

@@ -184,8 +184,10 @@ def test_what_one_threat_and_a_map_lack_is_said_in_the_singular(
     session, _ = open_session("m.waypoints", MissionOptions(scenario="s.toml"))
     session.edit(messages.Raise(kind="raise", rev=session.rev, by=10.0))
     losses = session.save("waypoints").losses
-    assert losses == ("the scenario's 1 threat: planfly export writes a fence of them",)
-    assert session.save("kml").losses == ("the commands, speeds and frames of the items: it is only a map",)
+    assert losses == ("the scenario's 1 threat: planfly export writes them as a fence",)
+    assert session.save("kml").losses == (
+        "the commands, speeds and frames of the items, because the file is only a map",
+    )
 
 
 def test_a_download_leaves_the_file_unsaved(tmp_path: Path) -> None:
@@ -292,7 +294,7 @@ def test_edits_of_a_file_that_has_changed_since_are_set_aside_and_this_is_said(t
     assert (restored, again.is_edited, kept.exists()) == (False, False, False)
     (aside,) = tmp_path.glob("m-earlier-*.json")
     assert aside.read_bytes() == edited
-    said = f"the mission file has changed since; 2 earlier edits were set aside in {aside}"
+    said = f"the mission file has changed since its last edit in the studio; 2 earlier edits were set aside in {aside}"
     assert again.unused_text == said
     assert said in again.mission_message()["notes"]
     # The settings do not depend on the file's content.
@@ -345,7 +347,9 @@ def test_an_opened_plan_of_another_autopilot_is_flown_by_it(tmp_path: Path) -> N
     session.change_settings(messages.Settings(kind="settings", wind_speed=6.0))
     session.open(open_document(str(plan), session.options))
     assert (session.settings_json()["autopilot"], session.settings_json()["wind_speed"]) == ("px4", 6.0)
-    assert "kept settings not used: autopilot ardupilot \u2192 px4" in "\n".join(session.mission_message()["notes"])
+    assert "autosaved settings not used: autopilot ardupilot \u2192 px4" in "\n".join(
+        session.mission_message()["notes"]
+    )
 
 
 def test_a_revert_reads_the_file_that_another_program_has_changed(tmp_path: Path) -> None:
@@ -455,9 +459,7 @@ def test_an_option_of_the_command_replaces_a_kept_setting_and_this_is_said(
     assert (shown["wind_speed"], shown["wind_from"], shown["turbulence"]) == (3.0, 90.0, "none")
     # What no option sets is kept.
     assert (shown["airspeed"], shown["parameters"]) == (26.0, {"WP_RADIUS": 55.0})
-    said = (
-        "kept settings replaced by the command, and kept as they are now: wind 9 \u2192 3; turbulence light \u2192 none"
-    )
+    said = "autosaved settings replaced by options of the command: wind 9 \u2192 3; turbulence light \u2192 none"
     assert said in windy.mission_message()["notes"]
     # Another aircraft has another airspeed, another file of parameters replaces those that were set.
     (tmp_path / "mine.parm").write_text("WP_RADIUS 70\n", encoding="utf-8")
@@ -482,7 +484,7 @@ def test_an_option_of_the_command_replaces_a_kept_setting_and_this_is_said(
     # The settings of one scenario are not those of another.
     third, restored = open_session(str(file), MissionOptions(scenario="jacksboro"), kept)
     assert not restored
-    assert third.replaced_text == "kept settings not used: all of them, which belong to jacksboro-air"
+    assert third.replaced_text == "autosaved settings not used: all of them, which belong to jacksboro-air"
     assert not open_session(str(file), world, kept)[0].replaced_text
 
 

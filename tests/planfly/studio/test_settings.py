@@ -36,7 +36,7 @@ def test_settings_are_judged_at_once() -> None:
     assert session.settings_json()["ceiling"] == session.judged.setup.scenario.ceiling == 1300.0
     set_in(session, autopilot="px4", aircraft="aerosonde")
     assert session.settings_json()["autopilot"] == "px4"
-    changed = "the settings changed here: autopilot, wind, minimum clearance, ceiling"
+    changed = "the settings changed in the studio: autopilot, wind, minimum clearance, ceiling"
     assert changed in session.save("waypoints").losses
 
 
@@ -53,7 +53,7 @@ def test_only_settings_that_differ_from_the_opening_are_lost(tmp_path: Path) -> 
         ({"turbulence": "light"}, "turbulence"),
     ):
         set_in(session, **change)
-        assert session.save("waypoints").losses == (f"the settings changed here: {name}",)
+        assert session.save("waypoints").losses == (f"the settings changed in the studio: {name}",)
         # Changed back, nothing differs, although the scenario now states the value.
         values = change.get("limits", change)
         own = shown["limits"] if "limits" in change else shown
@@ -76,7 +76,7 @@ def test_parameters_are_flown_with_and_saved() -> None:
     set_in(session, without=["ROLL_LIMIT_DEG"])
     assert session.settings_json()["parameters"] == {"WP_RADIUS": 60.0}
     assert session.save("parm").data.splitlines()[1:] == [b"WP_RADIUS 60"]
-    assert any("1 parameter set here" in line for line in session.save("plan").losses)
+    assert any("1 parameter set in the studio" in line for line in session.save("plan").losses)
     # A change of the weather leaves them, and another autopilot has others.
     set_in(session, wind_speed=2.0)
     assert session.settings_json()["parameters"] == {"WP_RADIUS": 60.0}

@@ -219,7 +219,9 @@ def test_lines_over_unknown_ground_are_neither_usable_nor_lost_and_nothing_is_tr
     open_, failed = result_of(usable, unknown, unknown), result_of(usable, unknown, lost)
     assert (open_.lost, open_.usable, failed.lost) == (False, False, True)
     assert open_.headline == "1 of 3 photo lines can be used; 2 lie outside the terrain data and cannot be judged"
-    assert failed.headline.endswith("1 lies outside the terrain data and cannot be judged; line 3 is the worst: 80 %")
+    assert failed.headline.endswith(
+        "1 lies outside the terrain data and cannot be judged; line 3 is the worst: 80 % usable"
+    )
     [text] = open_.no_remedy_lines
     assert text.startswith("nothing was tried: 2 photo lines outside the data of ")
     assert text.endswith(" an elevation file of the whole survey is needed (--terrain)")

@@ -218,9 +218,9 @@ def test_a_first_estimate_is_the_last_ones_pace(
     run(clock, "planning a", "planning", 20, 0.5)
     assert capsys.readouterr().err.splitlines()[0] == "planning a ... (no estimate yet)"
     run(clock, "planning b", "planning", 60, 1.0)
-    assert capsys.readouterr().err.splitlines()[0] == "planning b ... (about 30 s, at the pace of the last run here)"
+    assert capsys.readouterr().err.splitlines()[0] == "planning b ... (about 30 s, at the rate of the last run)"
     run(clock, "planning c", "planning", 60, 1.0)
-    assert capsys.readouterr().err.splitlines()[0] == "planning c ... (about 60 s, at the pace of the last run here)"
+    assert capsys.readouterr().err.splitlines()[0] == "planning c ... (about 60 s, at the rate of the last run)"
     with progress("flying") as advance:
         advance(0.0, 60.0, "")
     assert capsys.readouterr().err.splitlines()[0] == "flying ... (no estimate yet)"
@@ -233,7 +233,7 @@ def test_work_that_counted_nothing_the_last_time_is_said_to_take_as_long(
     clock = Clock(monkeypatch)
     run(clock, "planning", "planning", 0, 0.5)
     run(clock, "planning", "planning", 20, 0.5)
-    assert capsys.readouterr().err.splitlines()[2] == "planning ... (the last run here took 7 s)"
+    assert capsys.readouterr().err.splitlines()[2] == "planning ... (the last run took 7 s)"
 
 
 def test_what_failed_or_had_a_stage_within_is_no_measure(times: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -285,7 +285,7 @@ def test_a_stage_that_reports_nothing_is_named_and_timed(
         left.store_duration()
         lines.append(capsys.readouterr().err.splitlines())
     told = ["drawing: 61 s so far", "drawing: 121 s so far", "drawing: done in 130.0 s"]
-    assert lines == [["drawing ... (no estimate)", *told], ["drawing ... (the last run here took 2 min)", *told]]
+    assert lines == [["drawing ... (no estimate)", *told], ["drawing ... (the last run took 2 min)", *told]]
 
 
 def test_what_is_counted_late_has_its_estimate_then(
@@ -299,8 +299,8 @@ def test_what_is_counted_late_has_its_estimate_then(
     shown.advance(0.0, 4.0, "0 of 4 flights")
     shown.advance(0.0, 4.0, "0 of 4 flights")
     assert capsys.readouterr().err.splitlines() == [
-        "flying ... (the last run here took 13 s)",
-        "flying: 0 of 4 flights, about 12 s, at the pace of the last run here",
+        "flying ... (the last run took 13 s)",
+        "flying: 0 of 4 flights, about 12 s, at the rate of the last run",
     ]
 
 

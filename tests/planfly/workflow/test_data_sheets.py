@@ -18,7 +18,12 @@ from flight.dynamics.envelope_tables import load_envelope
 from flight.dynamics.fdm import Fdm, Variation
 from flight.dynamics.trim import fastest_level_flight, full_throttle_climb, slowest_level_flight, steady_flight
 from flight.simulation.simulate import Flight, fly_to_end
-from planfly.workflow.data_sheets import factor_effect, make_data_sheet_folder, stated_parameters, with_parameters
+from planfly.workflow.data_sheets import (
+    factor_effect,
+    make_data_sheet_folder,
+    read_aircraft_parameters,
+    with_parameters,
+)
 from tests.setups import setup_maker
 from world.errors import FlightError, ParameterError
 
@@ -55,7 +60,9 @@ def test_the_model_does_what_the_sheet_says(foam: Aircraft) -> None:
 def test_a_battery_that_level_flight_empties_at_once_is_refused(tmp_path: Path) -> None:
     """25 kg at 25 m/s with a drag of a twentieth of the weight need 300 W and more: 0.6 Wh last for 7 s at most."""
     sheet = DataSheet(mass=25.0, span=4.0, cruise=25.0, stall=16.0, volts=3.0, energy=0.6 * 3600.0)
-    with pytest.raises(FlightError, match=r"^battery 3 V, 0\.6 Wh: level flight .* empties it in [1-7] s: expected at"):
+    with pytest.raises(
+        FlightError, match=r"^battery 3 V, 0\.6 Wh: level flight .* empties the battery in [1-7] s; expected at"
+    ):
         make_data_sheet_folder(tmp_path / "heavy", sheet)
     assert not (tmp_path / "heavy").exists()
 
@@ -152,7 +159,7 @@ def test_parameters_are_data(tmp_path: Path) -> None:
     file = tmp_path / "mine.parm"
     # TRIM_THROTTLE 45 is ArduPlane's own value and says nothing.
     file.write_text("AIRSPEED_CRUISE 16\nARSPD_FBW_MIN 12\nTECS_CLMB_MAX 4\nTRIM_THROTTLE 45\nLIM_ROLL_CD 3000\n")
-    stated = stated_parameters(file).values
+    stated = read_aircraft_parameters(file).values
     assert stated == {"AIRSPEED_CRUISE": 16.0, "AIRSPEED_MIN": 12.0, "TECS_CLMB_MAX": 4.0, "ROLL_LIMIT_DEG": 30.0}
     made = make_data_sheet_folder(tmp_path / "mine", DataSheet(2.1, 1.6, 0.0, 0.0), file)
     assert (made.airspeed, made.stall_speed) == (16.0, 10.0)
@@ -172,7 +179,7 @@ def test_parameters_of_px4_are_the_same_data_by_its_own_names(tmp_path: Path) ->
     file = tmp_path / "mine.params"
     lines = ("FW_AIRSPD_TRIM 16", "FW_AIRSPD_MIN 13", "FW_AIRSPD_STALL 10", "FW_T_CLMB_MAX 4", "FW_R_LIM 40")
     file.write_text("".join(f"1\t1\t{line.replace(' ', chr(9))}\t9\n" for line in lines), encoding="ascii")
-    stated = stated_parameters(file)
+    stated = read_aircraft_parameters(file)
     assert stated.values == {
         "AIRSPEED_CRUISE": 16.0,
         "AIRSPEED_MIN": 13.0,
@@ -186,7 +193,7 @@ def test_parameters_of_px4_are_the_same_data_by_its_own_names(tmp_path: Path) ->
     assert math.degrees(made.max_bank) == pytest.approx(40.0)
     assert "From the parameter file: FW_AIRSPD_TRIM 16, " in (made.folder / "README.md").read_text()
     file.write_text("1\t1\tFW_AIRSPD_TRIM\t15\t9\n1\t1\tFW_R_LIM\t50\t9\n", encoding="ascii")
-    assert stated_parameters(file).values == {}
+    assert read_aircraft_parameters(file).values == {}
 
 
 def test_a_parameter_file_of_no_aeroplane_is_refused(tmp_path: Path) -> None:
@@ -194,7 +201,7 @@ def test_a_parameter_file_of_no_aeroplane_is_refused(tmp_path: Path) -> None:
         file = tmp_path / "other.params"
         file.write_text(text, encoding="ascii")
         with pytest.raises(ParameterError, match=r"^[^\n]+$"):
-            stated_parameters(file)
+            read_aircraft_parameters(file)
 
 
 def test_what_the_sheet_states_applies_instead_of_the_file(tmp_path: Path) -> None:
@@ -207,15 +214,15 @@ def test_what_the_sheet_states_applies_instead_of_the_file(tmp_path: Path) -> No
     # The autopilot's own minimum stays, above the stall that the sheet states.
     assert "AIRSPEED_MIN 13\n" in parameters
     assert "From the parameter file: ROLL_LIMIT_DEG 50.\n" in readme
-    told = "because the data sheet states it: AIRSPEED_CRUISE 19 (cruise 18 m/s), AIRSPEED_MIN 13 (stall 10 m/s).\n"
-    assert told in readme
+    assert "because the data sheet states these values: AIRSPEED_CRUISE 19 (cruise 18 m/s), AIRSPEED_MIN 13" in readme
+    assert ", AIRSPEED_MIN 13 (stall 10 m/s).\n" in readme
 
 
 def test_the_climb_of_a_parameter_file_is_that_at_its_throttle_limit(tmp_path: Path) -> None:
     """ArduPlane's reference: TECS_CLMB_MAX is the best climb rate with the throttle at THR_MAX, at cruise speed."""
     file = tmp_path / "mine.parm"
     file.write_text("AIRSPEED_CRUISE 16\nAIRSPEED_MIN 12\nTECS_CLMB_MAX 3\nTHR_MAX 75\n")
-    assert stated_parameters(file).values["THR_MAX"] == 75.0
+    assert read_aircraft_parameters(file).values["THR_MAX"] == 75.0
     made = make_data_sheet_folder(tmp_path / "mine", DataSheet(2.1, 1.6, 0.0, 0.0), file)
     fdm = Fdm(made, is_tested=True)
     # 3 m/s at 16 m/s take three quarters of the throttle.

@@ -103,8 +103,11 @@ TO_ARDUPLANE = "but PX4 is to fly; --autopilot ardupilot simulates ArduPlane ins
         ("plane.plan --autopilot px4", f"plane.plan: written for ArduPilot (firmwareType 3), {TO_ARDUPLANE}"),
         ("px4.plan --params plane.param", "px4.plan: written for PX4 (firmwareType 12), but"),
         ("plane.plan --params px4.params", "plane.plan: written for ArduPilot (firmwareType 3), but"),
-        ("m.waypoints --params copter.param", "copter.param: parameters of a multicopter or helicopter (ArduPilot): "),
-        ("m.waypoints --params mixed.param", "FW_R_TC is PX4's and TECS_CLMB_MAX ArduPilot's: --autopilot names"),
+        (
+            "m.waypoints --params copter.param",
+            "copter.param: the parameters are for a multicopter or helicopter (ArduPilot): ",
+        ),
+        ("m.waypoints --params mixed.param", "FW_R_TC is PX4's and TECS_CLMB_MAX is ArduPilot's: --autopilot names"),
         ("copter.plan", "copter.plan: mission.vehicleType: 2: a multicopter or helicopter"),
         ("vtol.plan", "vtol.plan: mission.vehicleType: 22: a VTOL aircraft"),
         ("tracker.plan", "tracker.plan: mission.vehicleType: 5: another vehicle"),

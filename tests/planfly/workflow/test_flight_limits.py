@@ -52,7 +52,7 @@ def test_a_log_has_a_limit(long: Path, capsys: pytest.CaptureFixture[str]) -> No
     argv = ["fly", long.name, "--scenario", "field.toml", "--guidance", "path", "--log", "f.mcap"]
     argv += ["--max-log", "1.5"]
     assert main(argv) == 4
-    assert "log limit: 1.5 MB are written; --max-log raises it" in capsys.readouterr().out
+    assert "log limit: the log has reached 1.5 MB; --max-log raises the limit" in capsys.readouterr().out
     log = read_log(Path("f.mcap"))
     assert log.complete
     assert 1.5e6 < Path("f.mcap").stat().st_size < 2.5e6
@@ -78,7 +78,7 @@ def test_energy_ends_a_flight(long: Path) -> None:
     assert short.ended == "nothing is left in the battery or the tank"
     assert float(short.track.energy[-1]) == pytest.approx(0.7 * used, rel=1e-3)
     none = fly_and_judge(dataclasses.replace(opened, battery=0.1 * used))
-    assert (len(none.track), none.ended) == (0, "not started: it takes 10 times the energy carried")
+    assert (len(none.track), none.ended) == (0, "not started: the mission needs 10 times the energy carried")
 
 
 def opened_calm(path: Path) -> FlightSetup:

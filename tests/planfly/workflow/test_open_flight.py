@@ -246,7 +246,7 @@ def test_the_judge_finds_the_fence_kept() -> None:
     setup = setup_of(*CORNER, threats=threats)
     mission, notes = add_plan_fence(setup)
     assert any(
-        note.startswith("omitted from the fence, because the mission passes above or below: m198;") for note in notes
+        note.startswith("omitted from the fence, because the mission passes above or below: m198. ") for note in notes
     )
 
     def failed(fences: Any) -> list[str]:
@@ -306,7 +306,7 @@ def test_a_parameter_that_is_assumed_for_a_landing_sequence_is_not_of_the_file(t
     assert isinstance(setup.autopilot, ArduPlane)
     # Also in a log, in another release, and for the program, which would not arm without it.
     restored = ArduPlane.restore(setup.autopilot.store())
-    for found in (setup.autopilot.parameters, restored.parameters, setup.autopilot.parameters.in_release("4.6")):
+    for found in (setup.autopilot.parameters, restored.parameters, setup.autopilot.parameters.with_release("4.6")):
         assert (found.by_origin("assumed"), found.by_origin("file")) == ({"RTL_AUTOLAND": 1.0}, {})
     assert load_user_parameters(setup) == {"RTL_AUTOLAND": 1.0}
     assert any("RTL_AUTOLAND 1 is assumed" in note for note in setup.route.notes)

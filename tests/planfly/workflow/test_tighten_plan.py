@@ -67,7 +67,7 @@ def test_a_plan_over_the_hill_becomes_one_round_it(tmp_path: Path, capsys: pytes
     assert 2 <= len(rounds) <= 4
     assert rounds[0]["flyable"] is False
     assert rounds[-1]["flyable"] is True
-    assert rounds[-1]["next"] == "done: it flies"
+    assert rounds[-1]["next"] == "done: the plan is flyable"
     assert "limits.max_climb_deg: 30.0 to aircraft" in str(rounds[1]["changes"])
     assert json.loads((out / "verdict.json").read_text(encoding="utf-8"))["flyable"] is True
     for number in range(len(rounds) - 1):

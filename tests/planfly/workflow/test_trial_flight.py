@@ -38,7 +38,9 @@ def test_a_trial_is_flown_when_it_is_asked_for_and_once(monkeypatch: pytest.Monk
     ]
 
 
-@pytest.mark.parametrize(("ratio", "reason"), [(1.99, ""), (2.01, "not started: it takes 2 times the energy carried")])
+@pytest.mark.parametrize(
+    ("ratio", "reason"), [(1.99, ""), (2.01, "not started: the mission needs 2 times the energy carried")]
+)
 def test_a_flight_of_more_than_twice_the_energy_carried_is_not_begun(
     ratio: float, reason: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -61,7 +61,7 @@ def test_a_zone_beside_the_way(made: Made, more: float, ok: bool) -> None:
 
 def test_what_fails_names_the_zone_and_the_leg(made: Made) -> None:
     assert certificate(made(zones=tower(4.0)), STRAIGHT).problems == (
-        "leg 0: 4.0 m from mast, 10 m horizontally or 5 m vertically required",
+        "leg 0: 4.0 m from mast; 10 m horizontally or 5 m vertically are required",
     )
     assert certificate(made(zones=tower(-9.0)), STRAIGHT).problems == ("leg 0: 9.0 m inside mast",)
 
@@ -71,12 +71,13 @@ def test_what_fails_at_several_places_is_one_line_the_worst_first(made: Made) ->
     path = np.array([[0.0, 0.0, 150.0], [1500.0, 0.0, 150.0], [3000.0, 0.0, 156.0]])
     low = {"max_height_m": 153.0, "min_clearance_m": 30}
     assert certificate(made(limits=low), path).problems == (
-        "leg 1: 156.0 m above ground at its highest, 153 m allowed, 5.0 m of margin required (also turn at waypoint 1)",
+        "leg 1: 156.0 m above ground at its highest point; at most 153 m minus a margin of 5.0 m are allowed"
+        " (also turn at waypoint 1)",
     )
     near, far = tower(1.0, 2250.0)[0] | {"name": "near"}, tower(4.0, 750.0)[0] | {"name": "far"}
     assert certificate(made(zones=[near, far]), path).problems == (
-        "leg 0: 4.0 m from far, 10 m horizontally or 5 m vertically required",
-        "leg 1: 1.0 m from near, 10 m horizontally or 5 m vertically required",
+        "leg 0: 4.0 m from far; 10 m horizontally or 5 m vertically are required",
+        "leg 1: 1.0 m from near; 10 m horizontally or 5 m vertically are required",
     )
 
 

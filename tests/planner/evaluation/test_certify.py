@@ -101,7 +101,7 @@ MARGIN_OF_PROBLEM = (
     (r" m long", "available_length"),
     (r": (climbs|sinks) ", "slope"),
     (r"at its lowest|leaves the terrain", "clearance"),
-    (r"outside the area", "bounds"),
+    (r"beyond the edge of the area", "bounds"),
     (r"at its highest", "headroom"),
     (r"", "zone_distance"),
 )

@@ -21,10 +21,10 @@ def inside(rows: Floats) -> bool:
 
 
 def test_first_rows_fill_the_boxes_and_gather_at_the_upper_side_where_asked() -> None:
-    rows = sampling().first(400)
+    rows = sampling().draw_first(400)
     assert inside(rows)
     np.testing.assert_allclose(rows.mean(axis=1), 0.5 * (LOWER + UPPER), atol=1.0)
-    rows = sampling().first(4000, np.array([0.0, 0.25]))
+    rows = sampling().draw_first(4000, np.array([0.0, 0.25]))
     assert inside(rows)
     share = (rows[..., 1] == UPPER[:, None, 1]).mean()
     # A quarter of the box beyond it is a fifth of all draws.
@@ -34,8 +34,8 @@ def test_first_rows_fill_the_boxes_and_gather_at_the_upper_side_where_asked() ->
 
 def test_the_same_seed_gives_the_same_rows() -> None:
     one, two, other = sampling(3), sampling(3), sampling(4)
-    np.testing.assert_array_equal(one.first(9), two.first(9))
-    assert not np.array_equal(one.first(9), other.first(9))
+    np.testing.assert_array_equal(one.draw_first(9), two.draw_first(9))
+    assert not np.array_equal(one.draw_first(9), other.draw_first(9))
 
 
 def test_rows_that_are_not_allowed_are_drawn_again() -> None:
@@ -43,7 +43,7 @@ def test_rows_that_are_not_allowed_are_drawn_again() -> None:
         return np.asarray((rows[:, 1] < 0.0) | (groups == 1))
 
     search = NicheSampling(LOWER, UPPER, left, np.random.default_rng(1))
-    rows = search.first(200)
+    rows = search.draw_first(200)
     # Half of the draws are allowed, and each has nine: one of five hundred is not.
     assert (rows[0, :, 1] < 0.0).mean() > 0.97
     assert 0.3 < (rows[1, :, 1] < 0.0).mean() < 0.7
@@ -58,7 +58,7 @@ def test_the_best_that_lie_apart_are_kept_behind_the_elite() -> None:
     rows = np.stack([group, group + np.array([5.0, 0.0])])
     costs = np.array([[1.0, 2.0, 3.0, 4.0, np.inf]] * 2)
     elite = np.array([[0.5, 0.5], [9.5, 9.5]])
-    out = sampling().next(rows, costs, 12, deviation, np.inf, elite)
+    out = sampling().draw_next(rows, costs, 12, deviation, np.inf, elite)
     assert inside(out)
     for g in range(2):
         np.testing.assert_array_equal(out[g, 0], elite[g])
@@ -75,14 +75,14 @@ def test_a_row_that_costs_too_much_is_kept_only_to_have_a_few() -> None:
     rows, costs = np.stack([group, group + np.array([5.0, 0.0])]), np.tile(np.arange(10.0), (2, 1))
     elite = np.array([[2.5, 9.0], [7.5, 9.0]])
     for most, kept in ((6.0, 8), (1.0, MIN_SELECTED_COUNT)):
-        out = sampling().next(rows, costs, 30, np.array([0.1, 0.1]), most, elite)
+        out = sampling().draw_next(rows, costs, 30, np.array([0.1, 0.1]), most, elite)
         same = [sum((row == old).all() for old in group) for row in out[0]]
         assert sum(same) == kept - 1
 
 
 def test_at_most_half_of_the_rows_are_kept() -> None:
-    rows = sampling().first(50)
+    rows = sampling().draw_first(50)
     costs = np.tile(np.arange(50.0), (2, 1))
-    out = sampling(2).next(rows, costs, 20, np.array([1e-3, 1e-3]), np.inf, rows[:, 49].copy())
+    out = sampling(2).draw_next(rows, costs, 20, np.array([1e-3, 1e-3]), np.inf, rows[:, 49].copy())
     same = [(out[0, :, None] == rows[0]).all(axis=2).any(axis=1)]
     assert np.sum(same) == 10

@@ -10,7 +10,14 @@ import pytest
 from aircraft.path_limits import Limits
 from planner.evaluation.problem import CERTIFIED_BUFFER_M, make_problem
 from planner.plan import Certificate, Plan
-from planner.search.explain_failure import closed_bands, explain_failure, max_altitude, separating_zones, violated_zones
+from planner.search.explain_failure import (
+    describe_closed_bands,
+    explain_failure,
+    find_separating_zones,
+    max_altitude,
+    nearest_missile_text,
+    violated_zones,
+)
 from planner.search.plan_path import plan_path
 from tests.setups import with_path
 from world.scenario import Scenario
@@ -28,7 +35,7 @@ def wall(low: float, high: float, name: str = "wall", **levels: float) -> dict[s
 
 
 def names(small: Callable[..., Scenario], *zones: dict[str, Any], **tables: Any) -> tuple[str, ...]:
-    closed = separating_zones(small(**({"terrain": FLAT, "threats": [], "zones": list(zones)} | tables)))
+    closed = find_separating_zones(small(**({"terrain": FLAT, "threats": [], "zones": list(zones)} | tables)))
     return () if closed is None else closed.zones
 
 
@@ -72,7 +79,7 @@ def failed_plan(scenario: Scenario) -> Plan:
 def test_separating_zones_are_named(small: Callable[..., Scenario]) -> None:
     closed = small(terrain=FLAT, threats=[], zones=[wall(-3000, 3000)])
     assert explain_failure(failed_plan(closed))[:2] == [
-        "zones block every route (gaps narrower than 47 m count as closed): wall",
+        "zones block every route: wall (gaps narrower than 47 m are treated as closed)",
         "the best path violates: wall",
     ]
     beside = small(terrain=FLAT, threats=[], zones=[wall(-3000, 2000), wall(2500, 2600, "other")])
@@ -100,7 +107,7 @@ Small = Callable[..., Scenario]
 def test_a_band_of_the_limits(more: float, said: list[str], small: Small, make_limits: MakeLimits) -> None:
     limits = {"min_clearance_m": 145.0, "max_height_m": 145.0 + 2.0 * CERTIFIED_BUFFER_M + more}
     scenario = small(**GROUND, limits=limits)
-    lines = closed_bands(make_problem(scenario, make_limits(scenario)))
+    lines = describe_closed_bands(make_problem(scenario, make_limits(scenario)))
     assert all(f" is {end}: " in line for line, end in zip(lines, said, strict=True))
     assert all("min_clearance_m 145 m" in line and "max_height_m" in line for line in lines)
 
@@ -110,10 +117,10 @@ def test_an_inclusions_band_is_named_where_the_plan_cannot_keep_both_edges(
 ) -> None:
     zone = {"name": "corridor", "kind": "inclusion", "east_m": 3000, "north_m": 0, "radius_m": 8000}
     scenario = small(**GROUND, limits={"min_clearance_m": 148.0}, zones=[zone | {"ceiling_agl_m": 151.0}])
-    (line,) = closed_bands(make_problem(scenario, make_limits(scenario)))
-    assert "m too low for a plan's margins above the clearance of 148 m and below its ceiling at 151 m" in line
+    (line,) = describe_closed_bands(make_problem(scenario, make_limits(scenario)))
+    assert "m too low: a plan needs margins above the clearance of 148 m and below the zone's ceiling at 151 m" in line
     wide = small(**GROUND, limits={"min_clearance_m": 100.0}, zones=[zone | {"ceiling_agl_m": 200.0}])
-    assert closed_bands(make_problem(wide, make_limits(wide))) == []
+    assert describe_closed_bands(make_problem(wide, make_limits(wide))) == []
 
 
 def test_the_lowest_ceiling_is_named(small: Small, make_limits: MakeLimits) -> None:
@@ -167,10 +174,10 @@ def test_obstacles_that_block_every_route_are_named(
     assert not plan.feasible
     lines = explain_failure(plan)
     assert "terrain blocks the whole width" in lines[0]
-    assert "ceiling is 450 m" in lines[0]
+    assert "ceiling is at 450 m AMSL" in lines[0]
     assert "turn back or circle to climb were searched" in lines[-1]
     alone = plan_path(walled, make_limits(walled), seed=1, algorithm="umda")
-    assert "a route that must turn back was not searched" in explain_failure(alone)[-1]
+    assert "it searched no route that turns back" in explain_failure(alone)[-1]
 
 
 def test_of_a_path_that_fails_by_its_autopilot_alone_nothing_is_said(small: Small, make_limits: MakeLimits) -> None:
@@ -183,3 +190,20 @@ def test_of_a_path_that_fails_by_its_autopilot_alone_nothing_is_said(small: Smal
     assert explain_failure(circles, make_limits(scenario)) == []
     stray = with_path(circles, plan.waypoints - [0.0, 0.0, 200.0])
     assert explain_failure(stray, make_limits(scenario)) != []
+
+
+def test_the_nearest_missile_and_its_leg(small: Callable[..., Scenario]) -> None:
+    """The second leg runs along north = 0, 1,000 m from a missile of 990 m; a radar without a kill radius is nearer."""
+    threats = [
+        {"name": "far", "east_m": 1000, "north_m": -2000, "kill_radius_m": 990, "kill_scale_m": 100, "height_m": 150},
+        {"name": "near", "east_m": 4500, "north_m": 1000, "kill_radius_m": 990, "kill_scale_m": 100, "height_m": 150},
+        {"name": "radar", "east_m": 1000, "north_m": 10, "detection_radius_m": 500, "detection_scale_m": 100},
+    ]
+    scenario = small(terrain=FLAT, threats=threats)
+    path = np.array([[0.0, 0.0, 150.0], [3000.0, 0.0, 150.0], [6000.0, 0.0, 150.0]])
+    certificate = Certificate(0.1, np.inf, 0.1, 9.0, 50.0, -2.5, ())
+    plan = Plan(scenario, path, np.zeros(4), np.zeros(4), certificate, 7, "umda", 60, np.zeros((0, 3)))
+    assert nearest_missile_text(plan) == (
+        "leg 1 passes 10.0 m outside the kill radius of near;"
+        " with its tracking error the flight may come 2.5 m inside it"
+    )

@@ -13,7 +13,7 @@ from planner.plan import Objective, Plan
 from planner.search import generations
 from planner.search.algorithms import ALGORITHMS
 from planner.search.explain_failure import explain_failure
-from planner.search.generations import MAX_GENERATIONS, path_generations, waypoint_generations
+from planner.search.generations import MAX_GENERATIONS, run_path_generations, run_waypoint_generations
 from planner.search.infeasibility_proof import is_closed
 from planner.search.plan_path import plan_path
 from planner.search.search_state import Search, best_first
@@ -34,12 +34,12 @@ def search_of(scenario: Scenario, limits: Limits, algorithm: str) -> Search:
 def test_generations_better_the_first_population(scenario: Scenario, limits: Limits, name: str) -> None:
     search = search_of(scenario, limits, name)
     none = np.empty((0, search.encoding.lower.size))
-    last = path_generations(search, 60, 12, none)
+    last = run_path_generations(search, 60, 12, none)
     assert search.evaluations == 60 + 12 * 30
     assert len(search.history) == 13
     assert search.done == 12
     first = search_of(scenario, limits, name)
-    path_generations(first, 60, 0, none)
+    run_path_generations(first, 60, 0, none)
     pair = np.stack([first.archive.scores[0], search.archive.scores[0]])
     assert best_first(pair)[0] == 1
     assert last.shape == search.encoding.lower.shape
@@ -49,7 +49,7 @@ def test_a_seeded_search_spends_a_share_once_it_is_safe(scenario: Scenario, limi
     seeded = replace(ALGORITHMS["umda-smooth"], seeded=True)
     search = search_of(scenario, limits, "umda-smooth")
     search.algorithm = seeded
-    path_generations(search, 60, 400, np.empty((0, search.encoding.lower.size)))
+    run_path_generations(search, 60, 400, np.empty((0, search.encoding.lower.size)))
     assert search.best_is_safe()
     assert search.evaluations < 0.35 * (60 + 400 * 30)
 
@@ -81,7 +81,7 @@ def test_the_way_is_found_without_seeds(threats: str, most: float, make_limits: 
 def test_generations_shorten_the_best_path(make_limits: Callable[[Scenario], Limits]) -> None:
     scenario = load_scenario("hard-15")
     search = waypoint_search(scenario, make_limits(scenario))
-    waypoint_generations(search, 200, 100)
+    run_waypoint_generations(search, 200, 100)
     lengths = [row[0] for row in search.history if row[2] == 0.0]
     assert len(search.history) == MAX_GENERATIONS == search.done
     assert lengths == sorted(lengths, reverse=True)
@@ -90,7 +90,7 @@ def test_generations_shorten_the_best_path(make_limits: Callable[[Scenario], Lim
 
 def test_waypoints_stay_in_their_intervals(scenario: Scenario, limits: Limits) -> None:
     search = waypoint_search(scenario, limits)
-    waypoint_generations(search, 40, 5)
+    run_waypoint_generations(search, 40, 5)
     assert search.done == 5
     assert (search.archive.vectors >= search.encoding.lower).all()
     assert (search.archive.vectors <= search.encoding.upper).all()
@@ -100,7 +100,7 @@ def test_waypoints_stay_in_their_intervals(scenario: Scenario, limits: Limits) -
 def test_a_stop_ends_after_the_generation_under_way(scenario: Scenario, limits: Limits) -> None:
     search = waypoint_search(scenario, limits)
     search.stop_condition = lambda: "interrupted" if search.done >= 2 else ""
-    waypoint_generations(search, 40, 8)
+    run_waypoint_generations(search, 40, 8)
     assert (search.done, search.end_reason) == (2, "interrupted")
 
 
@@ -144,7 +144,8 @@ def test_a_search_that_finds_no_way_evaluates_so_many_legs(
     assert 0.5 * most < sum(legs for _, legs in joins) <= most + 2 * first
     # The second attempt has twice the candidates, which are too many to be joined without a bound; there is no third.
     assert max(candidates for candidates, _ in joins) == 2 * first
-    assert "--budget 1000000 searches for longer" in explain_failure(plan, make_limits(scenario))[-1]
+    advice = explain_failure(plan, make_limits(scenario))[-1]
+    assert "[planner] waypoints = 16 allows more turns, and --budget 1000000 searches for longer" in advice
     # A budget asks for more.
     joins.clear()
     plan_path(with_planner(scenario, "--budget", budget=10**9), make_limits(scenario), seed=1)

@@ -89,7 +89,7 @@ def test_the_search_ends_at_a_wall_and_says_what_closes_it(
     def refused(*_: object) -> None:
         raise AssertionError("a path was searched for that is proven not to exist")
 
-    monkeypatch.setattr(plan_path_module, "waypoint_generations", refused)
+    monkeypatch.setattr(plan_path_module, "run_waypoint_generations", refused)
     monkeypatch.setattr(plan_path_module, "search_turning_back", refused)
     scenario = small(terrain=FLAT, threats=[*wall(), unit("beside", 1000.0, -2000.0)])
     limits = make_limits(scenario)
@@ -169,7 +169,7 @@ def test_the_search_ends_where_an_end_is_above_level_flight(monkeypatch: pytest.
     def refused(*_: object) -> None:
         raise AssertionError("a path was searched for that is proven not to exist")
 
-    monkeypatch.setattr(plan_path_module, "waypoint_generations", refused)
+    monkeypatch.setattr(plan_path_module, "run_waypoint_generations", refused)
     monkeypatch.setattr(plan_path_module, "search_turning_back", refused)
     # A Zagi at 3,348 m, where it climbs 4.5 degrees at sea level.
     scenario = fresh_scenario(1226)

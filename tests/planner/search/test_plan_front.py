@@ -195,5 +195,5 @@ def test_plans_that_are_not_safe_when_completed_are_left_out_and_counted(
     made = plan_front(scenario, limits, 3, seed=3, default=front.default.plan, finish=refuse, generations=GENERATIONS)
     assert [one.plan for one in made.plans] == [front.default.plan]
     assert made.refused > 2
-    note = f"1 of the 3 requested: {made.refused} plans that were found are not safe when completed, and no other"
+    note = f"1 of the 3 requested plans: {made.refused} other plans were not safe after completion, and no further"
     assert note in fewer_plans_line(made)

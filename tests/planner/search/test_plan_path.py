@@ -140,7 +140,7 @@ def test_a_wind_of_more_than_eighty_percent_of_the_airspeed_is_refused(
 ) -> None:
     flight = {"airspeed_mps": 25.0}
     scenario = small(wind={"speed_mps": 20.1}, flight=flight)
-    with pytest.raises(ScenarioError, match=r"small: wind\.speed_mps: 20\.1: .* at most 80% of the airspeed 25"):
+    with pytest.raises(ScenarioError, match=r"small: wind\.speed_mps: 20\.1: .* at most 80% of the airspeed of 25 m/s"):
         plan_path(scenario, make_limits(scenario), seed=1)
     strong = small(wind={"speed_mps": 20.0}, flight=flight, planner={"waypoints": 4, "population": 4, "generations": 1})
     assert plan_path(strong, make_limits(strong), seed=1).waypoints.shape == (4, 3)
@@ -166,3 +166,39 @@ def test_straight_line_is_taken_where_it_is_safe(
     other = plan_path(guarded, make_limits(guarded), seed=1)
     assert other.safe
     assert other.objectives[Objective.LENGTH_RATIO] > 1.0
+
+
+def serpentine(small: Callable[..., Scenario], walls: int, **planner: int) -> Scenario:
+    """A plain with walls across it, each open for 1.5 km at the end opposite to the gap of the wall before."""
+    zones = [
+        {
+            "name": f"wall {k}",
+            "kind": "exclusion",
+            "polygon_m": [[x - 100, low], [x + 100, low], [x + 100, high], [x - 100, high]],
+        }
+        for k, x in enumerate(range(2000, 2000 * walls + 1, 2000))
+        for low, high in [(-8500, 10000) if k % 2 else (-10000, 8500)]
+    ]
+    length = 2000.0 * (walls + 1)
+    return small(
+        terrain=FLAT,
+        threats=[],
+        zones=zones,
+        area={"east_m": [-2000, length + 2000], "north_m": [-10000, 10000], "ceiling_amsl_m": 450},
+        destination={"east_m": length, "north_m": 0, "height_m": 150},
+        planner={"population": 60, "generations": 25, **planner},
+    )
+
+
+def test_more_waypoints_are_tried_unless_their_number_is_stated(
+    small: Callable[..., Scenario], make_limits: Callable[[Scenario], Limits]
+) -> None:
+    """A way through seven walls turns twice at each: 14 corners, and 12 waypoints have ten."""
+    scenario = serpentine(small, 7)
+    plan = plan_path(scenario, make_limits(scenario), seed=1)
+    assert plan.safe
+    assert len(plan.waypoints) == 24
+    scenario = serpentine(small, 7, waypoints=12)
+    plan = plan_path(scenario, make_limits(scenario), seed=1)
+    assert not plan.safe
+    assert len(plan.waypoints) == 12

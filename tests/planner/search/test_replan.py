@@ -9,8 +9,8 @@ import pytest
 
 from aircraft.path_limits import Limits
 from planner.plan import Plan, parse_plan, plan_json
-from planner.search.plan_path import plan_path
-from planner.search.replan import replan, with_waypoints
+from planner.search.plan_path import plan_path, with_waypoints
+from planner.search.replan import replan
 from world.airspace.zones import Cylinder, Zone
 from world.errors import MissionError, ScenarioError
 from world.geometry import turning_angles
@@ -64,7 +64,7 @@ def test_a_leg_that_begins_in_reach_is_refused_by_its_own_name(old: Plan, limits
     east, north = old.waypoints[3, :2]
     threat = {"east_m": float(east), "north_m": float(north), "kill_radius_m": 2000.0, "detection_radius_m": 2500.0}
     now = with_threats(old.scenario, [threat], "test")
-    with pytest.raises(MissionError, match=r"leg 3: its first waypoint, 3, is \d+ m inside .* pop-up 1") as caught:
+    with pytest.raises(MissionError, match=r"leg 3: it starts at waypoint 3, \d+ m inside .* pop-up 1") as caught:
         replan(now, limits, old, 3, seed=1)
     assert "\n" not in str(caught.value)
 
@@ -100,5 +100,5 @@ def test_a_zone_that_comes_up_is_kept_out_of_and_a_leg_that_begins_in_it_is_refu
     legs = [np.linspace(*plan.waypoints[i : i + 2], 2000) for i in range(2, len(plan.waypoints) - 1)]
     assert np.linalg.norm(np.concatenate(legs)[:, :2] - middle[:2], axis=1).min() > 400.0
     here = dataclasses.replace(old.scenario, zones=(Zone("fire", "exclusion", Cylinder(*old.waypoints[3, :2], 50.0)),))
-    with pytest.raises(MissionError, match="leg 3: its first waypoint, 3, violates fire"):
+    with pytest.raises(MissionError, match="leg 3: it starts at waypoint 3, which violates fire"):
         replan(here, limits, old, 3, seed=1)

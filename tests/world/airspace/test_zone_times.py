@@ -93,7 +93,10 @@ def test_a_zone_that_is_not_active_is_left_out_and_said(tmp_path: Path) -> None:
     path.write_text(SMALL + ZONES, encoding="utf-8")
     scenario = load_scenario(str(path))
     assert [zone.name for zone in scenario.zones] == ["market", "mast"]
-    assert scenario.notes == ("1 zone has times of activity, and is active at all times (--at applies them)",)
+    assert scenario.notes == (
+        "1 zone has times of activity, but is treated as active at all times, because no time of flight is given"
+        " (--at)",
+    )
     friday = with_flight_time(scenario, "2026-05-01T10:00Z")
     assert [zone.name for zone in friday.zones] == ["mast"]
     assert friday.notes == (

@@ -280,7 +280,7 @@ def test_each_release_flares_by_its_own_sink_rate(version: ArduPlaneVersion) -> 
     aircraft = find_logged_aircraft(setup.aircraft, setup.scenario.flight.aircraft)
     assert isinstance(setup.autopilot, ArduPlane)
     own = record(ARDUPLANE_GROUND)
-    ground_law = setup.autopilot.in_release(version).ground.control_law
+    ground_law = setup.autopilot.with_release(version).ground.control_law
     assert ground_law is not None
     ground_law(setup.ground_phases, aircraft, ()).initialise(record(WORKSPACE), own)
     assert own.ground.flares_by_demand == (version == "4.7")

@@ -103,7 +103,7 @@ SERVO5_FUNCTION 0
 
 
 def said(text: str, mission: MissionParts, *, by_program: bool = False) -> list[str]:
-    return describe_open_settings(ArduPilotParameters.of_text(text, "mine.param"), mission, by_program=by_program)
+    return describe_open_settings(ArduPilotParameters.from_text(text, "mine.param"), mission, by_program=by_program)
 
 
 def test_arduplanes_defaults_leave_nothing_open_stated_or_not() -> None:
@@ -152,11 +152,19 @@ def test_a_setting_leaves_the_verdict_open_where_its_part_is_flown(line: str, mi
 @pytest.mark.parametrize(
     ("text", "mission", "expected"),
     [
-        ("FLAP_1_PERCNT 30\nFLAP_1_SPEED 15", IN_THE_AIR, "FLAP_1_PERCNT 30 below FLAP_1_SPEED 15"),
+        ("FLAP_1_PERCNT 30\nFLAP_1_SPEED 15", IN_THE_AIR, "FLAP_1_PERCNT 30 moves the flaps below FLAP_1_SPEED 15 m/s"),
         # No airspeed below AIRSPEED_MIN is demanded in the air, and the demand counts in whole m/s.
-        ("FLAP_1_PERCNT 30\nFLAP_1_SPEED 15\nAIRSPEED_MIN 15.9", IN_THE_AIR, "FLAP_1_PERCNT 30 below FLAP_1_SPEED 15"),
+        (
+            "FLAP_1_PERCNT 30\nFLAP_1_SPEED 15\nAIRSPEED_MIN 15.9",
+            IN_THE_AIR,
+            "FLAP_1_PERCNT 30 moves the flaps below FLAP_1_SPEED 15 m/s",
+        ),
         ("FLAP_1_PERCNT 30\nFLAP_1_SPEED 15\nAIRSPEED_MIN 16", IN_THE_AIR, ""),
-        ("FLAP_1_PERCNT 30\nFLAP_1_SPEED 15\nAIRSPEED_MIN 16", TO_GROUND, "FLAP_1_PERCNT 30 below FLAP_1_SPEED 15"),
+        (
+            "FLAP_1_PERCNT 30\nFLAP_1_SPEED 15\nAIRSPEED_MIN 16",
+            TO_GROUND,
+            "FLAP_1_PERCNT 30 moves the flaps below FLAP_1_SPEED 15 m/s",
+        ),
         ("FLAP_1_PERCNT 30", IN_THE_AIR, ""),
         ("FLAP_2_SPEED 15", IN_THE_AIR, ""),
         # 12 m/s of wind: that much can lie between the airspeed and the ground speed.
@@ -176,7 +184,7 @@ def test_a_setting_leaves_the_verdict_open_where_its_part_is_flown(line: str, mi
         ("THR_MIN -100\nUSE_REV_THRUST 64", IN_THE_AIR._replace(returns=True), "THR_MIN -100 and USE_REV_THRUST 64"),
         ("USE_REV_THRUST 1", EVERYTHING, ""),
         # A take-off banks freely from three times TKOFF_LVL_ALT, 30 m, or from TKOFF_ALT.
-        ("TKOFF_ALT 29", FROM_GROUND, "TKOFF_ALT 29 frees the bank of the take-off below 30 m"),
+        ("TKOFF_ALT 29", FROM_GROUND, "TKOFF_ALT 29 removes the bank limit of the take-off below 30 m"),
         ("TKOFF_ALT 30", FROM_GROUND, ""),
         ("TKOFF_ALT 29", IN_THE_AIR, ""),
     ],
@@ -198,13 +206,13 @@ def test_settings_that_depend_on_others(text: str, mission: MissionParts, expect
         # Airspeed sensors: the primary one, or else the first that there is.
         (
             "ARSPD_TYPE 0",
-            "ARSPD_TYPE 0 leaves no airspeed sensor, which is not simulated; with ARSPD_TYPE 1 and ARSPD_USE 0"
-            " ArduPlane's own program (--sitl) flies without the sensor, with ARSPD_USE 1 the flight is simulated with",
+            "ARSPD_TYPE 0 leaves no airspeed sensor, which is not simulated; set ARSPD_TYPE 1, and ARSPD_USE 1"
+            " to simulate the flight with the sensor, or ARSPD_USE 0 to fly ArduPlane's own program (--sitl) without",
         ),
         ("ARSPD_ENABLE 0", "ARSPD_ENABLE 0 leaves no airspeed sensor"),
         ("ARSPD_TYPE 0\nARSPD2_TYPE 8\nARSPD2_USE 0", "ARSPD2_USE 0"),
         ("ARSPD2_TYPE 8\nARSPD_PRIMARY 1\nARSPD2_USE 2", "ARSPD2_USE 2"),
-        ("ARSPD_PRIMARY 1\nARSPD_USE 0", "ARSPD_USE 0 affects the flight, but is not simulated; with ARSPD_USE 0 Ardu"),
+        ("ARSPD_PRIMARY 1\nARSPD_USE 0", "ARSPD_USE 0 affects the flight, but is not simulated; set ARSPD_USE 1 to"),
         ("ARSPD_TYPE 0\nARSPD2_TYPE 8\nARSPD2_USE 1", ""),
         ("ARSPD_USE 0\nARSPD2_TYPE 8\nARSPD_PRIMARY 1\nARSPD2_USE 1", ""),
         ("ARSPD2_TYPE 0\nARSPD_PRIMARY 1", ""),
@@ -213,7 +221,7 @@ def test_settings_that_depend_on_others(text: str, mission: MissionParts, expect
         ("GPS_TYPE 0", "GPS1_TYPE and GPS2_TYPE 0 leave no GPS"),
         ("GPS_TYPE 0\nGPS_TYPE2 9", ""),
         ("GPS1_TYPE 0\nGPS2_TYPE 9", ""),
-        ("GPS1_TYPE 0\nGPS2_TYPE 9\nGPS_AUTO_SWITCH 0", "GPS1_TYPE 0 leave no GPS"),
+        ("GPS1_TYPE 0\nGPS2_TYPE 9\nGPS_AUTO_SWITCH 0", "GPS1_TYPE 0 leaves no GPS"),
         ("GPS1_TYPE 0\nGPS2_TYPE 9\nGPS_AUTO_SWITCH 0\nGPS_PRIMARY 1", ""),
         ("AHRS_GPS_USE 0", "AHRS_GPS_USE 0"),
         ("AHRS_EKF_TYPE 0", "AHRS_EKF_TYPE 0 estimates the position without EKF3"),
@@ -229,17 +237,17 @@ def test_settings_that_depend_on_others(text: str, mission: MissionParts, expect
         # A fixed wing takes its heading from its course where it has no compass.
         ("COMPASS_ENABLE 0", ""),
         # Arming: bits 3 and 6 require a take-off and a return.
-        ("ARMING_MIS_ITEMS 8", "ARMING_MIS_ITEMS 8 prevents arming without NAV_TAKEOFF"),
+        ("ARMING_MIS_ITEMS 8", "ARMING_MIS_ITEMS 8 prevents arming, because the mission has no NAV_TAKEOFF"),
         ("ARMING_MIS_ITEMS 64", ""),
         ("ARMING_MIS_ITEMS 8\nARMING_CHECK 0", ""),
         ("ARMING_MIS_ITEMS 8\nARMING_SKIPCHK -1", ""),
         ("ARMING_MIS_ITEMS 8\nARMING_REQUIRE 0", ""),
         # `AP_Arming_Plane::pre_arm_checks`.
-        ("PTCH_LIM_MIN_DEG -2.9", "PTCH_LIM_MIN_DEG -2.9 prevents arming, which needs at most -3"),
+        ("PTCH_LIM_MIN_DEG -2.9", "PTCH_LIM_MIN_DEG -2.9 prevents arming: ArduPlane requires at most -3"),
         ("PTCH_LIM_MIN_DEG -3", ""),
-        ("PTCH_LIM_MAX_DEG 2.9", "PTCH_LIM_MAX_DEG 2.9 prevents arming, which needs at least 3"),
+        ("PTCH_LIM_MAX_DEG 2.9", "PTCH_LIM_MAX_DEG 2.9 prevents arming: ArduPlane requires at least 3"),
         ("PTCH_LIM_MAX_DEG 3", ""),
-        ("AIRSPEED_MIN 4.9", "AIRSPEED_MIN 4.9 prevents arming, which needs at least 5"),
+        ("AIRSPEED_MIN 4.9", "AIRSPEED_MIN 4.9 prevents arming: ArduPlane requires at least 5"),
         ("AIRSPEED_MIN 5", ""),
         ("AIRSPEED_MIN 4.9\nARMING_CHECK 0", ""),
         # Outputs: elevons on 77 and 78, a V-tail on 79 and 80, two motors on 73 and 74.
@@ -264,7 +272,7 @@ def test_what_leaves_no_airspeed_position_or_control(text: str, name: str) -> No
 
 def test_a_coarse_grid_of_the_ground_matters_above_terrain() -> None:
     over_terrain = IN_THE_AIR._replace(follows_terrain=True)
-    assert said("TERRAIN_SPACING 101", over_terrain)[0].startswith("TERRAIN_SPACING 101 follows a coarser ground")
+    assert said("TERRAIN_SPACING 101", over_terrain)[0].startswith("TERRAIN_SPACING 101 m makes ArduPlane's terrain")
     assert said("TERRAIN_SPACING 100", over_terrain) == said("TERRAIN_SPACING 2000", IN_THE_AIR) == []
 
 
@@ -273,7 +281,7 @@ def test_landing_marks_without_a_landing_prevent_arming(mark: int) -> None:
     """`AP_Arming_Plane::mission_checks`: DO_LAND_START (189) and DO_RETURN_PATH_START (188) need RTL_AUTOLAND."""
     marked = IN_THE_AIR._replace(commands=frozenset({16, mark}))
     (text,) = said("RTL_AUTOLAND 0", marked)
-    assert text.startswith("RTL_AUTOLAND 0 prevents arming with DO_")
+    assert text.startswith("RTL_AUTOLAND 0 prevents arming, because the mission has DO_")
     assert said("RTL_AUTOLAND 1", marked) == said("RTL_AUTOLAND 0", IN_THE_AIR) == said("WP_RADIUS 60", marked) == []
     assert said("RTL_AUTOLAND 0\nARMING_CHECK 0", marked) == []
 
@@ -318,9 +326,9 @@ def test_a_pitch_rate_that_no_turn_can_have_leaves_the_verdict_open(text: str, o
 def test_gains_that_hold_no_attitude_leave_the_verdict_open(name: str, text: str, faults: list[str]) -> None:
     aircraft = load_aircraft(name)
     own = load_aircraft_parameters(aircraft)
-    made = ArduPilotParameters.of_text(text.format(**own) + "\nWP_RADIUS 60", "mine.param")
+    made = ArduPilotParameters.from_text(text.format(**own) + "\nWP_RADIUS 60", "mine.param")
     texts = describe_open_settings(made, MissionParts(aircraft=aircraft), by_program=False)
-    assert [one.split("_")[0] + one.split("gains")[1].split(" to ")[0] for one in texts] == faults
+    assert [one.split("_")[0] + one.split("gains are")[1].split(" to ")[0] for one in texts] == faults
 
 
 def test_a_program_flies_its_own_settings_but_what_the_physics_lacks() -> None:
@@ -330,7 +338,7 @@ def test_a_program_flies_its_own_settings_but_what_the_physics_lacks() -> None:
 
 
 def test_a_set_holds_these_settings_only_where_they_are_stated() -> None:
-    made = ArduPilotParameters.of_text("LAND_TYPE 1\nWP_RADIUS 60\nSERIAL1_BAUD 57\n", "mine.param")
+    made = ArduPilotParameters.from_text("LAND_TYPE 1\nWP_RADIUS 60\nSERIAL1_BAUD 57\n", "mine.param")
     assert made.by_origin("file") == {"WP_RADIUS": 60.0, "LAND_TYPE": 1.0}
     assert made.unused == ("SERIAL1_BAUD",)
     assert len(made.values) == len(ArduPilotParameters.defaults().values) + 1

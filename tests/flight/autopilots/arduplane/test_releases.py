@@ -10,7 +10,7 @@ from flight.autopilots.arduplane.parameters import TABLE, ArduPilotParameters
 from flight.autopilots.arduplane.releases import choose_release, simulated_release
 from flight.autopilots.arduplane.renamed_parameters import NAMES_BEFORE_4_7, RENAMED, name_in_release
 from flight.autopilots.autopilot import ParameterValue, StoredAutopilot, StoredParameters
-from flight.autopilots.catalog import autopilot_of_log
+from flight.autopilots.catalog import autopilot_from_log
 from flight.autopilots.parameter_files import LONGEST_NAME
 from world.errors import ParameterError
 from world.scenario import load_scenario, with_flight
@@ -60,18 +60,24 @@ def test_a_parameter_file_selects_its_release(text: str, version: str, tmp_path:
         (
             "GLIDE_SLOPE_MIN 20",
             "4.7",
-            "is of ArduPlane 4.6 (GLIDE_SLOPE_MIN), but 4.7 is simulated, because it was named",
+            "was written for ArduPlane 4.6 (GLIDE_SLOPE_MIN), but ArduPlane 4.7 is simulated, as requested",
         ),
-        ("ALT_SLOPE_MIN 20", "4.6", "is of ArduPlane 4.7 (ALT_SLOPE_MIN), but 4.6 is simulated, because it was named"),
+        (
+            "ALT_SLOPE_MIN 20",
+            "4.6",
+            "was written for ArduPlane 4.7 (ALT_SLOPE_MIN), but ArduPlane 4.6 is simulated, as requested",
+        ),
         (
             "# ArduPlane V4.5.7\nWP_RADIUS 60",
             None,
-            "is of ArduPlane 4.5 (ArduPlane V4.5), but 4.6 is simulated, the nearest release that planfly has",
+            "was written for ArduPlane 4.5 (ArduPlane V4.5), but ArduPlane 4.6 is simulated,"
+            " the nearest available release",
         ),
         (
             "# ArduPlane V4.9.0\nWP_RADIUS 60",
             None,
-            "is of ArduPlane 4.9 (ArduPlane V4.9), but 4.7 is simulated, the nearest release that planfly has",
+            "was written for ArduPlane 4.9 (ArduPlane V4.9), but ArduPlane 4.7 is simulated,"
+            " the nearest available release",
         ),
     ],
 )
@@ -106,14 +112,14 @@ def test_a_release_belongs_to_arduplane_alone() -> None:
 )
 def test_a_log_selects_the_release_that_flew_it(program: str, version: str) -> None:
     assert simulated_release(program) == version
-    flown, notes = autopilot_of_log(program, {"WP_RADIUS": 60.0}, "a.BIN") or (None, ())
+    flown, notes = autopilot_from_log(program, {"WP_RADIUS": 60.0}, "a.BIN") or (None, ())
     assert flown is not None
     assert (flown.version, notes) == (version, ())
 
 
 def test_a_release_comes_back_from_a_log_and_a_log_without_one_is_of_46() -> None:
     for version in ("4.6", "4.7"):
-        law = ArduPlane(ArduPilotParameters.of_text("ALT_SLOPE_MIN 20", "mine.param", version))
+        law = ArduPlane(ArduPilotParameters.from_text("ALT_SLOPE_MIN 20", "mine.param", version))
         assert ArduPlane.restore(law.store()) == law
     values = (ParameterValue("GLIDE_SLOPE_MIN", 20.0, "file"),)
     older = ArduPlane.restore(StoredAutopilot(parameters=StoredParameters(values, (), "mine.param")))
@@ -122,12 +128,12 @@ def test_a_release_comes_back_from_a_log_and_a_log_without_one_is_of_46() -> Non
 
 def test_a_parameter_of_47_is_not_used_by_46() -> None:
     text = "ALT_SLOPE_MIN 20\nCLIMB_SLOPE_HGT 30\n"
-    newer, older = (ArduPilotParameters.of_text(text, "mine.param", version) for version in ("4.7", "4.6"))
+    newer, older = (ArduPilotParameters.from_text(text, "mine.param", version) for version in ("4.7", "4.6"))
     assert (newer.climb_slope_height, newer.unused) == (30.0, ())
     # 4.6 climbs in one step from 20 m over home and below (`Plane::setup_glide_slope`).
     assert (older.climb_slope_height, older.unused) == (20.0, ("CLIMB_SLOPE_HGT",))
     assert older.altitude_slope_min == newer.altitude_slope_min == 20.0
-    assert newer.in_release("4.6").climb_slope_height == 20.0
+    assert newer.with_release("4.6").climb_slope_height == 20.0
     assert [made.record().is_4_7 for made in (newer, older)] == [True, False]
 
 
@@ -153,7 +159,7 @@ READ_UNDER_OLD_NAMES = [
 
 @pytest.mark.parametrize("names", READ_UNDER_OLD_NAMES)
 def test_a_renamed_parameter_is_read_under_each_of_its_names(names: tuple[str, str, str]) -> None:
-    made = [ArduPilotParameters.of_text(text, "a") for text in names]
+    made = [ArduPilotParameters.from_text(text, "a") for text in names]
     assert made[0].by_origin("file") == made[1].by_origin("file") == made[2].by_origin("file")
     assert made[2].by_origin("file") == {names[2].split()[0]: float(names[2].split()[1])}
     assert [one.unused for one in made] == [(), (), ()]
@@ -174,7 +180,7 @@ def test_every_renamed_parameter_is_read_or_not_used_and_named_in_one_line(tmp_p
         file.write_text(f"{old} 7\nWP_RADIUS 60\n", encoding="utf-8")
         (note,) = choose_release("4.7", str(file)).notes[1:]
         new = name_in_release(old, "4.7")
-        said = f"{old} is read as {new}, its name in ArduPlane 4.7" if old in read else f"not used: {old} ({new})"
+        said = f"{old} is read as {new}, its name in ArduPlane 4.7" if old in read else f"not used: {old} (now {new})"
         assert note == f"{file}: {said}"
 
 

@@ -116,7 +116,7 @@ def test_what_a_wrapper_has_started_is_asked_to_end_and_closes_its_log(tmp_path:
     with started(wrapper(tmp_path, text)) as process:
         wait_for(tmp_path / "up")
         process.end(lambda: False)
-        assert process.keep_log(tmp_path / "kept.BIN")
+        assert process.save_log(tmp_path / "kept.BIN")
     assert (tmp_path / "kept.BIN").read_text() == "log\nend\n"
 
 
@@ -194,13 +194,13 @@ def test_a_program_that_is_asked_to_end_closes_its_log(tmp_path: Path) -> None:
     with started(script(tmp_path, text)) as process:
         wait_for(tmp_path / "up")
         process.end(lambda: False)
-        assert process.keep_log(tmp_path / "kept.BIN")
+        assert process.save_log(tmp_path / "kept.BIN")
     assert (tmp_path / "kept.BIN").read_text() == "log\nend\n"
 
 
 def test_a_program_without_a_log_leaves_none(tmp_path: Path) -> None:
     with started(script(tmp_path, "exit 0")) as process:
-        assert not process.keep_log(tmp_path / "kept.BIN")
+        assert not process.save_log(tmp_path / "kept.BIN")
     assert not (tmp_path / "kept.BIN").exists()
 
 

@@ -19,7 +19,7 @@ from flight.autopilots.arduplane_sitl.process import load_user_parameters
 from flight.autopilots.parts import RtlSettings
 from flight.autopilots.sitl.exchange import motion_on_rail
 from flight.autopilots.sitl.flight import launch_rail
-from flight.autopilots.sitl.mission import uploaded_mission
+from flight.autopilots.sitl.mission import make_uploaded_mission
 from flight.guidance.navigation_error import MOTION
 from flight.mission.items import Command
 from flight.simulation.running_flight import Release
@@ -44,13 +44,13 @@ def by_program(setup: FlightSetup) -> FlightSetup:
 
 def test_the_mission_goes_up_as_it_is_with_home_where_it_is() -> None:
     setup = by_program(circuit(RAIL, STRIP))
-    sent = uploaded_mission(setup)
+    sent = make_uploaded_mission(setup)
     assert setup.mission.home is not None
     assert (sent.home.lat_deg, sent.home.lon_deg, sent.home.alt) == (46.0, 8.0, 0.0)
     assert sent.items == setup.mission.items
     assert sent.items[sent.last - 1].command == Command.NAV_LAND
     # In the air, on a rail, it is another: the landing a waypoint, and a place more.
-    in_air = uploaded_mission(by_program(circuit(None, None)))
+    in_air = make_uploaded_mission(by_program(circuit(None, None)))
     assert {item.command for item in in_air.items} == {Command.NAV_WAYPOINT}
     assert len(in_air.items) == len(setup.mission.items) + 1
 
@@ -65,18 +65,18 @@ def test_with_one_end_alone_it_is_put_into_the_air_and_says_so() -> None:
 def test_in_the_air_a_return_that_goes_on_to_land_is_sent_with_its_landing_sequence() -> None:
     setup = by_program(kept_setup("autoland-1"))
     in_air = replace(setup, scenario=replace(setup.scenario, launch=None, landing=None))
-    commands = [item.command for item in uploaded_mission(in_air).items]
+    commands = [item.command for item in make_uploaded_mission(in_air).items]
     land = [Command.DO_LAND_START, *[Command.NAV_WAYPOINT] * 4]
     assert commands == [Command.NAV_WAYPOINT, Command.NAV_WAYPOINT, Command.NAV_RETURN_TO_LAUNCH, *land]
     # One that stays in its circle ends with the return.
     stays = by_program(kept_setup("autoland-1", RTL_AUTOLAND=0.0))
     stays = replace(stays, scenario=replace(stays.scenario, launch=None, landing=None))
-    assert uploaded_mission(stays).items[-1].command == Command.NAV_RETURN_TO_LAUNCH
+    assert make_uploaded_mission(stays).items[-1].command == Command.NAV_RETURN_TO_LAUNCH
 
 
 def test_what_the_scenario_asks_of_its_returns_is_set() -> None:
     setup = circuit(RAIL, STRIP)
-    asked = setup.autopilot.with_parameters(**setup.autopilot.returns.parameters_of(RtlSettings(180.0, lands=True)))
+    asked = setup.autopilot.with_parameters(**setup.autopilot.returns.make_parameters(RtlSettings(180.0, lands=True)))
     assert load_user_parameters(replace(setup, autopilot=asked)) == {"RTL_ALTITUDE": 180.0, "RTL_AUTOLAND": 1.0}
 
 

@@ -11,9 +11,9 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from aircraft.catalog import load_aircraft
 from flight.autopilots.arduplane_sitl.preflight import AUTO, Preflight, version_text
-from flight.autopilots.sitl.conversation import Talk
+from flight.autopilots.sitl.conversation import ConversationStep
 from flight.autopilots.sitl.link import ReportedState
-from flight.autopilots.sitl.mission import UploadedMission, uploaded_mission
+from flight.autopilots.sitl.mission import UploadedMission, make_uploaded_mission
 from flight.dynamics.envelope_tables import load_envelope
 from flight.mission.items import Command, Frame, Home, Mission, MissionItem
 from flight.mission.itinerary import NO_ITEM
@@ -54,7 +54,7 @@ def setup_of(*items: MissionItem, home: Home | None = HOME) -> FlightSetup:
 def flown(setup: FlightSetup) -> list[tuple[int, int, int, int]]:
     """Number, command, metres north and metres up of each item."""
     found = []
-    for item in uploaded_mission(setup).items:
+    for item in make_uploaded_mission(setup).items:
         _, north = to_map(SCENARIO.origin, item.lat_deg, item.lon_deg)
         found.append((item.seq, item.command, round(float(north)), round(item.alt)))
     return found
@@ -62,7 +62,7 @@ def flown(setup: FlightSetup) -> list[tuple[int, int, int, int]]:
 
 def test_places_are_above_the_sea_and_one_more_is_straight_on() -> None:
     setup = setup_of(place(1, 0.0), order(2, C.DO_CHANGE_SPEED, 0, 22, -1), place(3, 900.0, 90.0))
-    items = uploaded_mission(setup).items
+    items = make_uploaded_mission(setup).items
     assert [(item.seq, item.command, item.alt) for item in items] == [
         (1, 16, 100.0),
         (2, 178, 0.0),
@@ -76,14 +76,14 @@ def test_places_are_above_the_sea_and_one_more_is_straight_on() -> None:
 
 def test_an_acceptance_radius_goes_with_its_waypoint() -> None:
     setup = setup_of(place(1, 0.0), place(2, 900.0, params=(0.0, 35.0, 0.0, 0.0)), place(3, 1900.0))
-    assert [item.params[1] for item in uploaded_mission(setup).items] == [0.0, 35.0, 0.0, 0.0]
+    assert [item.params[1] for item in make_uploaded_mission(setup).items] == [0.0, 35.0, 0.0, 0.0]
 
 
 def test_a_waypoint_is_uploaded_with_what_its_file_says() -> None:
     """Its time to hold, the distance to fly on beyond it, and its yaw; only a NaN becomes 0."""
     stated = (5.0, 35.0, 150.0, math.nan)
     setup = setup_of(place(1, 0.0), place(2, 900.0, params=stated), place(3, 1900.0, params=(0.0, 0.0, -40.0, 90.0)))
-    assert [item.params for item in uploaded_mission(setup).items[1:3]] == [
+    assert [item.params for item in make_uploaded_mission(setup).items[1:3]] == [
         (5.0, 35.0, 150.0, 0.0),
         (0.0, 0.0, -40.0, 90.0),
     ]
@@ -104,11 +104,11 @@ def test_a_return_to_launch_goes_as_it_is_with_home_and_the_rally_points_and_not
     items = (place(1, 1500.0), place(2, 2500.0), order(3, C.NAV_RETURN_TO_LAUNCH), place(4, 9000.0))
     setup = setup_of(*items)
     rally = (place(0, 2000.0, 60.0, C.NAV_RALLY_POINT),)
-    given = uploaded_mission(replace(setup, mission=replace(setup.mission, rally=rally)))
+    given = make_uploaded_mission(replace(setup, mission=replace(setup.mission, rally=rally)))
     assert [(item.seq, item.command) for item in given.items] == [(1, 16), (2, 16), (3, 20)]
     # A home 15 m below the start is left where it is: the return's height counts from it.
     assert (given.home, given.rally) == (HOME, rally)
-    assert uploaded_mission(setup_of(place(1, 1500.0), place(2, 2500.0))).rally == ()
+    assert make_uploaded_mission(setup_of(place(1, 1500.0), place(2, 2500.0))).rally == ()
 
 
 def test_a_jump_leads_to_the_item_that_it_named() -> None:
@@ -121,7 +121,7 @@ def test_a_jump_leads_to_the_item_that_it_named() -> None:
         order(6, C.DO_JUMP, 3, 2),
         place(7, 2900.0),
     )
-    kept = [(item.seq, item.command, item.params[:2]) for item in uploaded_mission(setup).items]
+    kept = [(item.seq, item.command, item.params[:2]) for item in make_uploaded_mission(setup).items]
     # Item 3 is left out, and 4 comes after it.
     assert kept[3] == (4, 177, (2.0, 2.0))
     assert [command for _, command, _ in kept] == [16, 16, 16, 177, 16, 16]
@@ -134,24 +134,24 @@ def test_a_loiter_keeps_its_centre_and_its_turns_and_one_without_end_stays_and_i
         place(2, 1500.0, 80.0, C.NAV_LOITER_TURNS, params=turns),
         place(3, 4000.0, 80.0, C.NAV_LOITER_UNLIM, params=endless),
     )
-    first, second = uploaded_mission(setup).items[1:3]
+    first, second = make_uploaded_mission(setup).items[1:3]
     assert (first.command, first.params, round(first.alt)) == (18, turns, 100)
     # ArduPlane flies the item's radius without end, but WP_LOITER_RAD for a time: no other item stands for this one.
     assert (second.command, second.params) == (17, endless)
-    assert len(uploaded_mission(setup).items) == 3
+    assert len(make_uploaded_mission(setup).items) == 3
     assert flown(setup)[1][2] == 1500
 
 
 def test_home_is_the_missions_unless_it_would_hold_the_motor_back() -> None:
-    assert uploaded_mission(setup_of(place(1, 0.0), place(2, 900.0))).home == HOME
+    assert make_uploaded_mission(setup_of(place(1, 0.0), place(2, 900.0))).home == HOME
     # 80 m over a home at 20 m is where the flight starts: one at 90 m is too near.
-    near = uploaded_mission(setup_of(place(1, 0.0, 5.0), place(2, 900.0, 9.0), home=Home(46.0, 8.0, 75.0))).home
+    near = make_uploaded_mission(setup_of(place(1, 0.0, 5.0), place(2, 900.0, 9.0), home=Home(46.0, 8.0, 75.0))).home
     assert (near.lat_deg, near.alt) == (46.0, pytest.approx(80.0 - 100.0))
 
 
 def test_a_mission_without_a_home_has_it_below_the_start() -> None:
     way = [place(k, 900.0 * k, 80.0, frame=Frame.GLOBAL) for k in (1, 2)]
-    home = uploaded_mission(setup_of(*way, home=None)).home
+    home = make_uploaded_mission(setup_of(*way, home=None)).home
     _, north = to_map(SCENARIO.origin, home.lat_deg, home.lon_deg)
     assert (round(float(north)), home.alt) == (900, -20.0)
 
@@ -160,7 +160,8 @@ def test_a_route_of_no_mission_is_its_waypoints_and_its_speeds() -> None:
     way = np.array([[0.0, 0.0, 500.0], [0.0, 1000.0, 500.0], [0.0, 2000.0, 500.0], [0.0, 3000.0, 520.0]])
     setup = setup_maker(AEROSONDE)(way, speeds=[25.0, 25.0, 22.0])
     found = [
-        (item.command, item.params[1] if item.command == 178 else item.alt) for item in uploaded_mission(setup).items
+        (item.command, item.params[1] if item.command == 178 else item.alt)
+        for item in make_uploaded_mission(setup).items
     ]
     assert found == [(16, 500.0), (178, 25.0), (16, 500.0), (16, 500.0), (178, 22.0), (16, 520.0), (16, 520.0)]
 
@@ -172,7 +173,7 @@ def test_the_end_of_a_lead_out_leg_is_a_place_too() -> None:
     longer = replace(route, points=route_points(way, 25.0, item=[*route.items, NO_ITEM]))
     east = [
         round(float(to_map(SCENARIO.origin, item.lat_deg, item.lon_deg)[0]))
-        for item in uploaded_mission(replace(setup, route=longer)).items
+        for item in make_uploaded_mission(replace(setup, route=longer)).items
     ]
     assert east == [0, 0, 300, 1300]
 
@@ -224,7 +225,7 @@ class Clock:
     def __init__(self) -> None:
         self.time = 0.0
 
-    def go_through(self, talk: Talk) -> None:
+    def go_through(self, talk: ConversationStep) -> None:
         for _ in talk:
             self.time += 0.1
 

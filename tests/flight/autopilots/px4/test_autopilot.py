@@ -47,7 +47,7 @@ def test_parameters_alone_are_of_the_autopilot_that_the_scenario_names(aerosonde
     assert (made.parameters["NAV_ACC_RAD"], made.parameters.version) == (40.0, "1.16")
 
 
-NEAREST = "the nearest release that planfly has"
+NEAREST = "the nearest available release"
 
 
 @pytest.mark.parametrize(
@@ -56,9 +56,14 @@ NEAREST = "the nearest release that planfly has"
         ("1.16.0 ", None, "1.16", ""),
         ("1.16.1 stable", None, "1.16", ""),
         ("1.17.0", None, "1.17", ""),
-        ("1.15.4 stable", None, "1.16", f"is of PX4 1.15 (Version: 1.15), but 1.16 is simulated, {NEAREST}"),
-        ("1.18.0 dev", None, "1.17", f"is of PX4 1.18 (Version: 1.18), but 1.17 is simulated, {NEAREST}"),
-        ("1.16.0", "1.17", "1.17", "is of PX4 1.16 (Version: 1.16), but 1.17 is simulated, because it was named"),
+        (
+            "1.15.4 stable",
+            None,
+            "1.16",
+            f"was written for PX4 1.15 (Version: 1.15), but PX4 1.16 is simulated, {NEAREST}",
+        ),
+        ("1.18.0 dev", None, "1.17", f"was written for PX4 1.18 (Version: 1.18), but PX4 1.17 is simulated, {NEAREST}"),
+        ("1.16.0", "1.17", "1.17", "was written for PX4 1.16 (Version: 1.16), but PX4 1.17 is simulated, as requested"),
         ("unknown", None, "1.17", ""),
     ],
 )
@@ -74,7 +79,7 @@ def test_the_head_of_a_parameter_file_selects_the_release(
     assert made.version == flown
     assert isinstance(made, Px4)
     program = Px4Sitl.with_model(made, Path("px4"))
-    for copy in (made, made.with_parameters(NAV_ACC_RAD=30.0), made.in_release("1.17"), program, program.model):
+    for copy in (made, made.with_parameters(NAV_ACC_RAD=30.0), made.with_release("1.17"), program, program.model):
         assert copy.checks.parameter_notes == ((f"{file} {note}",) if note else ())
     # A plan states the release only if the file does not decide it.
     assert scenario.flight.with_stated_defaults().px4_version == named
@@ -89,7 +94,7 @@ def test_it_turns_earlier_in_thin_air_up_to_1_16(aerosonde: Aircraft) -> None:
 
 def test_speeds_beyond_its_limits_are_flown_at_them() -> None:
     made = Px4(
-        Px4Parameters.of_text("FW_AIRSPD_MIN 18\nFW_AIRSPD_MAX 31\nFW_AIRSPD_TRIM 25\nFW_R_LIM 40\n", "a.params")
+        Px4Parameters.from_text("FW_AIRSPD_MIN 18\nFW_AIRSPD_MAX 31\nFW_AIRSPD_TRIM 25\nFW_R_LIM 40\n", "a.params")
     )
     assert made.speeds.flown_airspeeds(np.array([10.0, 20.0, 40.0]), 25.0).tolist() == [18.0, 20.0, 31.0]
     assert made.speeds.limits is not None
@@ -113,7 +118,7 @@ def test_speeds_beyond_its_limits_are_flown_at_them() -> None:
     ],
 )
 def test_where_it_returns_to_is_by_its_type(kind: str, name: str, up: float) -> None:
-    rules = Px4(Px4Parameters.of_text(f"RTL_RETURN_ALT 120\n{kind}\n", "a.params")).returns.rules
+    rules = Px4(Px4Parameters.from_text(f"RTL_RETURN_ALT 120\n{kind}\n", "a.params")).returns.rules
     home, rally = ReturnPoint(0.0, 0.0, 300.0), ReturnPoint(0.0, 4000.0, 450.0)
     # It begins lower, and climbs first; it begins higher, and stays there until it descends to RTL_DESCEND_ALT 100.
     low, high = (choose_target(rules, (0.0, 1000.0, begin), home, [rally]) for begin in (350.0, 800.0))
@@ -142,9 +147,9 @@ def test_what_px4s_own_program_flies_leaves_no_verdict_open() -> None:
         (
             {},
             "outside an inclusion polygon",
-            ["GF_ACTION 2 prevents arming at home, which is outside an inclusion polygon"],
+            ["GF_ACTION 2 prevents arming, because home is outside an inclusion polygon"],
         ),
-        ({"GF_ACTION": 1.0}, "outside", ["GF_ACTION 1 prevents arming at home, which is outside"]),
+        ({"GF_ACTION": 1.0}, "outside", ["GF_ACTION 1 prevents arming, because home is outside"]),
         ({"GF_ACTION": 0.0}, "outside", []),
         ({}, "", []),
     ],

@@ -36,7 +36,7 @@ QGC = """# Onboard parameters for Vehicle 1
 def test_every_field_is_in_the_record_in_si() -> None:
     fields = set(field_names(PX4_PARAMETERS))
     assert set(DEFINITIONS) <= fields
-    record = Px4Parameters.of_text("FW_R_LIM 45\nFW_THR_TRIM 0.5\nFW_PSP_OFF -3\n", "a.params", "1.16").record()
+    record = Px4Parameters.from_text("FW_R_LIM 45\nFW_THR_TRIM 0.5\nFW_PSP_OFF -3\n", "a.params", "1.16").record()
     assert (record.roll_limit, record.throttle_trim) == pytest.approx((math.radians(45.0), 0.5))
     assert record.pitch_trim == pytest.approx(-math.radians(3.0))
     assert record.uses_switch_distance
@@ -72,7 +72,7 @@ def test_a_stations_file_goes_before_the_aircraft_and_that_before_px4(aerosonde:
 
 
 def test_one_that_is_not_flown_counts_where_it_is_not_px4s_own() -> None:
-    made = Px4Parameters.of_text("FW_T_F_ALT_ERR -1\nRTL_LAND_DELAY 5\n", "a.params")
+    made = Px4Parameters.from_text("FW_T_F_ALT_ERR -1\nRTL_LAND_DELAY 5\n", "a.params")
     assert set(made.by_origin("file")) == {"RTL_LAND_DELAY"}
     # Each name of the file is used or named as not used.
     assert made.unused == ("FW_T_F_ALT_ERR",)
@@ -81,7 +81,7 @@ def test_one_that_is_not_flown_counts_where_it_is_not_px4s_own() -> None:
 
 
 def test_what_a_person_states_otherwise_and_is_not_flown_is_named() -> None:
-    made = Px4Parameters.of_text("FW_USE_AIRSPD 0\nNPFG_EN_MIN_GSP 0\nNAV_FW_ALTL_RAD 8\nFW_LND_ANG 7\n", "a.params")
+    made = Px4Parameters.from_text("FW_USE_AIRSPD 0\nNPFG_EN_MIN_GSP 0\nNAV_FW_ALTL_RAD 8\nFW_LND_ANG 7\n", "a.params")
     assert {"FW_USE_AIRSPD", "NPFG_EN_MIN_GSP", "NAV_FW_ALTL_RAD"} <= set(made.by_origin("file")) & set(NOT_SIMULATED)
     assert made.by_origin("file")["FW_LND_ANG"] == 7.0
     assert made.unused == ()
@@ -99,12 +99,12 @@ def test_what_a_person_states_otherwise_and_is_not_flown_is_named() -> None:
 )
 def test_faults_are_one_line(text: str, said: str) -> None:
     with pytest.raises(ParameterError) as refused:
-        Px4Parameters.of_text(text, "a.params")
+        Px4Parameters.from_text(text, "a.params")
     assert str(refused.value) == said
 
 
 def test_what_is_stored_is_restored_and_another_version_is_not() -> None:
-    made = Px4Parameters.of_text("NAV_ACC_RAD 50\nFOO 1\n", "mine.params", "1.16")
+    made = Px4Parameters.from_text("NAV_ACC_RAD 50\nFOO 1\n", "mine.params", "1.16")
     stored = StoredParameters(made.values, made.unused, made.source)
     assert Px4Parameters.restore(stored, "1.16") == made
     assert Px4Parameters.restore(stored, "1.17") == replace(made, version="1.17")
@@ -122,12 +122,12 @@ def test_only_parameters_of_the_law_are_changed() -> None:
 
 
 def test_a_logs_parameters_are_read_to_single_precision() -> None:
-    made, notes = Px4Parameters.of_log({"NPFG_SW_DST_MLT": float(np.float32(0.32)), "X": 1.0}, "a.ulg", "1.16")
+    made, notes = Px4Parameters.from_log({"NPFG_SW_DST_MLT": float(np.float32(0.32)), "X": 1.0}, "a.ulg", "1.16")
     assert (made["NPFG_SW_DST_MLT"], notes) == (0.32, ())
     for logged in ({}, {"FW_AIRSPD_MIN": 9.0, "FW_AIRSPD_MAX": 8.0}):
-        _, notes = Px4Parameters.of_log(logged, "a.ulg", "1.16")
+        _, notes = Px4Parameters.from_log(logged, "a.ulg", "1.16")
         assert notes[-1] == "the log contains no parameters: PX4's defaults are used"
-    made, notes = Px4Parameters.of_log({"FW_AIRSPD_MIN": 25.0}, "a.ulg", "1.16")
+    made, notes = Px4Parameters.from_log({"FW_AIRSPD_MIN": 25.0}, "a.ulg", "1.16")
     assert made == Px4Parameters.defaults("1.16")
     assert "must be below FW_AIRSPD_MAX 20: PX4's defaults are used" in notes[0]
 
@@ -151,7 +151,7 @@ def test_parameters_are_equal_by_value() -> None:
 
 def test_what_lies_beyond_the_documented_range_is_flown_and_said() -> None:
     text = "FW_R_LIM 30\nFW_P_LIM_MAX 70\nNPFG_PERIOD_SF 10\nFW_T_CLMB_R_SP 0.1\nFW_T_SINK_R_SP 40\nFW_T_SEB_R_FF 3\n"
-    made = Px4Parameters.of_text(text, "a.params")
+    made = Px4Parameters.from_text(text, "a.params")
     assert made.by_origin("file")["FW_T_SINK_R_SP"] == 40.0
     assert [said.split(" (")[0] for said in made.outside_documented_ranges] == [
         "FW_R_LIM 30",
@@ -161,7 +161,7 @@ def test_what_lies_beyond_the_documented_range_is_flown_and_said() -> None:
         "FW_P_LIM_MAX 70",
     ]
     assert made.outside_documented_ranges[0] == "FW_R_LIM 30 (35..75)"
-    assert Px4Parameters.of_text("FW_R_LIM 35\nNAV_ACC_RAD 200", "a.params").outside_documented_ranges == ()
+    assert Px4Parameters.from_text("FW_R_LIM 35\nNAV_ACC_RAD 200", "a.params").outside_documented_ranges == ()
 
 
 def test_a_documented_range_holds_the_default_and_is_within_what_is_taken() -> None:

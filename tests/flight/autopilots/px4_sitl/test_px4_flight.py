@@ -65,7 +65,7 @@ def fly(setup: FlightSetup, program: Path, log: Path | None = None) -> tuple[Sim
         flight.prepare()
         flown = fly_to_end(flight)
         if log is not None:
-            assert flight.keep_log(log)
+            assert flight.save_log(log)
         lock = Path(f"/tmp/px4_lock-{flight._lockstep._port.port}")
         assert lock.exists()
     assert not lock.exists()

@@ -150,7 +150,7 @@ def test_a_scenario_that_requires_it_fails_where_nothing_is_in_reach(tmp_path: P
     near, far = (demanded(tmp_path, BARRED, mission_text(0.0, east)) for east in (4500.0, 6500.0))
     assert (near.ok, far.ok) == (True, False)
     assert "without the engine: home can be reached from 181 of 181 positions" in near.reason
-    assert ", nothing from " in far.reason
+    assert "; nothing from " in far.reason
     assert far.method == "one return every 1 s of the route, glides that keep 30 m above ground"
     # Flat ground counts, for it is somewhere to land.
     assert demanded(tmp_path).ok is True

@@ -385,7 +385,7 @@ def test_without_a_home_there_is_nowhere_to_return_to(tmp_path: Path) -> None:
 def test_glides_and_returns_with_px4_have_the_airspeeds_of_its_file(tmp_path: Path) -> None:
     """A glide is flown at the user's own least airspeed; other values are the aircraft's."""
     setup = hill_setup(tmp_path)
-    own = Px4(Px4Parameters.of_text("FW_AIRSPD_MIN 19.5\nFW_AIRSPD_TRIM 24\nFW_AIRSPD_MAX 30\n", "a.params"))
+    own = Px4(Px4Parameters.from_text("FW_AIRSPD_MIN 19.5\nFW_AIRSPD_TRIM 24\nFW_AIRSPD_MAX 30\n", "a.params"))
     world = make_return_world(replace(setup, autopilot=own))
     assert (world.autopilot, world.min_airspeed, world.min_airspeed_name) == (own, 19.5, "FW_AIRSPD_MIN")
     # ArduPlane stands in without an engine.

@@ -189,7 +189,7 @@ def test_it_goes_to_the_nearest_of_two(tmp_path: Path) -> None:
     for one in found.each:
         if abs(one.start[0] - 2750.0) > 20.0:
             assert one.target.name == f"the landing sequence at item {7 if one.start[0] < 2750.0 else 4}"
-    assert found.each[0].target.reason == "item 7 is of the nearest of 2"
+    assert found.each[0].target.reason == "item 7 begins the nearest of 2 landing sequences"
     # Its first place is a loiter: flown around at its height, 99 m over the ground.
     assert found.each[0].kind == "safe"
     assert found.each[0].clearance == pytest.approx(100.0, abs=8.0)

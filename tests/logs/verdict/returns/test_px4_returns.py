@@ -188,7 +188,7 @@ def test_the_default_returns_to_the_landing_of_the_mission(tmp_path: Path) -> No
     [
         ("RTL_TYPE 2", BEHIND, "RTL_TYPE 2 returns along the mission, which is not simulated", False),
         ("RTL_TYPE 4", LANDING, "RTL_TYPE 4 returns along the mission, which is not simulated", False),
-        ("RTL_TYPE 5", BEHIND, "RTL_TYPE 5 without a rally point loiters where it begins", False),
+        ("RTL_TYPE 5", BEHIND, "RTL_TYPE 5 without a rally point loiters where the RTL begins", False),
         ("RTL_LAND_DELAY 0", BEHIND, "RTL_LAND_DELAY 0 lands after the return, which is not simulated", True),
         ("RTL_TYPE 1", LANDING.replace("\t189\t", "\t178\t"), "a landing without DO_LAND_START", True),
         (
@@ -215,7 +215,7 @@ def test_its_own_words_are_px4s(tmp_path: Path) -> None:
     found = judged(tmp_path, "RTL_RETURN_ALT 450\nNAV_DLL_ACT 2")
     lines = [*describe_causes(found.causes), *describe_landing(found)]
     assert "station lost (NAV_DLL_ACT 2)" in lines[0]
-    assert "RTL_RETURN_ALT (450 m above its destination)" in lines[-1]
+    assert "RTL_RETURN_ALT (450 m above the destination)" in lines[-1]
     assert (found.autoland, found.stands_in) == (None, False)
 
 

@@ -56,7 +56,9 @@ def test_nothing_of_a_good_flight_from_the_ground_to_the_ground_hits_it() -> Non
     assert starts.grounded_count >= 5
     assert found.omitted_count >= starts.grounded_count
     assert len(found.each) + found.omitted_count == pytest.approx(track.time[-1] - track.time[0], abs=2.0)
-    assert f"; {found.omitted_count} on or near the ground during take-off and landing omitted" in headline(found)
+    assert f"; {found.omitted_count} starts on or near the ground during take-off and landing omitted" in headline(
+        found
+    )
     # Low are the climb to the take-off's height and the final, none between them.
     low = starts.time[starts.is_low]
     # The ground is level, at 0 m.

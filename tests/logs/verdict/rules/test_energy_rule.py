@@ -67,14 +67,14 @@ def test_a_charge_at_which_arduplane_leaves_the_mission_fails(share: float, acti
     needed, _ = predicted_energy(route_requirements(setup))
     charge = 1000.0 * needed / setup.envelope.volts
     text = f"BATT_CAPACITY {share * charge + 1500.0:.1f}\nBATT_LOW_MAH 1500\nBATT_FS_LOW_ACT {action}\n"
-    law = ArduPlane(ArduPilotParameters.of_text(text, "mine.param"))
+    law = ArduPlane(ArduPilotParameters.from_text(text, "mine.param"))
     item = of(judge_geometry(replace(setup, autopilot=law)), "energy")
     assert item.ok is ok
     assert (", but the flight needs" in item.reason) is not ok
 
 
 def test_a_voltage_at_which_arduplane_leaves_the_mission_is_said_not_to_be_judged() -> None:
-    law = ArduPlane(ArduPilotParameters.of_text("BATT_LOW_VOLT 21\nBATT_FS_LOW_ACT 2\n", "mine.param"))
+    law = ArduPlane(ArduPilotParameters.from_text("BATT_LOW_VOLT 21\nBATT_FS_LOW_ACT 2\n", "mine.param"))
     item = of(judge_geometry(replace(real_setup(), autopilot=law)), "energy")
     assert item.ok
     assert "it is not judged whether BATT_LOW_VOLT 21 ends the mission" in item.reason
@@ -229,7 +229,7 @@ def test_an_aircraft_that_burns_fuel_has_no_current() -> None:
 
 def _energy_with(text: str, share: float = 0.5) -> Finding:
     """Judge the energy with parameters, of a battery whose share the flight needs."""
-    setup = replace(real_setup(), autopilot=ArduPlane(ArduPilotParameters.of_text(text, "mine.param")))
+    setup = replace(real_setup(), autopilot=ArduPlane(ArduPilotParameters.from_text(text, "mine.param")))
     needed, _ = predicted_energy(route_requirements(setup))
     return of(judge_geometry(replace(setup, battery=needed / share)), "energy")
 
@@ -322,7 +322,7 @@ def test_a_failsafe_that_an_uncertain_power_may_reach_leaves_the_energy_open(
     needed, _ = predicted_energy(route_requirements(setup))
     capacity = 1500.0 + share * 1000.0 * needed / setup.envelope.volts
     text = f"BATT_CAPACITY {capacity:.3f}\nBATT_LOW_MAH 1500\nBATT_FS_LOW_ACT 1\n"
-    law = ArduPlane(ArduPilotParameters.of_text(text, "mine.param"))
+    law = ArduPlane(ArduPilotParameters.from_text(text, "mine.param"))
     item = of(judge_geometry(replace(setup, autopilot=law)), "energy")
     assert (item.ok, item.check) == (ok, check)
     assert item.limit == pytest.approx(share * needed, rel=1e-4)

@@ -50,7 +50,7 @@ def with_home(setup: FlightSetup, autopilot: Autopilot) -> FlightSetup:
 
 
 def arduplane(text: str) -> ArduPlane:
-    return ArduPlane(ArduPilotParameters.of_text(text, "mine.param"))
+    return ArduPlane(ArduPilotParameters.from_text(text, "mine.param"))
 
 
 def test_a_scenario_without_a_link_has_no_finding() -> None:
@@ -79,7 +79,7 @@ def test_the_place_is_the_leg_and_the_position_of_the_least_margin() -> None:
     for item in (of(judge_geometry(setup), "link"), of(judge(setup, fly_path(setup)), "link")):
         assert item.place == FLIGHT
         assert "the link margin is up to 3.5 dB below the required fade margin" in item.reason
-        assert "it is lowest on leg 0, to item 1, at 0 s (east 0 m, north 0 m, 6.0 km from the station" in item.reason
+        assert "It is lowest on leg 0, to item 1, at 0 s (east 0 m, north 0 m, 6.0 km from the station" in item.reason
     assert "on leg 1, to item 2, at 240 s" in of(judge_geometry(linked(make_setup(WAY))), "link").reason
 
 
@@ -150,7 +150,7 @@ def test_a_track_that_leaves_the_terrain_is_judged_up_to_there() -> None:
     leaving = edited(track, position=np.column_stack([track.position[:, 0], north, track.position[:, 2]]))
     kept = of(judge(setup, leaving), "link")
     assert kept.ok is None
-    assert "elsewhere the terrain below the radio path is unknown" in kept.reason
+    assert "Elsewhere the terrain below the radio path is unknown" in kept.reason
     assert of(judge(linked(setup), leaving), "link").ok is False
 
 
@@ -249,7 +249,7 @@ def test_an_autopilot_that_goes_on_is_said_to(autopilot: Autopilot, use: str, se
     setup = with_home(linked(make_setup(WAY), max_outage_s=600.0, use=use), autopilot)
     item = of(judge_geometry(setup), "link")
     assert (item.ok, item.limit, item.limit_source) == (True, 600.0, "scenario")
-    assert item.reason.endswith(f"; if the link is lost, {autopilot.title} continues its mission{setting}")
+    assert item.reason.endswith(f". If the link is lost, {autopilot.title} continues its mission{setting}")
 
 
 def test_an_outage_that_the_autopilot_does_not_notice_has_no_reaction() -> None:
@@ -382,7 +382,7 @@ def test_ground_with_a_hole_leaves_a_kept_link_open() -> None:
     setup = linked(make_setup(WAY, scenario=make_scenario(WAY, ground=ground)), sensitivity_dbm=-150.0)
     item = of(judge_geometry(setup), "link")
     assert item.ok is None
-    assert item.reason.endswith("elsewhere the terrain below the radio path is unknown")
+    assert item.reason.endswith("Elsewhere the terrain below the radio path is unknown")
 
 
 def test_the_take_off_and_the_landing_are_part_of_the_link() -> None:
@@ -401,4 +401,4 @@ def test_the_take_off_and_the_landing_are_part_of_the_link() -> None:
         distances = np.linalg.norm(flown.track.position - place - [0.0, 0.0, 3.0], axis=1)
         assert facts["greatest distance from the station"] == pytest.approx(float(distances.max()), abs=30.0)
         assert item.flown == pytest.approx(float(flown.track.time[-1]), abs=20.0)
-        assert f"; it is lowest on leg {worst_leg}, to item " in item.reason
+        assert f". It is lowest on leg {worst_leg}, to item " in item.reason

@@ -40,7 +40,7 @@ REFUSED = {
         "checkDistancesBetweenWaypoints",
         (*GOOD[:2], wp(0, 1500, command=4501), GOOD[2]),
         3,
-        "distance between waypoint and gate too close",
+        "the gate and the neighbouring waypoint are too close together",
     ),
     "unsupported": (
         "checkMissionItemValidity",
@@ -59,21 +59,21 @@ REFUSED = {
         "checkTakeoff",
         (wp(0, 500, 0, command=22), *GOOD[1:]),
         1,
-        "takeoff altitude 0.0 m is not above home",
+        "the takeoff altitude is 0.0 m above home, but must be above 0 m",
     ),
-    "takeoff-late": ("checkTakeoff", (GOOD[1], GOOD[0], GOOD[2]), 2, "takeoff is not the first waypoint item"),
+    "takeoff-late": ("checkTakeoff", (GOOD[1], GOOD[0], GOOD[2]), 2, "the takeoff is not the first"),
     "two-land-starts": (
         "checkFixedWingLanding",
         (*GOOD, "2 189 0 0 0 0 0 0 0", "2 189 0 0 0 0 0 0 0", wp(1500, 0, 60), wp(0, 0, 0, command=21)),
         5,
-        "more than one land start",
+        "more than one DO_LAND_START",
     ),
-    "land-start-alone": ("checkFixedWingLanding", (*GOOD, "2 189 0 0 0 0 0 0 0", wp(1500, 0)), 4, "invalid land start"),
+    "land-start-alone": ("checkFixedWingLanding", (*GOOD, "2 189 0 0 0 0 0 0 0", wp(1500, 0)), 4, "no landing follows"),
     "rtl-after-land-start": (
         "checkFixedWingLanding",
         (*GOOD, "2 189 0 0 0 0 0 0 0", wp(1500, 0, 60), "2 20 0 0 0 0 0 0 0", wp(0, 0, 0, command=21)),
         6,
-        "land start item before RTL item",
+        "a return to launch after DO_LAND_START",
     ),
     "approach-below": (
         "checkFixedWindLandApproach",
@@ -86,7 +86,7 @@ REFUSED = {
         "checkFixedWindLandApproach",
         (*GOOD, wp(1500, 0, 150), wp(0, 0, 0, command=21)),
         5,
-        "the landing glide slope 5.7° is steeper than 5.0°",
+        "the landing glide slope is 5.7°, more than the maximum of 5.0°",
     ),
     "inside-orbit": (
         "checkFixedWindLandApproach",
@@ -98,7 +98,7 @@ REFUSED = {
         "checkFixedWindLandApproach",
         (*GOOD, wp(1500, 0, 60, command=18, p="1 0 150 0"), wp(0, 0, 0, command=21)),
         5,
-        "unsupported landing approach entrance",
+        "the approach must begin with",
     ),
 }
 
@@ -133,7 +133,7 @@ def test_where_px4_flies_what_it_refuses_fails(case: str) -> None:
 
 def by_px4(text: str, *lines: str) -> list[Finding]:
     """The rule's findings where PX4 flies with a file of parameters, "" for none."""
-    made = Px4Parameters.of_text(text, "a.params") if text else Px4Parameters.defaults()
+    made = Px4Parameters.from_text(text, "a.params") if text else Px4Parameters.defaults()
     findings = judge_geometry(replace(setup_of(*lines), autopilot=Px4(made))).findings
     return [item for item in findings if item.rule == "mission"]
 
@@ -209,7 +209,7 @@ def test_first_waypoint_too_far() -> None:
     finding = of("checkDistanceToFirstWaypoint", wp(0, 500), wp(0, 1500), home=HOME_FAR)
     assert finding.ok is None
     assert judge_geometry(setup_of(wp(0, 500), wp(0, 1500), home=HOME_FAR)).flyable
-    assert "first waypoint too far away: 179" in finding.reason
+    assert "the first waypoint is 179" in finding.reason
 
 
 def test_a_good_landing_passes_every_check() -> None:
@@ -224,7 +224,7 @@ def test_what_px4_only_remarks_on_does_not_fail() -> None:
     assert of("checkMissionItemValidity", *GOOD, wp(1500, 0, frame=10)).ok is None
     below = of("checkIfBelowHomeAltitude", *GOOD, wp(1500, 0, -5))
     assert below.ok
-    assert "waypoint 4 below home" in below.reason
+    assert "waypoint 4 is below home" in below.reason
     apart = of("checkDistancesBetweenWaypoints", *GOOD)
     assert apart.ok
     assert "MIS_DIST_WPS" in apart.reason
@@ -264,12 +264,15 @@ _AROUND = _fence(5003, 400, (0, 0))
     ("fences", "words"),
     [
         (_AROUND, ""),
-        (_EAST, "FENCE_ENABLE 1 prevents arming at home, which is outside an inclusion polygon"),
-        (_fence(5004, 100, (0, 99)), "FENCE_ENABLE 1 prevents arming at home, which is inside an exclusion circle of"),
+        (_EAST, "FENCE_ENABLE 1 prevents arming, because home is outside an inclusion polygon"),
+        (_fence(5004, 100, (0, 99)), "FENCE_ENABLE 1 prevents arming, because home is inside an exclusion circle of"),
         (_fence(5004, 100, (0, 101)), ""),
         # All inclusions, or with bit 1 of FENCE_OPTIONS any: `AC_PolyFence_loader::breached`.
-        ((*_EAST, *_AROUND), "FENCE_ENABLE 1 prevents arming at home, which is outside an inclusion polygon"),
-        (_fence(5003, 1, (0, 0)), "FENCE_MARGIN 2 prevents arming, which needs at most the 1 m of an inclusion circle"),
+        ((*_EAST, *_AROUND), "FENCE_ENABLE 1 prevents arming, because home is outside an inclusion polygon"),
+        (
+            _fence(5003, 1, (0, 0)),
+            "FENCE_MARGIN 2 prevents arming: ArduPlane requires at most the 1 m of an inclusion circle",
+        ),
     ],
 )
 def test_a_home_beyond_the_fence_leaves_the_verdict_open(fences: tuple[MissionItem, ...], words: str) -> None:
@@ -368,7 +371,7 @@ def test_what_no_tangent_joins_to_a_circle_fails_where_the_autopilot_flies_there
     ((item, reason, ok),) = found
     assert (item, ok, verdict.flyable) == (expected[0], False, False)
     assert reason.startswith(expected[1])
-    assert reason.endswith("which is not judged")
+    assert reason.endswith("on a path that is not judged")
     # planfly's own guidance flies on tangents, and leaves it out with a note.
     assert not setup_of(wp(0, -3000, 300), *lines).route.unjoined_stops
 
@@ -387,7 +390,7 @@ def test_a_take_off_inside_the_first_circle_is_no_fault() -> None:
         ({}, ()),
         ({"ALT_OFFSET": -120.0}, ("ALT_OFFSET -120",)),
         ({"SOAR_ENABLE": 1.0, "Q_ENABLE": 1.0}, ("SOAR_ENABLE 1", "Q_ENABLE 1")),
-        ({"FENCE_ENABLE": 1.0}, ("FENCE_ENABLE 1 prevents arming without a fence",)),
+        ({"FENCE_ENABLE": 1.0}, ("FENCE_ENABLE 1 prevents arming, because no fence",)),
         ({"FENCE_ENABLE": 1.0, "FENCE_TYPE": 2.0}, ("FENCE_TYPE 2",)),
         ({"FENCE_AUTOENABLE": 1.0, "FENCE_TYPE": 5.0}, ("FENCE_TYPE 5",)),
         ({"FENCE_ENABLE": 1.0, "FENCE_TYPE": 3.0, "FENCE_ACTION": 0.0}, ()),
@@ -530,8 +533,8 @@ def test_px4_1_16_may_keep_no_minimum_ground_speed() -> None:
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ("0 50 60", "DO_CHANGE_SPEED to 50 m/s with a throttle sets TRIM_THROTTLE"),
-        ("0 5 60", "DO_CHANGE_SPEED to 5 m/s with a throttle sets TRIM_THROTTLE"),
+        ("0 50 60", "DO_CHANGE_SPEED to 50 m/s is outside AIRSPEED_MIN"),
+        ("0 5 60", "DO_CHANGE_SPEED to 5 m/s is outside AIRSPEED_MIN"),
         ("0 15 60", ""),  # within AIRSPEED_MIN 9 to AIRSPEED_MAX 22: the airspeed, and no throttle
         ("0 50 -1", ""),
         ("1 50 60", ""),  # a minimum ground speed, and no throttle

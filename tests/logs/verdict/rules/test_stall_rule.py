@@ -38,7 +38,8 @@ def test_a_planned_turn_just_below_and_just_above_the_stall_in_its_bank(speed: f
     assert failing(verdict) == (set() if ok else {("stall", FLIGHT)})
     assert item.limit == pytest.approx(BANKED, abs=1e-3)
     assert item.margin == pytest.approx(speed - BANKED, abs=1e-3)
-    assert "at waypoint 1, stall 17.2 m/s in 30° of bank (level 16.0 m/s; true airspeeds)" in item.reason
+    assert "at waypoint 1; the stall speed is 17.2 m/s in 30° of bank" in item.reason
+    assert item.reason.endswith(" and 16.0 m/s in level flight (true airspeeds)")
     if not ok:
         # 3 % above the limit, up to a whole tenth.
         assert suggested(item, "airspeed").wanted == pytest.approx(17.8)
@@ -158,7 +159,7 @@ def test_the_turn_with_the_least_margin_is_told(speeds: list[float], at: int) ->
     bank = math.atan(math.tan(math.radians(30.0)) * (18.0 / 20.0) ** 2)
     assert item.planned == 18.0
     assert item.limit == pytest.approx(16.0 / math.sqrt(math.cos(bank)), abs=1e-3)
-    assert f"18.0 m/s at waypoint {at}, stall" in item.reason
+    assert f"18.0 m/s at waypoint {at}; the stall speed" in item.reason
 
 
 def test_the_moment_of_the_least_margin_is_told() -> None:
