@@ -88,7 +88,8 @@ class Optimiser:
         """Return points in the box to evaluate, (n, d).
 
         The first call returns the whole population, later calls return half of it.  "multistart" returns as many points
-        as the current generation of its search has, and "partial" as many as its population has.
+        as the current generation of its search has, and "partial" as many as its population has, or as the Gaussian
+        that refines its best point draws.
         """
         self._is_asked = True
         return np.array(self._search.ask())
@@ -203,8 +204,9 @@ def optimise(
 
     lower, upper: bounds of the box, (d,).
     model: "umda", the paper's univariate Gaussians; "emna", one Gaussian with full covariance; "multistart", Gaussians
-    with full covariance from many starts of many widths, for a cost with walls, gaps or several valleys; "partial", a
-    Gaussian that redraws parts of points, for few evaluations; "differential", differential evolution, for comparison.
+    with full covariance from many starts of many widths, for a cost with walls, gaps or several valleys; "partial",
+    which redraws parts of points, often neighbouring variables, for few evaluations; "differential", differential
+    evolution, for comparison.
     population: even number of points, at least 4, half of them drawn again in each generation; for "multistart" and
     "partial", which draw all points, the size of the largest generation.
     seed: a whole number, or a generator of random numbers.

@@ -1,12 +1,19 @@
 """Estimation of distribution that redraws only a part of the variables of each sample.
 
 A new sample of a whole distribution loses what its parent had right in variables that do not matter to the others.
-Here every sample keeps a part of its variables and draws the rest from a Gaussian with the covariance of the
-population, around one of the best samples; it replaces its parent only if it is better.  The fraction of redrawn
-variables and the width of the Gaussian follow those of successful samples, as the parameters of adaptive differential
-evolution do (Zhang and Sanderson, "JADE: adaptive differential evolution with optional external archive", IEEE
-Transactions on Evolutionary Computation 13, 2009).  A search that stalls starts again with twice the population (after
-Auger and Hansen, "A restart CMA evolution strategy with increasing population size", CEC 2005).  Only ranks are used.
+Here every sample keeps a part of its variables. The others are drawn around one of the best samples, at a distance that
+has the covariance of the population; a sample replaces its parent only if it is better.  The redrawn variables of half
+of the samples are neighbours, because the variables of neighbouring waypoints often have to change together.
+
+The fraction of redrawn variables and the width of the distribution follow those of successful samples, as the
+parameters of adaptive differential evolution do (Zhang and Sanderson, "JADE: adaptive differential evolution with
+optional external archive", IEEE Transactions on Evolutionary Computation 13, 2009).  The difference of two samples
+takes the place of a Gaussian draw, as in differential evolution (Storn and Price, Journal of Global Optimization 11,
+1997).
+
+When a population no longer improves, a Gaussian with full covariance (`planner.optimisers.multistart.Gaussian`) refines
+its best sample, also along a curved valley. Then the search starts again with twice the population (after Auger and
+Hansen, "A restart CMA evolution strategy with increasing population size", CEC 2005).  Only ranks are used.
 """
 
 import math
@@ -15,23 +22,24 @@ from collections.abc import Callable
 import numpy as np
 
 from planner.optimisers.box_search import BoxSearch
-from planner.optimisers.linear_algebra import multiply_by_sparse
-from planner.optimisers.multistart import reflect_into_box
-from world.arrays import Floats, Ints
+from planner.optimisers.multistart import Gaussian, reflect_into_box
+from world.arrays import Flags, Floats, Ints
 
 # Number of samples of the first population, per variable.
 FIRST_POPULATION_PER_VARIABLE = 2
 # Minimum number of samples of the first population.
 MIN_POPULATION = 60
 # Fraction of the population around which samples are drawn.
-CENTRE_FRACTION = 0.1
+CENTRE_FRACTION = 0.2
 # Fraction of redrawn variables at the start.
 FIRST_REDRAWN_FRACTION = 0.5
 # Standard deviation of the redrawn fraction among samples.
 REDRAWN_FRACTION_DEVIATION = 0.1
 # Minimum redrawn fraction.
 MIN_REDRAWN_FRACTION = 0.02
-# Width of the Gaussian at the start, as a factor on the population's deviations.
+# Fraction of samples whose redrawn variables are neighbours; those of the others are drawn one by one.
+NEIGHBOURS_FRACTION = 0.5
+# Width of the distribution at the start, as a factor on the population's deviations.
 FIRST_WIDTH = 0.3
 # Standard deviation of the logarithm of the width among samples.
 LOG_WIDTH_DEVIATION = 0.3
@@ -41,8 +49,10 @@ WILD_FRACTION = 0.3
 WILD_LOG_WIDTH = 1.5
 # Rate at which both parameters follow those of successful samples.
 LEARNING_RATE = 0.2
-# Number of generations without a better sample after which the search starts again.
-MAX_STALLED_GENERATIONS = 30
+# Number of generations without a better sample after which the best sample is refined.
+MAX_STALLED_GENERATIONS = 10
+# Standard deviation of the refining Gaussian at its start, as a fraction of the box.
+REFINING_DEVIATION = 0.02
 # Factor on the population at a new start.
 POPULATION_GROWTH = 2
 
@@ -81,6 +91,7 @@ class PartialResampling(BoxSearch):
         self._max_count = population
         self._count = min(population, max(MIN_POPULATION, FIRST_POPULATION_PER_VARIABLE * lower.size))
         self._best: tuple[Floats, Floats] | None = None
+        self._gaussian: Gaussian | None = None
         self._start()
         if initial is None:
             self._pending_samples = self._pending_samples[: self._count]
@@ -93,20 +104,49 @@ class PartialResampling(BoxSearch):
         self._stalled_generations = 0
 
     def tell(self, scores: Floats) -> None:
-        """Keep those samples of the last `ask` that are better than their parents, by their scores (n, c)."""
+        """Process the scores (n, c) of the last samples of `ask`, and draw the next samples.
+
+        A sample of a population replaces its parent if it is better.
+        """
+        if self._gaussian is not None:
+            self._update_gaussian(self._gaussian, scores)
+            return
         if not len(self._points):
             self._points, self._point_scores = self._pending_samples.copy(), scores.copy()
         else:
             self._replace_parents(scores)
-        order = np.lexsort((self._rng.random(len(self._points)), self._rank(self._point_scores)))
-        self._points, self._point_scores = self._points[order], self._point_scores[order]
-        self._store()
+        self._points, self._point_scores = self._sort(self._points, self._point_scores)
+        self._store(self._points, self._point_scores)
         if self._stalled_generations > MAX_STALLED_GENERATIONS:
-            self._start()
-            self._count = min(self._max_count, POPULATION_GROWTH * self._count)
-            self._pending_samples = self._rng.uniform(self.lower, self.upper, (self._count, self.lower.size))
+            best_point = (self._points[0] - self.lower) / (self.upper - self.lower)
+            generation_size = 4 + int(3.0 * math.log(self.lower.size))
+            self._gaussian = Gaussian(best_point, REFINING_DEVIATION, generation_size)
+            self._draw_from_gaussian(self._gaussian)
         else:
             self._draw()
+
+    def _sort(self, points: Floats, scores: Floats) -> tuple[Floats, Floats]:
+        """Return points (n, d) and their scores (n, c), best first; ties are in random order."""
+        order = np.lexsort((self._rng.random(len(points)), self._rank(scores)))
+        return points[order], scores[order]
+
+    def _update_gaussian(self, gaussian: Gaussian, scores: Floats) -> None:
+        """Update the refining Gaussian with scores (n, c), or start again if it has converged."""
+        points = (self._pending_samples - self.lower) / (self.upper - self.lower)
+        gaussian.update(points, scores, self._rank, self._rng.random(len(scores)))
+        self._store(*self._sort(self._pending_samples, scores))
+        if not gaussian.is_done:
+            self._draw_from_gaussian(gaussian)
+            return
+        self._gaussian = None
+        self._start()
+        self._count = min(self._max_count, POPULATION_GROWTH * self._count)
+        self._pending_samples = self._rng.uniform(self.lower, self.upper, (self._count, self.lower.size))
+
+    def _draw_from_gaussian(self, gaussian: Gaussian) -> None:
+        """Draw the next generation of the refining Gaussian."""
+        samples = self.lower + gaussian.draw(self._rng) * (self.upper - self.lower)
+        self._pending_samples = np.clip(samples, self.lower, self.upper)
 
     def _replace_parents(self, scores: Floats) -> None:
         """Replace each parent whose sample ranks higher; adapt the redrawn fraction and the width.
@@ -131,18 +171,17 @@ class PartialResampling(BoxSearch):
             self._width *= math.exp(LEARNING_RATE * log_ratio)
         self._points[is_better], self._point_scores[is_better] = self._pending_samples[is_better], scores[is_better]
 
-    def _store(self) -> None:
-        """Set `samples` and `scores`: the best sample of all starts, then the population."""
-        if self._best is None or self._rank(np.stack([self._best[1], self._point_scores[0]]))[1] == 0:
-            self._best = self._points[0].copy(), self._point_scores[0].copy()
-        self.samples = np.concatenate([self._best[0][None], self._points])
-        self.scores = np.concatenate([self._best[1][None], self._point_scores])
+    def _store(self, points: Floats, scores: Floats) -> None:
+        """Store the best sample of all starts, and behind it a generation (n, d) with scores (n, c), best first."""
+        if self._best is None or self._rank(np.stack([self._best[1], scores[0]]))[1] == 0:
+            self._best = points[0].copy(), scores[0].copy()
+        self.samples = np.concatenate([self._best[0][None], points])
+        self.scores = np.concatenate([self._best[1][None], scores])
 
     def _draw(self) -> None:
-        """Draw the next sample of each member of the population, which is sorted best first."""
-        count, size = self._points.shape
+        """Draw a sample for each member of the population, which is sorted."""
+        count = len(self._points)
         points = (self._points - self.lower) / (self.upper - self.lower)
-        deviations = (points - points.mean(axis=0)) / math.sqrt(count)
         self._fractions = np.clip(
             self._redrawn_fraction + REDRAWN_FRACTION_DEVIATION * self._rng.standard_normal(count),
             MIN_REDRAWN_FRACTION,
@@ -154,10 +193,23 @@ class PartialResampling(BoxSearch):
             + is_wild * self._rng.uniform(-WILD_LOG_WIDTH, WILD_LOG_WIDTH, count)
         )
         centres = points[self._rng.integers(0, max(2, round(CENTRE_FRACTION * count)), count)]
-        # Random combinations of the population's deviations have the population's covariance.
-        steps = multiply_by_sparse(self._rng.standard_normal((count, count)), deviations)
-        is_redrawn = self._rng.random((count, size)) < self._fractions[:, None]
-        is_redrawn[np.arange(count), self._rng.integers(0, size, count)] = True
-        redrawn_points = reflect_into_box(centres + self._widths[:, None] * steps)
-        samples = self.lower + np.where(is_redrawn, redrawn_points, points) * (self.upper - self.lower)
+        # The difference of two members has twice the covariance of the population.
+        first_members, second_members = self._rng.integers(0, count, (2, count))
+        steps = (points[first_members] - points[second_members]) / math.sqrt(2.0)
+        drawn = reflect_into_box(centres + self._widths[:, None] * steps)
+        samples = self.lower + np.where(self._draw_redrawn_variables(), drawn, points) * (self.upper - self.lower)
         self._pending_samples = np.clip(samples, self.lower, self.upper)
+
+    def _draw_redrawn_variables(self) -> Flags:
+        """Return a mask (n, d), True for the variables of each sample that are redrawn; at least one per sample.
+
+        The variables are regarded as a ring, so that the last one is a neighbour of the first.
+        """
+        count, size = self._points.shape
+        is_redrawn = self._rng.random((count, size)) < self._fractions[:, None]
+        first_variables = self._rng.integers(0, size, count)
+        is_redrawn[np.arange(count), first_variables] = True
+        neighbour_counts = np.maximum(1, np.round(self._fractions * size))
+        is_neighbour = (np.arange(size) - first_variables[:, None]) % size < neighbour_counts[:, None]
+        redraws_neighbours = self._rng.random(count) < NEIGHBOURS_FRACTION
+        return np.where(redraws_neighbours[:, None], is_neighbour, is_redrawn)
