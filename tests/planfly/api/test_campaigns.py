@@ -137,7 +137,7 @@ def test_a_campaign_that_goes_on_without_a_number_says_its_number(
         "warning: 2 flights cannot show P >= 0.9, even if all are flyable: 29 flights without a failure are needed"
     )
     # 0.9^28 is above and 0.9^29 below 0.05.
-    assert caplog.messages == ["flies 2 flights, the number of the resumed campaign", too_few]
+    assert caplog.messages == ["number of flights: 2, the number of the resumed campaign", too_few]
     caplog.clear()
     planfly.campaign(tmp_path / "short.waypoints", flights=2, at_least=0.9, **options)
     assert caplog.messages == [too_few]

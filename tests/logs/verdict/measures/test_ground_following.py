@@ -120,7 +120,7 @@ def test_the_autopilots_climb_limit_is_named_where_it_is_lower() -> None:
     setup = replace(over_step(), autopilot=law)
     item = slope_of(setup, flown(setup))
     assert (
-        "TECS_CLMB_MAX 2 m/s permits a climb of 4.5°; the aircraft would fly up to 111 m too low over the ground"
+        "TECS_CLMB_MAX 2 m/s permits a climb of 4.5°, so the aircraft would fly up to 111 m too low over the ground"
         in (item.reason)
     )
 
