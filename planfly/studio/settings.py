@@ -187,7 +187,7 @@ def apply_parameter_settings(current: ChangedParameters, scenario: Scenario, set
         try:
             single = read_parameters(scenario, settings.parameter, "parameter")
         except PlanflyError as error:
-            known_as_file = r"not known to the (simulated \w+); expected a parameter file of .*"
+            known_as_file = r"not used by the (simulated \w+); expected a parameter file of .*"
             text = re.sub(known_as_file, r"not a parameter of the \1", str(error))
             raise PlanflyError(text, file=error.file, field=error.field, value=error.value) from None
         if single.unused:

@@ -254,7 +254,7 @@ def test_a_scenario_lists_its_tiles(tmp_path: Path) -> None:
     assert written["terrain"]["path"][3] == str(tmp_path / "dem" / "11.tif")
     assert scenario_from_spec(written, "a plan").terrain.sha256 == listed.terrain.sha256  # type: ignore[union-attr]
     cut(tmp_path / "dem", "11.tif", slice(ROWS // 2, ROWS), slice(COLS // 2, COLS - 1))
-    with pytest.raises(ScenarioError, match="has changed since"):
+    with pytest.raises(ScenarioError, match="the file has changed: its SHA-256 differs"):
         scenario_from_spec(written, "a plan")
 
 

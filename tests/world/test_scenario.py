@@ -165,7 +165,7 @@ def test_origin_and_area_come_from_the_tile(tmp_path: Path) -> None:
 def test_a_tile_that_changed_is_noticed(tmp_path: Path) -> None:
     data = scenario_from_spec(_dem(tmp_path), "x", base=tmp_path).to_json()
     np.savez(tmp_path / "tile.npz", elevation=np.ones((240, 300)), xmin=9, xmax=9.1, ymin=46.9, ymax=47)
-    with pytest.raises(ScenarioError, match="the file has changed since"):
+    with pytest.raises(ScenarioError, match="the file has changed: its SHA-256 differs"):
         scenario_from_spec(data, "plan.json")
 
 
