@@ -237,11 +237,17 @@ class Search:
             self.evaluate(self.straight_vectors())
         raise SearchEnded
 
-    def straight_vectors(self) -> Floats:
-        """Return the straight line as a vector (1, d) of the rotated encoding."""
+    def straight_vectors(self, *, has_equal_legs: bool = False) -> Floats:
+        """Return the straight line as a vector (1, d) of the rotated encoding.
+
+        has_equal_legs: False for waypoints in the middle of their intervals, so that the first and last leg have half
+            the length of the others.
+        """
         encoding, space = self.encoding, self.problem.space
         edges = encoding.lower[0::3], encoding.upper[0::3]
         fractions = 0.5 * (edges[0] + edges[1]) / edges[1][-1]
+        if has_equal_legs:
+            fractions = np.arange(1, encoding.waypoints - 1) / (encoding.waypoints - 1)
         path = space.start + np.concatenate([[0.0], fractions, [1.0]])[:, None] * (space.destination - space.start)
         return rotated_vectors(space, encoding, path[None])
 
@@ -316,7 +322,7 @@ class Search:
             if self.has_safe() and path_length(path) >= self.length_ratio() * self._straight_length():
                 return False
             certificate = certify(self.problem, path)
-            if self._keep_if_finished(path, certificate):
+            if self.keep_if_finished(path, certificate):
                 return True
             least_distance = 0.0 if self.furthest_short is None else self.furthest_short[1].kill_distance
             if certificate.ok and certificate.kill_distance > least_distance:
@@ -326,7 +332,7 @@ class Search:
         self.narrow_places += list(closest_places(data, path, self.required_distance + data.tracking.across))
         return self._shorten_again(path)
 
-    def _keep_if_finished(self, path: Floats, certificate: Certificate) -> bool:
+    def keep_if_finished(self, path: Floats, certificate: Certificate) -> bool:
         """Keep a path (w, 3) as the shortest, report it, and return True, if its certificate meets the goal."""
         if not self.meets_goal(certificate):
             return False
@@ -355,7 +361,7 @@ class Search:
             if path_length(path) >= max_length:
                 return False
             certificate = certify(self.problem, path)
-            if self._keep_if_finished(path, certificate):
+            if self.keep_if_finished(path, certificate):
                 return True
         return False
 
