@@ -85,6 +85,9 @@ SLOPE_MARGINS_RAD = (math.radians(0.2), math.radians(0.6))
 MAX_MISSING_DISTANCE_M = max(*EXTRA_MARGINS_M, *CORNER_MARGINS_M)
 # Distance from missiles in addition to the certificate's margin, m, in gaps too narrow for the search's usual margin.
 NARROW_KILL_MARGIN_M = 1.0
+# Maximum height in addition to the clearance of a search for which the usual height leaves no path, m. With a tracking
+# error of 10 m, only ground steeper than 75 degrees requires more.
+LOW_BUFFER_M = 60.0
 # Shortening by which a path must improve the best path to pass missiles more closely than usual, as a fraction.
 NARROW_GAIN_FRACTION = 0.002
 # Evaluations that must be left for `move_all_waypoints`; otherwise it is skipped.
@@ -102,6 +105,21 @@ def with_narrow_margins(problem: Problem) -> Problem:
     data = problem.search
     margin = data.tracking.across + problem.certified.kill_margin + NARROW_KILL_MARGIN_M
     return replace(problem, search=data._replace(kill_margin=min(data.kill_margin, margin)))
+
+
+def with_low_buffer(problem: Problem) -> Problem:
+    """Return a problem whose search keeps at most `LOW_BUFFER_M` in addition to the clearance.
+
+    The usual buffer includes the rise of the map's steepest ground across the tracking error. A single cliff may
+    therefore close the whole map, although the certificate considers the ground only where a path passes it.
+    """
+    data = problem.search
+    low_data = data._replace(
+        buffer=min(data.buffer, LOW_BUFFER_M),
+        start_buffer=min(data.start_buffer, LOW_BUFFER_M),
+        destination_buffer=min(data.destination_buffer, LOW_BUFFER_M),
+    )
+    return replace(problem, search=low_data)
 
 
 class SearchEnded(Exception):

@@ -25,7 +25,15 @@ from planner.evaluation.encoding import (
 )
 from planner.evaluation.problem import ProblemArrays
 from planner.plan import Certificate, Violation
-from planner.search.search_state import Search, SearchEnded, are_safe, best_first, with_narrow_margins
+from planner.search.search_state import (
+    LOW_BUFFER_M,
+    Search,
+    SearchEnded,
+    are_safe,
+    best_first,
+    with_low_buffer,
+    with_narrow_margins,
+)
 from planner.seeding.airspace_grids import airspace_routes
 from planner.seeding.grids import GridRoute, grid_routes
 from planner.seeding.lattice import MAX_EXPANDED, ceiling_route, lattice_route, make_lattice, turning_step
@@ -343,9 +351,14 @@ def search_turning_back(search: Search, best: tuple[Floats, Certificate]) -> tup
     Returns the better of the new path and `best`, with its certificate.
     """
     best, is_complete = _search_lattices(search, best, is_guided=False)
-    if is_complete or search.meets_goal(best[1]) or search.must_end():
+    usual_problem, has_high_buffer = search.problem, search.problem.search.buffer > LOW_BUFFER_M
+    if search.meets_goal(best[1]) or search.must_end() or (is_complete and not has_high_buffer):
         return best
-    return _search_lattices(search, best, is_guided=True)[0]
+    search.problem = with_low_buffer(usual_problem) if has_high_buffer else usual_problem
+    try:
+        return _search_lattices(search, best, is_guided=True)[0]
+    finally:
+        search.problem = usual_problem
 
 
 def _search_lattices(

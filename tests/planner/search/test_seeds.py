@@ -394,6 +394,39 @@ def test_close_ends_on_a_large_map_are_joined_by_the_straight_line(
     assert plan.evaluations == 1
 
 
+def test_cliffs_do_not_close_the_flat_ground_between_them(tmp_path: Path) -> None:
+    """The same room of rock: walls of 300 m width that rise 1,400 m within one pixel of 50 m, and a path 600 m away.
+
+    The rise of the steepest ground across the tracking error is more than the 120 m between the ends and the clearance.
+    """
+    axis = np.linspace(-10_000.0, 10_000.0, 401)
+    east, north = np.meshgrid(axis, axis)
+    is_wall = (east > 2500) & (east < 2800) & (np.abs(north) < 2800)
+    is_wall |= (np.abs(north) > 2500) & (np.abs(north) < 2800) & (np.abs(east) < 2800)
+    half_width, half_height = 10_000.0 / 111_319.49, 10_000.0 / 110_574.0
+    box = {"xmin": 10.0 - half_width, "xmax": 10.0 + half_width, "ymin": -half_height, "ymax": half_height}
+    np.savez(tmp_path / "walls.npz", elevation=np.where(is_wall, 1500.0, 100.0).astype(np.float32), **box)
+    (tmp_path / "walls.toml").write_text(
+        """name = "walls"
+terrain = {kind = "dem", path = "walls.npz"}
+area = {east_m = [-9500, 9500], north_m = [-9500, 9500], ceiling_amsl_m = 1000}
+start = {east_m = 8000, north_m = 0, height_m = 150}
+destination = {east_m = 0, north_m = 0, height_m = 150}
+""",
+        encoding="utf-8",
+    )
+    scenario = load_scenario(str(tmp_path / "walls.toml"))
+    limits = load_uav(scenario).limits
+    assert make_problem(scenario, limits).search.buffer > 120.0
+    corners = [(8000, 0), (3400, 3400), (2700, 3400), (-2700, 3400), (-3400, 2700), (-3400, 2000), (0, 0)]
+    known = np.array([[*corner, 250.0] for corner in corners], dtype=np.float64)
+    known[[0, -1]] = scenario.start, scenario.destination
+    assert certify_waypoints(scenario, limits, known, seed=1).safe
+    plan = plan_path(scenario, limits, seed=1)
+    assert plan.safe, plan.certificate.problems
+    assert leg_runs(plan.waypoints).sum() < leg_runs(known).sum()
+
+
 def test_it_is_not_looked_for_where_a_straight_frame_holds_a_short_path(
     make_limits: Callable[[Scenario], Limits], monkeypatch: pytest.MonkeyPatch
 ) -> None:
