@@ -205,7 +205,7 @@ class PartialResampling(BoxSearch):
 
         The variables are regarded as a ring, so that the last one is a neighbour of the first.
         """
-        count, size = self._points.shape
+        count, size = len(self._points), self.lower.size
         is_redrawn = self._rng.random((count, size)) < self._fractions[:, None]
         first_variables = self._rng.integers(0, size, count)
         is_redrawn[np.arange(count), first_variables] = True

@@ -86,6 +86,9 @@ SLOPE_MARGINS_RAD = (math.radians(0.2), math.radians(0.6))
 MAX_MISSING_DISTANCE_M = max(*EXTRA_MARGINS_M, *CORNER_MARGINS_M)
 # Distance from missiles in addition to the certificate's margin, m, in gaps too narrow for the search's usual margin.
 NARROW_KILL_MARGIN_M = 1.0
+# Maximum height in addition to the clearance of a search for which the usual height leaves no path, m. With a tracking
+# error of 10 m, only ground steeper than 75 degrees requires more.
+LOW_BUFFER_M = 60.0
 # Shortening by which a path must improve the best path to pass missiles more closely than usual, as a fraction.
 NARROW_GAIN_FRACTION = 0.002
 # Evaluations that must be left for `move_all_waypoints`; otherwise it is skipped.
@@ -103,6 +106,21 @@ def with_narrow_margins(problem: Problem) -> Problem:
     data = problem.search
     margin = data.tracking.across + problem.certified.kill_margin + NARROW_KILL_MARGIN_M
     return replace(problem, search=data._replace(kill_margin=min(data.kill_margin, margin)))
+
+
+def with_low_buffer(problem: Problem) -> Problem:
+    """Return a problem whose search keeps at most `LOW_BUFFER_M` in addition to the clearance.
+
+    The usual buffer includes the rise of the map's steepest ground across the tracking error. A single cliff may
+    therefore close the whole map, although the certificate considers the ground only where a path passes it.
+    """
+    data = problem.search
+    low_data = data._replace(
+        buffer=min(data.buffer, LOW_BUFFER_M),
+        start_buffer=min(data.start_buffer, LOW_BUFFER_M),
+        destination_buffer=min(data.destination_buffer, LOW_BUFFER_M),
+    )
+    return replace(problem, search=low_data)
 
 
 class SearchEnded(Exception):
@@ -238,11 +256,17 @@ class Search:
             self.evaluate(self.straight_vectors())
         raise SearchEnded
 
-    def straight_vectors(self) -> Floats:
-        """Return the straight line as a vector (1, d) of the rotated encoding."""
+    def straight_vectors(self, *, has_equal_legs: bool = False) -> Floats:
+        """Return the straight line as a vector (1, d) of the rotated encoding.
+
+        has_equal_legs: False for waypoints in the middle of their intervals, so that the first and last leg have half
+            the length of the others.
+        """
         encoding, space = self.encoding, self.problem.space
         edges = encoding.lower[0::3], encoding.upper[0::3]
         fractions = 0.5 * (edges[0] + edges[1]) / edges[1][-1]
+        if has_equal_legs:
+            fractions = np.arange(1, encoding.waypoints - 1) / (encoding.waypoints - 1)
         path = space.start + np.concatenate([[0.0], fractions, [1.0]])[:, None] * (space.destination - space.start)
         return rotated_vectors(space, encoding, path[None])
 
@@ -321,7 +345,7 @@ class Search:
             if self.has_safe() and path_length(path) >= self.length_ratio() * self._straight_length():
                 return False
             certificate = certify(self.problem, path)
-            if self._keep_if_finished(path, certificate):
+            if self.keep_if_finished(path, certificate):
                 return True
             least_distance = 0.0 if self.furthest_shortened is None else self.furthest_shortened[1].kill_distance
             if certificate.ok and certificate.kill_distance > least_distance:
@@ -331,7 +355,7 @@ class Search:
         self.narrow_places += list(closest_places(data, path, self.required_distance + data.tracking.across))
         return self._shorten_again(path)
 
-    def _keep_if_finished(self, path: Floats, certificate: Certificate) -> bool:
+    def keep_if_finished(self, path: Floats, certificate: Certificate) -> bool:
         """If a path (w, 3) meets the goal, store it as the shortest path, report it, and return True."""
         if not self.meets_goal(certificate):
             return False
@@ -360,7 +384,7 @@ class Search:
             if path_length(path) >= max_length:
                 return False
             certificate = certify(self.problem, path)
-            if self._keep_if_finished(path, certificate):
+            if self.keep_if_finished(path, certificate):
                 return True
         return False
 

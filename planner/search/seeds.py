@@ -14,6 +14,7 @@ from contextlib import suppress
 import numpy as np
 
 from planner.airspace.zone_limits import is_limited
+from planner.evaluation.certify import certify
 from planner.evaluation.encoding import (
     Encoding,
     require_frames,
@@ -23,8 +24,16 @@ from planner.evaluation.encoding import (
     sample_route,
 )
 from planner.evaluation.problem import ProblemArrays
-from planner.plan import Certificate
-from planner.search.search_state import Search, SearchEnded, are_safe, best_first, with_narrow_margins
+from planner.plan import Certificate, Violation
+from planner.search.search_state import (
+    LOW_BUFFER_M,
+    Search,
+    SearchEnded,
+    are_safe,
+    best_first,
+    with_low_buffer,
+    with_narrow_margins,
+)
 from planner.seeding.airspace_grids import airspace_routes
 from planner.seeding.grids import GridRoute, grid_routes
 from planner.seeding.lattice import MAX_EXPANDED, ceiling_route, lattice_route, make_lattice, turning_step
@@ -55,11 +64,25 @@ def try_straight_line(search: Search) -> bool:
     if search.encoding.name != "rotated":
         return False
     vectors = search.straight_vectors()
-    scores = search.score(vectors)
-    if not are_safe(scores[0]):
+    if are_safe(search.score(vectors)[0]):
+        search.evaluate(vectors)
+        return search.meets_goal(search.best_certified()[1])
+    return _try_equal_legs(search)
+
+
+def _try_equal_legs(search: Search) -> bool:
+    """Return True if the straight line is safe with equal legs, the longest possible between ends close together.
+
+    It is tried only if nothing but short legs violates a constraint: the certificate allows shorter legs than scores.
+    """
+    vectors = search.straight_vectors(has_equal_legs=True)
+    scores = search.score(vectors)[0]
+    scores[Violation.TURN] = 0.0
+    path = np.ascontiguousarray(search.encoding.decode(vectors)[0])
+    if not (are_safe(scores) and search.keep_if_finished(path, certify(search.problem, path))):
         return False
     search.evaluate(vectors)
-    return search.meets_goal(search.best_certified()[1])
+    return True
 
 
 def starting_vectors(
@@ -330,6 +353,28 @@ def search_turning_back(search: Search, best: tuple[Floats, Certificate]) -> tup
 
     best: best path so far, with its certificate.
     """
+    best, is_complete = _search_lattices(search, best, is_guided=False)
+    usual_problem, has_high_buffer = search.problem, search.problem.search.buffer > LOW_BUFFER_M
+    if search.meets_goal(best[1]) or search.must_end() or (is_complete and not has_high_buffer):
+        return best
+    search.problem = with_low_buffer(usual_problem) if has_high_buffer else usual_problem
+    try:
+        return _search_lattices(search, best, is_guided=True)[0]
+    finally:
+        search.problem = usual_problem
+
+
+def _search_lattices(
+    search: Search, best: tuple[Floats, Certificate], *, is_guided: bool
+) -> tuple[tuple[Floats, Certificate], bool]:
+    """Search along the cheapest routes over lattices, until a path is safe.
+
+    best: best path so far, with its certificate.
+    is_guided: True for an estimate of the remaining length that knows obstacles and slopes, so that the search reaches
+        further with the same number of states.
+
+    Returns the better of the new path and `best`, with its certificate, and True if states remain.
+    """
     data, space = search.problem.search, search.problem.space
     frame, step = rotated_frame(space.start, space.destination), turning_step(data)
     lattices = [make_lattice(data, frame, step_fraction * step) for step_fraction in LATTICE_STEP_FRACTIONS]
@@ -339,7 +384,9 @@ def search_turning_back(search: Search, best: tuple[Floats, Certificate]) -> tup
         if remaining_states <= 0 or search.must_end() or lattices[index] in lattices[:index]:
             break
         try:
-            route, expanded_count = lattice_route(data, frame, step_fraction * step, search.pause, remaining_states)
+            route, expanded_count = lattice_route(
+                data, frame, step_fraction * step, search.pause, remaining_states, is_guided=is_guided
+            )
         except SearchEnded:
             break
         remaining_states -= expanded_count
@@ -350,13 +397,14 @@ def search_turning_back(search: Search, best: tuple[Floats, Certificate]) -> tup
             break
         path, certificate, is_shortened = _search_along_route(search, route)
         if search.meets_goal(certificate) and (not is_safe or path_length(path) < path_length(best[0])):
-            return (path, certificate) if is_shortened else _follow_shortened(search, (path, certificate))
+            best = (path, certificate) if is_shortened else _follow_shortened(search, (path, certificate))
+            break
         if not is_safe and (certificate.ok, certificate.kill_distance) > (
             best[1].ok,
             best[1].kill_distance,
         ):
             best = path, certificate
-    return best
+    return best, remaining_states > 0
 
 
 def _follow_shortened(search: Search, best: tuple[Floats, Certificate]) -> tuple[Floats, Certificate]:

@@ -24,6 +24,7 @@ from planner.seeding.grids import (
     GridRoute,
     fill_goal_distances,
     find_obstacles,
+    positions_across,
     proximity_cost,
     to_world_position,
 )
@@ -436,7 +437,7 @@ def airspace_grid(data: ProblemArrays, frame: RotatedFrame, span: tuple[float, f
     follows_ground = math.isfinite(band_height)
     while True:
         step = frame.length / stages
-        across = np.arange(-math.floor(-span[0] / step), math.floor(span[1] / step) + 1) * step
+        width = math.floor(-span[0] / step) + math.floor(span[1] / step) + 1
         layer_spacing = max(1.0, gentler_slope * step / LAYERS_PER_STEP)
         if follows_ground:
             layers = min(MAX_LAYERS, max(MIN_LAYERS, math.ceil(band_height / layer_spacing) + 1))
@@ -447,10 +448,9 @@ def airspace_grid(data: ProblemArrays, frame: RotatedFrame, span: tuple[float, f
         else:
             layer_spacing = max(layer_spacing, MIN_LAYER_SPACING_STEPS * step)
             layers = max(1, math.floor((data.ceiling - min_altitude) / layer_spacing) + 1)
-        if stages <= 8 or (stages + 1) * across.size * layers <= MAX_CELLS:
-            return AirspaceGrid(
-                stages, np.asarray(across, np.float64), layers, layer_spacing, follows_ground, min_altitude, gentle=True
-            )
+        if stages <= 8 or (stages + 1) * width * layers <= MAX_CELLS:
+            across = positions_across(span, step, stages)
+            return AirspaceGrid(stages, across, layers, layer_spacing, follows_ground, min_altitude, gentle=True)
         stages = max(8, int(stages / 1.2))
 
 

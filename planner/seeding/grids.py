@@ -595,6 +595,18 @@ class GridRoute:
     cost: float
 
 
+def positions_across(span: tuple[float, float], spacing: float, stages: int) -> Floats:
+    """Return the positions across of a grid's cells, m: those within a span that a route over all stages can reach.
+
+    span: lowest and highest position across, m.
+
+    A route begins and ends in the middle. If its ends are close together, it can reach only a small part of the map.
+    """
+    reach = MAX_SIDE * (stages // 2)
+    first, last = max(-reach, math.ceil(span[0] / spacing)), min(reach, math.floor(span[1] / spacing))
+    return np.asarray(np.arange(first, last + 1) * spacing, np.float64)
+
+
 def make_grid(data: ProblemArrays, frame: RotatedFrame, span: tuple[float, float], stages: int) -> Grid:
     """Make a grid with square cells on the map, and with one layer at the altitude of the start.
 
@@ -608,16 +620,15 @@ def make_grid(data: ProblemArrays, frame: RotatedFrame, span: tuple[float, float
     while True:
         step = frame.length / stages
         layer_spacing = spacing_ratio * step
-        right_count, left_count = math.floor(-span[0] / step), math.floor(span[1] / step)
-        across = np.arange(-right_count, left_count + 1) * step
+        width = math.floor(-span[0] / step) + math.floor(span[1] / step) + 1
         layer_numbers = np.arange(
             math.ceil((min_altitude - data.start[2]) / layer_spacing),
             math.floor((max_altitude - data.start[2]) / layer_spacing) + 1,
         )
-        if stages <= 4 or (stages + 1) * across.size * max(1, layer_numbers.size) <= MAX_CELLS:
+        if stages <= 4 or (stages + 1) * width * max(1, layer_numbers.size) <= MAX_CELLS:
             return Grid(
                 stages,
-                np.asarray(across, np.float64),
+                positions_across(span, step, stages),
                 np.asarray(data.start[2] + layer_numbers * layer_spacing, np.float64),
             )
         stages = max(4, int(stages / 1.2))

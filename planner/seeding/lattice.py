@@ -2,8 +2,9 @@
 
 A* search (Hart, Nilsson and Raphael, 1968) over states of a lattice point and one of eight courses. A step leads to a
 neighbouring point, turns by no more than a right angle, and climbs or descends within the slope limits; a route that
-needs more distance to climb than is available therefore circles. The heuristic is the straight distance to the goal.
-The resulting route is simplified by replacing steps with feasible straight legs (`simplify_route`).
+needs more distance to climb than is available therefore circles. The heuristic is the straight distance to the goal, or
+in a guided search an estimate that knows obstacles and slopes. The resulting route is simplified by replacing steps
+with feasible straight legs (`simplify_route`).
 """
 
 import heapq
@@ -103,6 +104,20 @@ def _climb_layers(data: ProblemArrays, frame: RotatedFrame, lattice: Lattice) ->
     return layers
 
 
+class Heuristic(NamedTuple):
+    """Estimate of the remaining length of a state's route to the goal.
+
+    squared_distances: (along x across,) square of the horizontal length from each column to the goal, m2.
+    climb_length, descent_length: minimum horizontal length per metre of climb or descent, m; 0 to ignore it.
+    weight: factor on the estimate. Above 1 the search finds a route sooner, but not the cheapest.
+    """
+
+    squared_distances: Floats
+    climb_length: float
+    descent_length: float
+    weight: float
+
+
 class _StateTable(NamedTuple):
     """Costs (m), parents and expanded flags of the search's states, and the feasibility of its steps.
 
@@ -110,6 +125,7 @@ class _StateTable(NamedTuple):
         the start.
     layer_limits: (8, 2) maximum climb and descent in layers.
     steps: feasibility by cell, course and change of layer.
+    heuristic: estimate of the remaining length.
     """
 
     cost: Floats
@@ -117,6 +133,19 @@ class _StateTable(NamedTuple):
     is_expanded: Flags
     layer_limits: Codes
     steps: Bytes
+    heuristic: Heuristic
+
+
+@inner
+def _remaining_cost(lattice: Lattice, heuristic: Heuristic, position: int, altitude: float) -> float:
+    """Return the estimated cost from a column of a lattice at an altitude to the goal, m.
+
+    position: index of the column in `heuristic.squared_distances`.
+    """
+    climb = lattice.low + lattice.goal_layer * lattice.layer_spacing - altitude
+    slope_length = climb * heuristic.climb_length if climb > 0.0 else climb * heuristic.descent_length
+    squared_distance = max(heuristic.squared_distances[position], slope_length * slope_length)
+    return heuristic.weight * math.sqrt(squared_distance + climb * climb)
 
 
 @inner
@@ -134,16 +163,15 @@ def _expand_state(
 
     max_turn: largest turn per step, in units of 45 degrees.
 
-    The priority of a successor is its cost plus its distance to the goal.
+    The priority of a successor is its cost plus its remaining cost.
     """
     layer_limits, course, cell = table.layer_limits, state % 8, state // 8
     layer, position = cell % lattice.layers, cell // lattice.layers
     along, across = position // lattice.across, position % lattice.across
     max_descent = np.max(layer_limits[:, 1])
     width = np.max(layer_limits[:, 0]) + max_descent + 1
-    start, end, goal = np.empty(3), np.empty(3), np.empty(3)
+    start, end = np.empty(3), np.empty(3)
     _set_position(frame, lattice, along, across, layer, start)
-    _set_position(frame, lattice, lattice.goal, lattice.right, lattice.goal_layer, goal)
     for turn in range(-max_turn, max_turn + 1):
         next_course = (course + turn) % 8
         next_along, next_across = along + _STEPS[next_course, 0], across + _STEPS[next_course, 1]
@@ -152,7 +180,8 @@ def _expand_state(
         lowest_layer = max(0, layer - layer_limits[next_course, 1])
         highest_layer = min(lattice.layers - 1, layer + layer_limits[next_course, 0])
         for next_layer in range(lowest_layer, highest_layer + 1):
-            next_state = ((next_along * lattice.across + next_across) * lattice.layers + next_layer) * 8 + next_course
+            next_position = next_along * lattice.across + next_across
+            next_state = (next_position * lattice.layers + next_layer) * 8 + next_course
             _set_position(frame, lattice, next_along, next_across, next_layer, end)
             length = math.sqrt((end[0] - start[0]) ** 2 + (end[1] - start[1]) ** 2 + (end[2] - start[2]) ** 2)
             total = table.cost[state] + length + TURN_COST * lattice.step * abs(turn)
@@ -168,8 +197,8 @@ def _expand_state(
                 table.steps[step_index] = _FREE if is_free else _CLOSED
             if table.steps[step_index] == _FREE:
                 table.cost[next_state], table.parents[next_state] = total, state + 1
-                goal_distance = math.sqrt((end[0] - goal[0]) ** 2 + (end[1] - goal[1]) ** 2 + (end[2] - goal[2]) ** 2)
-                heapq.heappush(open_states, (total + goal_distance, next_state))
+                remaining_cost = _remaining_cost(lattice, table.heuristic, next_position, end[2])
+                heapq.heappush(open_states, (total + remaining_cost, next_state))
 
 
 class LatticeSearch(NamedTuple):
@@ -186,9 +215,95 @@ class LatticeSearch(NamedTuple):
     goal_state: int
 
 
-def begin_lattice_search(data: ProblemArrays, frame: RotatedFrame, lattice: Lattice) -> LatticeSearch:
-    """Return a new search for a route from start to destination, before its first expansion."""
+# Factor on the length of a step that is closed in every layer, in the distances of a guided search. A sloped step may
+# be free there.
+CLOSED_LENGTH_FACTOR = 100.0
+# Factor on the estimate of a guided search: many routes climb or descend equally well, and one of them is enough.
+GUIDED_WEIGHT = 1.5
+
+
+@compiled
+def _straight_distances(frame: RotatedFrame, lattice: Lattice) -> Floats:
+    """Return the square of the straight distance from each column of a lattice to the goal, (along x across,) m2."""
+    squared_distances, point, goal = np.empty(lattice.along * lattice.across), np.empty(3), np.empty(3)
+    _set_position(frame, lattice, lattice.goal, lattice.right, lattice.goal_layer, goal)
+    for position in range(squared_distances.size):
+        _set_position(frame, lattice, position // lattice.across, position % lattice.across, 0, point)
+        squared_distances[position] = (point[0] - goal[0]) ** 2 + (point[1] - goal[1]) ** 2
+    return squared_distances
+
+
+@compiled
+def _distances_around_obstacles(data: ProblemArrays, frame: RotatedFrame, lattice: Lattice) -> Floats:
+    """Return the length of the shortest way from each column of a lattice to the goal's column, (along x across,) m.
+
+    Dijkstra's algorithm (1959) over steps to the eight neighbours. A step that is free in no layer has
+    `CLOSED_LENGTH_FACTOR` times its length.
+    """
+    limits = precompute_limits(data)
+    distances, start, end = np.full(lattice.along * lattice.across, np.inf), np.empty(3), np.empty(3)
+    goal = lattice.goal * lattice.across + lattice.right
+    distances[goal], open_layer = 0.0, lattice.goal_layer
+    open_columns = [(0.0, goal)]
+    while len(open_columns) > 0:
+        distance, position = heapq.heappop(open_columns)
+        if distance > distances[position]:
+            continue
+        along, across = position // lattice.across, position % lattice.across
+        for course in range(8):
+            next_along, next_across = along + _STEPS[course, 0], across + _STEPS[course, 1]
+            if not (0 <= next_along < lattice.along and 0 <= next_across < lattice.across):
+                continue
+            next_position = next_along * lattice.across + next_across
+            length = lattice.step * math.hypot(_STEPS[course, 0], _STEPS[course, 1])
+            if distance + length >= distances[next_position]:
+                continue
+            is_free = False
+            for k in range(lattice.layers):
+                # First the layer that was free for the previous step.
+                layer = (open_layer + k) % lattice.layers
+                _set_position(frame, lattice, next_along, next_across, layer, start)
+                _set_position(frame, lattice, along, across, layer, end)
+                max_cost = MAX_COST_RATIO * length
+                if (
+                    _is_inside(data, start)
+                    and _is_inside(data, end)
+                    and penalised_leg_cost(data, limits, start, end, max_cost) <= max_cost
+                ):
+                    is_free, open_layer = True, layer
+                    break
+            next_distance = distance + (length if is_free else CLOSED_LENGTH_FACTOR * length)
+            if next_distance < distances[next_position]:
+                distances[next_position] = next_distance
+                heapq.heappush(open_columns, (next_distance, next_position))
+    return distances
+
+
+def _guiding_heuristic(data: ProblemArrays, frame: RotatedFrame, lattice: Lattice, layer_limits: Codes) -> Heuristic:
+    """Return the estimate of a guided search: around obstacles, and long enough to climb or descend.
+
+    layer_limits: (8, 2) maximum climb and descent of a step in layers.
+    """
+    step_lengths = lattice.step * np.hypot(_STEPS[:, 0], _STEPS[:, 1])
+    slopes = (layer_limits * lattice.layer_spacing / step_lengths[:, None]).max(axis=0)
+    climb_length, descent_length = (1.0 / slope if slope > 0.0 else 0.0 for slope in slopes)
+    distances = _distances_around_obstacles(data, frame, lattice)
+    return Heuristic(distances**2, climb_length, descent_length, GUIDED_WEIGHT)
+
+
+def begin_lattice_search(
+    data: ProblemArrays, frame: RotatedFrame, lattice: Lattice, *, is_guided: bool = False
+) -> LatticeSearch:
+    """Return a new search for a route from start to destination, before its first expansion.
+
+    is_guided: True for an estimate of the remaining length that knows obstacles and slopes.
+    """
     layer_limits = _climb_layers(data, frame, lattice)
+    heuristic = (
+        _guiding_heuristic(data, frame, lattice, layer_limits)
+        if is_guided
+        else Heuristic(_straight_distances(frame, lattice), 0.0, 0.0, 1.0)
+    )
     state_count = lattice.along * lattice.across * lattice.layers * 8
     width = int(layer_limits.max(axis=0).sum()) + 1
     # Large arrays of zeros from NumPy take memory only where they are written to, mostly a small part.
@@ -198,6 +313,7 @@ def begin_lattice_search(data: ProblemArrays, frame: RotatedFrame, lattice: Latt
         np.zeros(state_count, dtype=np.bool_),
         layer_limits,
         np.zeros(state_count * width, dtype=np.int8),
+        heuristic,
     )
     states = _start_states(data, frame, lattice, table)
     return LatticeSearch(table, np.zeros(states.size), states, 0, -1)
@@ -319,6 +435,8 @@ MAX_STEP_M = 2000.0
 LAYERS_PER_STEP = 2
 # Maximum number of states of a lattice.
 MAX_LATTICE_STATES = 4_000_000
+# Factor on the step of a lattice that has too many states, if the ends are closer together than a step.
+SPACING_FACTOR = 1.1
 # Maximum number of expanded states of all lattices of a search together.  In 600 scenarios, no finer lattice had a
 # route if the first lattice had used up this number.
 MAX_EXPANDED = 60_000
@@ -346,28 +464,34 @@ def make_lattice(data: ProblemArrays, frame: RotatedFrame, step: float) -> Latti
 
     step: maximum spacing of the points, m. It is increased if the lattice would otherwise have more than
         `MAX_LATTICE_STATES` states.
+
+    If the ends are closer together than a step, the goal is the point a step from the start.
     """
     corners = [(east, north, 0.0) for east in (data.west, data.east) for north in (data.south, data.north)]
     min_corner, max_corner = frame.to_frame(corners)[:, :2].min(axis=0), frame.to_frame(corners)[:, :2].max(axis=0)
     level_point = np.array([*data.destination[:2], data.start[2]])
     gentler_slope = math.tan(max(0.01, min(slope_limits(data, np.array(data.start), level_point))))
     min_altitude = max(data.floor, float(np.nanmin(data.heights)) + data.clearance)
-    stages = max(1, math.ceil(frame.length / step))
+    stages, spacing = max(1, math.ceil(frame.length / step)), frame.length
     # Enlarge the spacing until the lattice is small enough.
     while True:
-        step = frame.length / stages
-        layer_spacing = gentler_slope * step / LAYERS_PER_STEP
-        behind, right = math.floor(-min_corner[0] / step), math.floor(-min_corner[1] / step)
-        along, across = behind + math.floor(max_corner[0] / step) + 1, right + math.floor(max_corner[1] / step) + 1
+        spacing = frame.length / stages if stages > 1 else max(frame.length, step)
+        layer_spacing = gentler_slope * spacing / LAYERS_PER_STEP
+        behind, right = math.floor(-min_corner[0] / spacing), math.floor(-min_corner[1] / spacing)
+        along = behind + math.floor(max_corner[0] / spacing) + 1
+        across = right + math.floor(max_corner[1] / spacing) + 1
         layers_below = max(0, math.floor((data.start[2] - min_altitude) / layer_spacing))
         layers = layers_below + max(0, math.floor((data.ceiling - data.start[2]) / layer_spacing)) + 1
-        if stages == 1 or along * across * layers * 8 <= MAX_LATTICE_STATES:
+        if along * across * layers * 8 <= MAX_LATTICE_STATES:
             break
-        stages -= 1
+        if stages > 1:
+            stages -= 1
+        else:
+            step *= SPACING_FACTOR
     goal_layer = min(layers - 1, max(0, round((data.destination[2] - data.start[2]) / layer_spacing) + layers_below))
     first_altitude = data.start[2] - layers_below * layer_spacing
     return Lattice(
-        step,
+        spacing,
         behind,
         right,
         along,
@@ -388,6 +512,8 @@ def cheapest_lattice_route(
     max_turn: int,
     max_states: int,
     pause: Callable[[], None] = lambda: None,
+    *,
+    is_guided: bool = False,
 ) -> tuple[Records, int]:
     """Find the cheapest route over a lattice.
 
@@ -395,10 +521,11 @@ def cheapest_lattice_route(
 
     max_turn: largest turn per step, in units of 45 degrees.
     max_states: maximum number of expanded states.
+    is_guided: as in `begin_lattice_search`.
 
     There are no records if there is no route.
     """
-    search = begin_lattice_search(data, frame, lattice)
+    search = begin_lattice_search(data, frame, lattice, is_guided=is_guided)
     while search.goal_state < 0 and len(search.states) and search.expanded_count < max_states:
         search = continue_lattice_search(
             data, frame, lattice, max_turn, search, min(STATES_PER_PAUSE, max_states - search.expanded_count)
@@ -415,19 +542,24 @@ def lattice_route(
     step: float,
     pause: Callable[[], None] = lambda: None,
     max_states: int = MAX_EXPANDED,
+    *,
+    is_guided: bool = False,
 ) -> tuple[Floats, int]:
     """Find a route over a lattice; return its points, (k, 3) m, and the number of expanded states.
 
     step: spacing of the lattice, m.
     pause: called after every `STATES_PER_PAUSE` states; an exception raised there stops the search.
     max_states: maximum number of expanded states.
+    is_guided: as in `begin_lattice_search`.
 
     If there is no route, k is 0.
     """
     lattice = make_lattice(data, frame, step)
     # Turns of up to 90 degrees where the limits allow them; with eight courses 45 degrees is the minimum.
     max_turn = 2 if data.max_turn >= math.radians(90.0) else 1
-    cells, expanded_count = cheapest_lattice_route(data, frame, lattice, max_turn, max_states, pause)
+    cells, expanded_count = cheapest_lattice_route(
+        data, frame, lattice, max_turn, max_states, pause, is_guided=is_guided
+    )
     if not len(cells):
         return np.empty((0, 3)), expanded_count
     positions = np.column_stack([cells["along"], cells["across"]]) * lattice.step

@@ -24,6 +24,7 @@ from planner.seeding.grids import (
     find_obstacles,
     layers_per_step,
     make_grid,
+    positions_across,
     prune_cells,
     relax_cells,
     relax_stage,
@@ -421,7 +422,7 @@ def optimistic_grid(
     """
     square_grid = make_grid(data, frame, span, stages)
     step = ratio * frame.length / square_grid.stages
-    across = np.arange(math.ceil(span[0] / step), math.floor(span[1] / step) + 1) * step
+    across = positions_across(span, step, square_grid.stages)
     layers, start_altitude = square_grid.layers, data.start[2]
     if data.ceiling > start_altitude and layers.size > 1:
         layer_spacing = (data.ceiling - start_altitude) / math.ceil(
@@ -435,6 +436,4 @@ def optimistic_grid(
             )
             * layer_spacing
         )
-    return square_grid._replace(
-        across=np.asarray(across, np.float64), layers=layers, shrink=shrink, spread=spread, ratio=ratio
-    )
+    return square_grid._replace(across=across, layers=layers, shrink=shrink, spread=spread, ratio=ratio)

@@ -88,7 +88,10 @@ def test_a_track_alone_needs_a_plan(tmp_path: Path, capsys: Output) -> None:
             lambda path: dataflash(path, program="ArduCopter V4.5.7 (x)"),
             "this log is from a copter (program ArduCopter V4.5.7 (x))",
         ),
-        (lambda path: dataflash(path, program="ArduRover V4.5.0"), "this log is from a rover (program ArduRover V4.5.0)"),
+        (
+            lambda path: dataflash(path, program="ArduRover V4.5.0"),
+            "this log is from a rover (program ArduRover V4.5.0)",
+        ),
         (lambda path: px4(path, vehicle_type=1), "this log is from a copter (program PX4)"),
         (lambda path: telemetry(path, kind=10), "this log is from a rover"),
     ],

@@ -17,7 +17,7 @@ from planner.evaluation.encoding import ENCODINGS, RotatedFrame, rotated_frame
 from planner.evaluation.problem import CERTIFIED_KILL_MARGIN_M, ProblemArrays, make_problem
 from planner.plan import Certificate, Objective
 from planner.search.algorithms import ALGORITHMS
-from planner.search.plan_path import plan_path
+from planner.search.plan_path import certify_waypoints, plan_path
 from planner.search.search_state import Search
 from planner.search.seeds import (
     MIN_DETOUR_FRACTION,
@@ -73,9 +73,16 @@ def test_a_lattice_that_memory_makes_the_same_is_searched_once(
     steps: list[float] = []
 
     def find_none(
-        data: ProblemArrays, frame: RotatedFrame, step: float, pause: Callable[[], None], max_states: int
+        data: ProblemArrays,
+        frame: RotatedFrame,
+        step: float,
+        pause: Callable[[], None],
+        max_states: int,
+        *,
+        is_guided: bool,
     ) -> tuple[Floats, int]:
         steps.append(step)
+        assert not is_guided
         return np.empty((0, 3)), 0
 
     monkeypatch.setattr(seeds_module, "lattice_route", find_none)
@@ -85,17 +92,30 @@ def test_a_lattice_that_memory_makes_the_same_is_searched_once(
     assert len(steps) == searched
 
 
-@pytest.mark.parametrize(("seen", "allowed"), [(25_000, [60_000, 35_000]), (60_000, [60_000])])
+@pytest.mark.parametrize(
+    ("seen", "allowed"),
+    [
+        (25_000, [(False, 60_000), (False, 35_000)]),
+        (60_000, [(False, 60_000), (True, 60_000)]),
+        (30_000, [(False, 60_000), (False, 30_000), (True, 60_000), (True, 30_000)]),
+    ],
+)
 def test_a_second_lattice_expands_no_more_states_than_the_first_has_left(
-    scenario: Scenario, limits: Limits, monkeypatch: pytest.MonkeyPatch, seen: int, allowed: list[int]
+    scenario: Scenario, limits: Limits, monkeypatch: pytest.MonkeyPatch, seen: int, allowed: list[tuple[bool, int]]
 ) -> None:
-    """Neither finds a route, and 60,000 states are for both."""
-    asked: list[int] = []
+    """Neither finds a route, and 60,000 states are for both; if that is not enough, as many for a guided search."""
+    asked: list[tuple[bool, int]] = []
 
     def find_none(
-        data: ProblemArrays, frame: RotatedFrame, step: float, pause: Callable[[], None], max_states: int
+        data: ProblemArrays,
+        frame: RotatedFrame,
+        step: float,
+        pause: Callable[[], None],
+        max_states: int,
+        *,
+        is_guided: bool,
     ) -> tuple[Floats, int]:
-        asked.append(max_states)
+        asked.append((is_guided, max_states))
         return np.empty((0, 3)), seen
 
     monkeypatch.setattr(seeds_module, "lattice_route", find_none)
@@ -278,6 +298,133 @@ def test_traps_are_left_by_short_ways_that_no_straight_frame_holds(
     assert np.diff(frame.to_frame(plan.waypoints)[:, 0]).min() < -100.0
     shortest, share = TRAPS[name]
     assert leg_runs(plan.waypoints).sum() < share * shortest
+
+
+# Plans on flat ground on a map of 20 km, with start and destination as stated.
+OPEN = {"terrain": FLAT, "threats": [], "planner": {"waypoints": 12}}
+MAP = {"east_m": [-10000, 10000], "north_m": [-10000, 10000]}
+
+
+def ends(*places: tuple[float, float, float]) -> dict[str, dict[str, float]]:
+    names = ("start", "destination")
+    return {
+        name: {"east_m": place[0], "north_m": place[1], "height_m": place[2]}
+        for name, place in zip(names, places, strict=True)
+    }
+
+
+def wall(name: str, west: float, east: float, south: float, north: float) -> dict[str, object]:
+    return {
+        "name": name,
+        "kind": "exclusion",
+        "polygon_m": [[west, south], [east, south], [east, north], [west, north]],
+    }
+
+
+@pytest.mark.parametrize("is_reversed", [False, True])
+def test_a_high_room_that_is_open_on_the_far_side_is_entered_round_its_walls(
+    is_reversed: bool, small: Callable[..., Scenario], make_limits: Callable[[Scenario], Limits]
+) -> None:
+    """Three walls of 200 m, up to a ceiling of 1,000 m, so that a lattice has many layers."""
+    places = [(8000.0, 0.0, 150.0), (0.0, 0.0, 150.0)]
+    zones = [
+        wall("e", 2500, 2700, -2500, 2500),
+        wall("n", -2500, 2700, 2500, 2700),
+        wall("s", -2500, 2700, -2700, -2500),
+    ]
+    scenario = small(
+        **OPEN, **ends(*(places[::-1] if is_reversed else places)), zones=zones, area=MAP | {"ceiling_amsl_m": 1000}
+    )
+    limits = make_limits(scenario)
+    # By construction 300 m from the walls and more.
+    corners = [(8000, 0), (2900, 3200), (2400, 3300), (-2500, 3300), (-3200, 3000), (-3200, 2200), (0, 0)]
+    known = np.array([[*corner, 150.0] for corner in (corners[::-1] if is_reversed else corners)], dtype=np.float64)
+    assert certify_waypoints(scenario, limits, known, seed=1).safe
+    plan = plan_path(scenario, limits, seed=1)
+    assert plan.safe, plan.certificate.problems
+    assert leg_runs(plan.waypoints).sum() < leg_runs(known).sum()
+
+
+def test_a_spiral_of_walls_is_followed_with_enough_waypoints(
+    small: Callable[..., Scenario], make_limits: Callable[[Scenario], Limits]
+) -> None:
+    """Corridors of 1,500 m around the destination, one turn and a half."""
+    zones = [
+        wall("w0", -5200, -5000, -5200, 5200),
+        wall("n", -5000, 5000, 5000, 5200),
+        wall("e", 5000, 5200, -5000, 5200),
+        wall("s", -3500, 5200, -5200, -5000),
+        wall("w", -3700, -3500, -5200, 3500),
+        wall("n2", -3700, 3300, 3300, 3500),
+        wall("e2", 3300, 3500, -3300, 3500),
+        wall("s2", -2000, 3500, -3500, -3300),
+    ]
+    scenario = small(
+        **(OPEN | {"planner": {"waypoints": 20}}),
+        **ends((8000.0, 0.0, 150.0), (0.0, 0.0, 150.0)),
+        zones=zones,
+        area=MAP | {"ceiling_amsl_m": 1000},
+    )
+    plan = plan_path(scenario, make_limits(scenario), seed=1)
+    assert plan.safe, plan.certificate.problems
+
+
+@pytest.mark.parametrize(("distance", "climb"), [(300.0, 1900.0), (300.0, -1900.0), (1000.0, 1900.0)])
+def test_a_climb_over_open_ground_makes_a_detour(
+    distance: float, climb: float, small: Callable[..., Scenario], make_limits: Callable[[Scenario], Limits]
+) -> None:
+    heights = (100.0, 2000.0) if climb > 0.0 else (2000.0, 100.0)
+    scenario = small(
+        **OPEN, **ends((0.0, 0.0, heights[0]), (distance, 0.0, heights[1])), area=MAP | {"ceiling_amsl_m": 2500}
+    )
+    plan = plan_path(scenario, make_limits(scenario), seed=1)
+    assert plan.safe, plan.certificate.problems
+
+
+def test_close_ends_on_a_large_map_are_joined_by_the_straight_line(
+    small: Callable[..., Scenario], make_limits: Callable[[Scenario], Limits]
+) -> None:
+    """Eleven equal legs of 60 m are 5.45 m long; each leg must be at least 5 m long."""
+    scenario = small(**OPEN, **ends((0.0, 0.0, 150.0), (60.0, 0.0, 150.0)), area=MAP | {"ceiling_amsl_m": 2500})
+    plan = plan_path(scenario, make_limits(scenario), seed=1)
+    assert plan.safe, plan.certificate.problems
+    assert plan.objectives[Objective.LENGTH_RATIO] == pytest.approx(1.0)
+    np.testing.assert_allclose(leg_runs(plan.waypoints), 60.0 / 11.0)
+    # No other path is tried.
+    assert plan.evaluations == 1
+
+
+def test_cliffs_do_not_close_the_flat_ground_between_them(tmp_path: Path) -> None:
+    """The same room of rock: walls of 300 m width that rise 1,400 m within one pixel of 50 m, and a path 600 m away.
+
+    The rise of the steepest ground across the tracking error is more than the 120 m between the ends and the clearance.
+    """
+    axis = np.linspace(-10_000.0, 10_000.0, 401)
+    east, north = np.meshgrid(axis, axis)
+    is_wall = (east > 2500) & (east < 2800) & (np.abs(north) < 2800)
+    is_wall |= (np.abs(north) > 2500) & (np.abs(north) < 2800) & (np.abs(east) < 2800)
+    half_width, half_height = 10_000.0 / 111_319.49, 10_000.0 / 110_574.0
+    box = {"xmin": 10.0 - half_width, "xmax": 10.0 + half_width, "ymin": -half_height, "ymax": half_height}
+    np.savez(tmp_path / "walls.npz", elevation=np.where(is_wall, 1500.0, 100.0).astype(np.float32), **box)
+    (tmp_path / "walls.toml").write_text(
+        """name = "walls"
+terrain = {kind = "dem", path = "walls.npz"}
+area = {east_m = [-9500, 9500], north_m = [-9500, 9500], ceiling_amsl_m = 1000}
+start = {east_m = 8000, north_m = 0, height_m = 150}
+destination = {east_m = 0, north_m = 0, height_m = 150}
+""",
+        encoding="utf-8",
+    )
+    scenario = load_scenario(str(tmp_path / "walls.toml"))
+    limits = load_uav(scenario).limits
+    assert make_problem(scenario, limits).search.buffer > 120.0
+    corners = [(8000, 0), (3400, 3400), (2700, 3400), (-2700, 3400), (-3400, 2700), (-3400, 2000), (0, 0)]
+    known = np.array([[*corner, 250.0] for corner in corners], dtype=np.float64)
+    known[[0, -1]] = scenario.start, scenario.destination
+    assert certify_waypoints(scenario, limits, known, seed=1).safe
+    plan = plan_path(scenario, limits, seed=1)
+    assert plan.safe, plan.certificate.problems
+    assert leg_runs(plan.waypoints).sum() < leg_runs(known).sum()
 
 
 def test_it_is_not_looked_for_where_a_straight_frame_holds_a_short_path(

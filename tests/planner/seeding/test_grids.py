@@ -24,6 +24,7 @@ from planner.seeding.grids import (
     find_obstacles,
     grid_route,
     make_grid,
+    positions_across,
     relax_cells,
     set_cell_costs,
     to_world_position,
@@ -288,6 +289,13 @@ def test_route_is_the_cheapest_of_all(plain: Problem, stages: int, aside: int) -
             costs.append(way_cost(plain, points, floor))
     assert way_cost(plain, route.points, floor) == pytest.approx(route.cost, rel=1e-9)
     assert route.cost == pytest.approx(min(costs), rel=1e-9)
+
+
+def test_a_grid_between_close_ends_covers_what_a_route_reaches() -> None:
+    """In 4 stages a route leads 2 stages away from the line and 2 back, by up to three cells in each."""
+    assert positions_across((-10_000.0, 10_000.0), 15.0, 4).tolist() == [15.0 * k for k in range(-6, 7)]
+    assert positions_across((-40.0, 70.0), 15.0, 4).tolist() == [15.0 * k for k in range(-2, 5)]
+    assert positions_across((-10_000.0, 10_000.0), 15.0, 5).size == 13
 
 
 @pytest.mark.parametrize("stages", [12, 24, 36])

@@ -13,6 +13,7 @@ from planner.evaluation.encoding import rotated_frame
 from planner.evaluation.problem import Problem, ProblemArrays, make_problem
 from planner.seeding import lattice as lattice_module
 from planner.seeding.lattice import (
+    GUIDED_WEIGHT,
     MAX_LATTICE_STATES,
     MIN_STEP_M,
     Lattice,
@@ -95,6 +96,22 @@ def test_the_last_step_arrives_on_the_course_that_is_asked_for(make_data: MakeDa
     assert abs((last - 1.5 * math.pi + math.pi) % (2.0 * math.pi) - math.pi) <= math.pi / 2.0 + 1e-9
 
 
+def test_a_guided_climb_meets_the_same_limits_with_few_states(make_data: MakeData) -> None:
+    """Of the many routes that climb 2 km in 12 steps, one is enough; without an estimate all are expanded."""
+    data = make_data([], ceiling=5000.0)
+    made = lattice(layers=13, goal_layer=12, layer_spacing=170.0)
+    frame = rotated_frame(data.start, data.destination)
+    expanded = []
+    for is_guided in (False, True):
+        cells, count = cheapest_lattice_route(data, frame, made, 2, 100_000, is_guided=is_guided)
+        assert cells["layer"][-1] == 12
+        assert (np.diff(cells["layer"]) <= 1).all()
+        courses = np.unwrap(np.arctan2(np.diff(cells["across"]), np.diff(cells["along"])))
+        assert np.abs(np.diff(courses)).max() <= math.pi / 2.0 + 1e-9
+        expanded.append(count)
+    assert expanded[1] < 0.2 * expanded[0]
+
+
 def test_where_all_is_closed_there_is_no_way(make_data: MakeData) -> None:
     wall = [
         {"east_m": 1500, "north_m": north, "amsl_m": 150, "kill_radius_m": 600, "kill_scale_m": 50}
@@ -170,6 +187,25 @@ def test_a_lattice_that_would_be_too_large_has_longer_steps(pocket: Problem) -> 
     assert lattice.step > 20.0
 
 
+@pytest.mark.parametrize("distance", [1.0, 60.0, 399.0])
+def test_ends_closer_than_a_step_are_a_step_apart_on_the_lattice(pocket: Problem, distance: float) -> None:
+    data = pocket.search._replace(destination=pocket.search.start + np.array([distance, 0.0, 0.0]))
+    lattice = make_lattice(data, rotated_frame(data.start, data.destination), 400.0)
+    assert lattice.step == 400.0
+    assert lattice.goal == lattice.behind + 1
+    assert lattice.along * lattice.across * lattice.layers * 8 <= MAX_LATTICE_STATES
+
+
+def test_a_lattice_between_close_ends_has_longer_steps_if_it_would_be_too_large(
+    pocket: Problem, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(lattice_module, "MAX_LATTICE_STATES", 20_000)
+    data = pocket.search._replace(destination=pocket.search.start + np.array([60.0, 0.0, 0.0]))
+    lattice = make_lattice(data, rotated_frame(data.start, data.destination), 100.0)
+    assert lattice.along * lattice.across * lattice.layers * 8 <= 20_000
+    assert lattice.step > 100.0
+
+
 def test_a_step_holds_two_right_angles(pocket: Problem) -> None:
     data = pocket.search
     step = turning_step(data)
@@ -193,6 +229,16 @@ def test_a_route_leaves_a_pocket_and_passes_no_missile(pocket: Problem) -> None:
         for share in np.linspace(0.0, 1.0, 200):
             point = a + share * (b - a)
             assert min(math.dist(point, place) for place in threats.position) > 480.0
+
+
+def test_a_guided_search_leaves_a_pocket_with_few_states(pocket: Problem) -> None:
+    data = pocket.search
+    frame = rotated_frame(data.start, data.destination)
+    cheapest, all_expanded = lattice_route(data, frame, 400.0)
+    route, expanded = lattice_route(data, frame, 400.0, is_guided=True)
+    assert expanded < 0.1 * all_expanded
+    lengths = [np.linalg.norm(np.diff(points, axis=0), axis=1).sum() for points in (cheapest, route)]
+    assert lengths[1] <= GUIDED_WEIGHT * lengths[0]
 
 
 def test_a_search_in_slices_finds_the_same_route(pocket: Problem, monkeypatch: pytest.MonkeyPatch) -> None:
