@@ -20,7 +20,14 @@ from logs.verdict.trials import least_change
 from logs.verdict.verdict import Verdict
 from planfly.workflow.mission_context import JudgedMission, MissionContext
 from planfly.workflow.suggestion_trials import MAX_TRIED_LEGS, SuggestionTrials, tried_suggestions
-from planfly.workflow.trial_flight import AbortCheck, Trial, TrialAborted, max_explaining_flights, never_abort
+from planfly.workflow.trial_flight import (
+    ALTITUDE_ERROR_M,
+    AbortCheck,
+    Trial,
+    TrialAborted,
+    max_explaining_flights,
+    never_abort,
+)
 
 # ----------------------------------------------------------------------
 # Find the autopilot parameter that decides a failed flight, by flying again with one parameter changed at a time.
@@ -190,9 +197,6 @@ def find_deciding_parameter(
 # Cross-track error of a simulated autopilot against the real one, as a fraction of the distance from the legs.  Nine in
 # ten corners that ArduPlane kept are within this error.
 CROSS_TRACK_ERROR_FRACTION = 0.1
-# Altitude error of a simulated autopilot against the real one, m.  The minimum clearances of 20 ArduPlane climbs are
-# within this error.
-ALTITUDE_ERROR_M = 1.2
 
 
 def passes_with_margin(trial_findings: Sequence[Finding], failed_findings: Sequence[Finding]) -> bool:
@@ -248,15 +252,18 @@ def explain_verdict(
         is_affordable = is_requested or (max_explaining_flights(setup) > 1 and requirements.legs <= MAX_TRIED_LEGS)
         if setup.autopilot.answer_name != "airframe" and not is_only_return and is_affordable:
             reference = replace(reference, airframe=judge_airframe_flight(setup, aircraft, should_abort))
-        is_affordable = max_explaining_flights(setup) >= _MAX_PARAMETER_FLIGHTS
-        if reference.airframe is not None and reference.airframe.flyable and is_affordable:
-            reference = replace(reference, deciding=find_deciding_parameter(setup, aircraft, verdict, should_abort))
+        has_parameter_remedy = False
         if verdict.failed:
             judged_mission = JudgedMission(setup.mission, setup, requirements, verdict)
             passed_trials = SuggestionTrials(
                 MissionContext.from_setup(setup), judged_mission, should_abort
             ).find_passing()
             reference = replace(reference, tried=tried_suggestions(passed_trials))
+            has_parameter_remedy = any(change.parameter for trial in passed_trials for change in trial.suggestion)
+        # A parameter of the failing leg itself is the better advice.
+        is_affordable = max_explaining_flights(setup) >= _MAX_PARAMETER_FLIGHTS and not has_parameter_remedy
+        if reference.airframe is not None and reference.airframe.flyable and is_affordable:
+            reference = replace(reference, deciding=find_deciding_parameter(setup, aircraft, verdict, should_abort))
     if reference == ReferenceFlights():
         return verdict, None
     return with_reference(verdict, requirements, reference), reference
