@@ -596,7 +596,9 @@ def _suggest_higher_return(requirements: RouteRequirements, shortfall: float) ->
     shortfall: missing height above ground, m; each change alone may need more.
     """
     setup, start = requirements.setup, requirements.setup.route.rtl_start
-    values = next(iter(setup.autopilot.model.returns.trials.altitudes), {})
+    returns = setup.autopilot.model.returns
+    # An RTL that keeps the altitude of its start has no altitude of its own.
+    values = {} if math.isnan(returns.rules.height) else next(iter(returns.trials.altitudes), {})
     wanted = RTL_ALTITUDE_STEP_M * math.ceil((next(iter(values.values()), 0.0) + shortfall) / RTL_ALTITUDE_STEP_M)
     higher_end = tuple(
         Change("parameter", FLIGHT, value, wanted, "m", parameter=name)
