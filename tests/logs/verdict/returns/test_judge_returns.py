@@ -26,7 +26,7 @@ from logs.verdict.returns.judge_returns import (
     without_engine_world,
     worst_first_key,
 )
-from logs.verdict.returns.return_starts import ReturnStarts, planned_starts
+from logs.verdict.returns.return_starts import ReturnStarts, _ground_phase_starts, planned_starts
 from logs.verdict.returns.returns_text import headline, range_text
 from planfly.api.returning import ReturnsResult
 from tests.logs.verdict.returns.hill import DEGREE, HEAD, hill_setup, mission_text
@@ -443,3 +443,16 @@ def test_glides_and_returns_with_px4_have_the_airspeeds_of_its_file(tmp_path: Pa
     assert [of_file[name] for name in ("AIRSPEED_MIN", "AIRSPEED_CRUISE", "AIRSPEED_MAX")] == [19.5, 24.0, 30.0]
     assert of_aircraft.min_airspeed == 18.0
     assert of_file.roll_limit == of_aircraft.autopilot.turns.max_bank
+
+
+@pytest.mark.parametrize(("first", "has_take_off"), [(5.0, True), (19.9, True), (20.1, False)])
+def test_a_log_without_legs_has_a_take_off_if_it_begins_near_the_ground(
+    tmp_path: Path, first: float, has_take_off: bool
+) -> None:
+    """Over level ground it is at 30 m after 10 s and after 50 s, and lands after 60 s."""
+    setup = hill_setup(tmp_path)
+    time = np.arange(61.0)
+    up = np.interp(time, [0.0, 10.0, 20.0, 40.0, 50.0, 60.0], [first, 30.0, 80.0, 80.0, 30.0, 0.0])
+    position = np.stack([np.zeros(61), np.zeros(61), up], axis=1)
+    found = time[_ground_phase_starts(setup, time, position, None, time)].tolist()
+    assert found == [*(range(10) if has_take_off else ()), *range(45, 61)]
