@@ -21,7 +21,7 @@ from logs.recording.reader import read_log
 from logs.verdict.findings import PITCH_LIMIT_TIME, Fact, Finding, make_finding
 from logs.verdict.judge_flight import judge_flight
 from logs.verdict.measures.route_requirements import route_requirements
-from logs.verdict.places import FLIGHT, Change, Place, ReferenceFlights
+from logs.verdict.places import FLIGHT, Change, DecidingParameter, Place, ReferenceFlights
 from logs.verdict.verdict import Verdict, verdict_json
 from logs.verdict.wording import deciding_text
 from planfly.flight_logs import judge_log
@@ -350,8 +350,10 @@ def test_no_other_parameter_decides_where_the_failing_leg_is_offered_its_own(
     verdict, reference = explain_verdict(route_requirements(judged.setup), AIRCRAFT, unexplained(judged))
     assert reference is not None
     assert reference.airframe is not None
-    assert (reference.airframe.flyable, reference.deciding) == (True, None)
-    assert verdict.failed[0].suggestion == "set RTL_ALTITUDE to 120 m instead of 100 m"
+    (failed,) = verdict.failed
+    assert reference.airframe.flyable
+    assert reference.deciding == DecidingParameter("RTL_ALTITUDE", 100.0, 120.0, "m", failed.rule, failed.place)
+    assert failed.suggestion == "set RTL_ALTITUDE to 120 m instead of 100 m"
 
 
 @pytest.mark.parametrize(("legs", "has_airframe"), [(0, True), (-1, False)])
