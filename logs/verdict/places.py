@@ -17,9 +17,10 @@ PlaceKind = Literal["flight", "mission", "plan", "leg", "waypoint", "missile", "
 # Kind of a change: the quantity that it changes.
 # - Changes to another value: "length" or "rise" of a leg (a negative rise is a descent), "airspeed", largest "turn",
 #   "radius" that a loiter's item states, "home altitude", "altitude frame" of the items below ground, "end loiter"
-#   instead of the last waypoint, "landing course", "launch course" and "launch speed" of the scenario.
-# - Changes by a step: "height" (higher) or "descent" (lower) of a leg or of the path at a zone; "inset" of the path
-#   from the area's edges; "distance" from a missile; "north", "east", "south" or "west" of the path at a zone;
+#   instead of the last waypoint, "landing course", "launch course" and "launch speed" of the scenario,
+#   "parameter" of the autopilot, which `Change.parameter` names.
+# - Changes by a step: "height" (higher) or "descent" (lower) of a leg, a waypoint or the path at a zone; "inset" of the
+#   path from the area's edges; "distance" from a missile; "north", "east", "south" or "west" of the path at a zone;
 #   "duration" of the flight.
 # - Changes by a factor: "battery" or "tank".
 # - Knowledge about the aircraft instead of changes of the plan: duration of a flight at "full throttle" or with "no
@@ -37,6 +38,7 @@ ChangeKind = Literal[
     "landing course",
     "launch course",
     "launch speed",
+    "parameter",
     "height",
     "descent",
     "inset",
@@ -135,6 +137,8 @@ class Change(DocumentConfig):
     """Findings that remain open after the suggestion, stated with its last change."""
     not_flown: bool = field(default=False, compare=False)
     """True, with the last change, if the suggestion was tried by geometry only, because the flight ended before it."""
+    parameter: str = ""
+    """Name of the autopilot parameter that is changed; empty for any other change."""
 
 
 # Changes to make together.  A finding has alternative suggestions, any of which would make it pass.

@@ -12,7 +12,7 @@ import numpy as np
 
 from aircraft.path_limits import aircraft_slopes, turn_radius_between
 from flight.mission.altitude_frames import find_misread_altitudes
-from flight.mission.items import LANDINGS, OVER_HOME, Frame
+from flight.mission.items import OVER_HOME, PLACES, Frame
 from flight.mission.itinerary import stated_loiter
 from flight.mission_files.wpl import HOME_LINE_MISSING_TEXT
 from flight.simulation.setup import FlightSetup
@@ -416,7 +416,7 @@ def _level_speeds(requirements: RouteRequirements, altitude: float, current_spee
 
 
 def _slope_speed(requirements: RouteRequirements, leg: int, slope: float) -> float | None:
-    """Return the nearest commanded airspeed at which the aircraft holds a slope, m/s, or None.
+    """Return the nearest other commanded airspeed at which the aircraft holds a slope, m/s, or None.
 
     slope: absolute value of the slope, rad.
     """
@@ -432,7 +432,13 @@ def _slope_speed(requirements: RouteRequirements, leg: int, slope: float) -> flo
         return min(aircraft_slopes(table, course, altitude)[direction] for altitude in altitudes) >= slope
 
     commanded = float(requirements.setup.demanded_route.leg_airspeeds[leg])
-    return first_that_passes(_level_speeds(requirements, max(altitudes), commanded, factor), can_hold_slope)
+    other_speeds = (
+        speed
+        for speed in _level_speeds(requirements, max(altitudes), commanded, factor)
+        # Closer to the present airspeed than this is no other airspeed.
+        if abs(speed - commanded) >= 0.5 * SUGGESTION_SPEED_STEP_MPS
+    )
+    return first_that_passes(other_speeds, can_hold_slope)
 
 
 def _turn_speed(requirements: RouteRequirements, corner: int) -> float | None:
@@ -553,7 +559,8 @@ def suggest_flying_higher(
 
     Two suggestions come first if they apply.  A home far from the ground is set on the ground.  Altitudes of items
     below the ground are read as heights above home if they then fit the terrain.  Over varied ground, following the
-    terrain is also suggested.
+    terrain is also suggested.  A leg of an RTL is raised by the parameter of
+    the RTL altitude.
     """
     if finding.place == FLIGHT:
         return _suggest_launch_from_ground(requirements)
@@ -572,6 +579,8 @@ def suggest_flying_higher(
         raised = Change("height", finding.place, None, _round_to_meter(remaining_shortfall), "m")
         return ((*home_on_ground[0], raised),)
     suggestions = list(_suggest_other_frame(setup, Frame.GLOBAL_RELATIVE_ALT))
+    if finding.place.index in setup.route.rtl_legs:
+        return (*suggestions, *_suggest_higher_return(requirements, shortfall))
     if shortfall > SUGGESTION_LENGTH_MARGIN_M:
         suggestions.append((Change("height", finding.place, None, _round_to_meter(shortfall), "m"),))
     following = _follow_ground(requirements, finding)
@@ -579,6 +588,33 @@ def suggest_flying_higher(
         # A change that lets several legs follow the ground is tried before single legs are raised.
         suggestions.insert(0 if len(following) > 1 else len(suggestions), following)
     return tuple(suggestions)
+
+
+# Step in which the altitude of an RTL is suggested, m.
+RTL_ALTITUDE_STEP_M = 5.0
+
+
+def _suggest_higher_return(requirements: RouteRequirements, shortfall: float) -> tuple[Suggestion, ...]:
+    """Suggest a higher altitude of an RTL, by the autopilot's parameters, a higher start of it, or both.
+
+    shortfall: missing height above ground, m; each change alone may need more.
+    """
+    setup, start = requirements.setup, requirements.setup.route.rtl_start
+    returns = setup.autopilot.model.returns
+    # An RTL that keeps the altitude of its start has no altitude of its own.
+    values = {} if math.isnan(returns.rules.height) else next(iter(returns.trials.altitudes), {})
+    wanted = RTL_ALTITUDE_STEP_M * math.ceil((next(iter(values.values()), 0.0) + shortfall) / RTL_ALTITUDE_STEP_M)
+    higher_end = tuple(
+        Change("parameter", FLIGHT, value, wanted, "m", parameter=name)
+        for name, value in values.items()
+        if value < wanted
+    )
+    placed_items = {item.seq for item in setup.mission.items if item.command in PLACES}
+    higher_start: Suggestion = ()
+    if start is not None and int(setup.route.items[start]) in placed_items:
+        higher_start = (Change("height", requirements.waypoint(start), None, _round_to_meter(shortfall), "m"),)
+    both = (*higher_end, *higher_start) if higher_end and higher_start else ()
+    return tuple(suggestion for suggestion in (higher_end, both, higher_start) if suggestion)
 
 
 # Smallest difference of the ground's altitude along a leg for which following the ground is suggested, m.
@@ -589,14 +625,15 @@ def _follow_ground(requirements: RouteRequirements, finding: Finding) -> Suggest
     """Return changes that let all legs that are too low over varied ground follow the ground.
 
     The end of a leg keeps its height above ground, but gets at least the required height plus `HEIGHT_ERROR_LIMIT_M`.
-    Legs that already follow the ground or end with a landing are not changed.  Return () if the leg of the finding is
-    not among the changed legs, or if the autopilot cannot follow terrain.
+    A leg is not changed if it already follows the ground, or if its item states no height to fly at, such as a landing
+    or an RTL.  Return () if the leg of the finding is not among the changed legs, or if the autopilot cannot follow
+    terrain.
     """
     setup, leg, limit = requirements.setup, finding.place.index, finding.limit
     terrain = setup.scenario.terrain
     if terrain is None or limit is None or finding.place.kind != "leg" or not setup.autopilot.checks.follows_terrain:
         return ()
-    landing_items = {item.seq for item in setup.mission.items if item.command in LANDINGS}
+    placed_items = {item.seq for item in setup.mission.items if item.command in PLACES}
     changes = []
     for followed_leg in range(requirements.legs):
         start, end = requirements.points[followed_leg], requirements.points[followed_leg + 1]
@@ -604,8 +641,8 @@ def _follow_ground(requirements: RouteRequirements, finding: Finding) -> Suggest
         places = start + np.linspace(0.0, 1.0, count)[:, None] * (end - start)
         ground = np.asarray(terrain.height(places[:, 0], places[:, 1]), dtype=np.float64)
         follows = bool(np.isfinite(setup.route.points["above_ground"][followed_leg + 1]))
-        is_landing = int(setup.route.items[followed_leg + 1]) in landing_items
-        if follows or is_landing or not np.isfinite(ground).all() or np.ptp(ground) < _MIN_FOLLOWED_RELIEF_M:
+        is_placed = int(setup.route.items[followed_leg + 1]) in placed_items
+        if follows or not is_placed or not np.isfinite(ground).all() or np.ptp(ground) < _MIN_FOLLOWED_RELIEF_M:
             continue
         heights = places[:, 2] - ground
         if followed_leg == leg or float(heights.min()) < limit:

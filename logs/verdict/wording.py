@@ -133,15 +133,16 @@ def change_text(change: Change) -> str:
                 f"command an airspeed of {requested_value:.1f} to {change.most:.1f} m/s on {place_text(change.place)}"
             )
         case "airspeed":
-            return f"{_airspeed_text(change)} instead of {change.current:g} m/s"
+            wanted_text, current_text = _changed_texts(change)
+            return f"{_airspeed_text(change, wanted_text)} instead of {current_text}"
         case "turn":
             return f"turn at most {requested_value:.1f}° at {place_text(change.place)}"
         case "height" | "descent":
+            verb = "raise" if change.what == "height" else "lower"
             if change.place.kind == "leg":
-                verb = "raise" if change.what == "height" else "lower"
                 return f"{verb} both ends of {place_name} by {requested_value:.0f} m"
             if change.place.kind == "waypoint":
-                return f"lower {place_text(change.place)} by {requested_value:.0f} m"
+                return f"{verb} {place_text(change.place)} by {requested_value:.0f} m"
             return (
                 f"pass {change.place.name} {requested_value:.0f} m {'higher' if change.what == 'height' else 'lower'}"
             )
@@ -163,6 +164,9 @@ def _other_change_text(change: Change) -> str:
     """Phrase a change of anything other than the path as an instruction."""
     requested_value = change.wanted
     match change.what:
+        case "parameter":
+            suffix = _unit_suffix(change.unit)
+            return f"set {change.parameter} to {requested_value:g}{suffix} instead of {change.current:g}{suffix}"
         case "home altitude":
             return f"set home to {requested_value:.1f} m AMSL, the ground there, instead of {change.current:.1f} m"
         case "altitude frame":
@@ -202,12 +206,31 @@ def _other_change_text(change: Change) -> str:
     return f"use a {change.what} {requested_value:.2f} times as large"
 
 
-def _airspeed_text(change: Change) -> str:
+def _changed_texts(change: Change, digits: int = 0) -> tuple[str, str]:
+    """Return the magnitudes of the wanted and the current value, with enough digits to show that they differ.
+
+    digits: smallest number of digits after the point, if they differ in these.
+
+    >>> _changed_texts(Change("rise", Place("leg", 1), -86.4, -86.0, "m"))
+    ('86.0 m', '86.4 m')
+    >>> _changed_texts(Change("airspeed", Place("leg", 1), 25.0, 20.5, "m/s"))
+    ('20.5 m/s', '25 m/s')
+    """
+    wanted, current = abs(change.wanted), abs(change.current or 0.0)
+    suffix = _unit_suffix(change.unit)
+    if change.what == "airspeed" and f"{wanted:g}" != f"{current:g}":
+        return f"{wanted:g}{suffix}", f"{current:g}{suffix}"
+    while digits < _MAX_DIGITS and wanted != current and f"{wanted:.{digits}f}" == f"{current:.{digits}f}":
+        digits += 1
+    return f"{wanted:.{digits}f}{suffix}", f"{current:.{digits}f}{suffix}"
+
+
+def _airspeed_text(change: Change, airspeed_text: str) -> str:
     """Phrase a change of airspeed as an instruction, such as "fly leg 1 at 20.5 m/s"."""
     if change.place.kind == "leg":
-        return f"fly {place_text_within(change.place)} at {change.wanted:g} m/s"
+        return f"fly {place_text_within(change.place)} at {airspeed_text}"
     where = f" through {place_text(change.place)}" if change.place.kind == "waypoint" else ""
-    return f"fly{where} at {change.wanted:g} m/s"
+    return f"fly{where} at {airspeed_text}"
 
 
 def _rise_text(change: Change) -> str:
@@ -215,7 +238,8 @@ def _rise_text(change: Change) -> str:
     verb = "climb" if math.copysign(1.0, change.wanted) > 0.0 else "descend"
     if change.current is None:
         return f"{verb} {abs(change.wanted):.0f} m on {place_text(change.place)}"
-    return f"{verb} {abs(change.wanted):.0f} m instead of {abs(change.current):.0f} m on {place_text(change.place)}"
+    wanted_text, current_text = _changed_texts(change)
+    return f"{verb} {wanted_text} instead of {current_text} on {place_text(change.place)}"
 
 
 def _length_text(change: Change) -> str:
@@ -224,7 +248,8 @@ def _length_text(change: Change) -> str:
     place_name = place_text_within(change.place)
     if current < MIN_LEG_LENGTH_M:
         return f"{place_name} to {change.wanted:.0f} m (it is vertical)"
-    return f"{place_name} from {current:.0f} m to {change.wanted:.0f} m"
+    wanted_text, current_text = _changed_texts(change)
+    return f"{place_name} from {current_text} to {wanted_text}"
 
 
 def _terrain_height_text(suggestion: Suggestion) -> str:

@@ -5,6 +5,7 @@ a changed mission is judged like a mission file.
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -163,6 +164,11 @@ class MissionContext:
         if is_opened_mission and self.scenario is opened.scenario:
             return opened
         return make_setup(self.scenario, self.uav, mission, self.seed, placed=self.place_mission(mission))
+
+    def setup_with_parameters(self, mission: Mission, parameters: Mapping[str, float]) -> FlightSetup:
+        """Make the flight setup of a mission with other values of the autopilot's parameters, by name."""
+        uav = replace(self.uav, autopilot=self.uav.autopilot.with_parameters(**parameters))
+        return make_setup(self.scenario, uav, mission, self.seed, placed=self.place_mission(mission))
 
     def judge(self, mission: Mission) -> JudgedMission:
         """Judge a mission by its geometry, without a flight."""

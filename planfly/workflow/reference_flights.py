@@ -14,13 +14,20 @@ from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import GROUND_FOLLOWING_ERROR, PITCH_LIMIT_TIME, Finding
 from logs.verdict.judge_flight import with_reference
 from logs.verdict.measures.route_requirements import RouteRequirements, true_airspeed_route
-from logs.verdict.places import FLIGHT, AirframeAnswer, DecidingParameter, ReferenceFlights
+from logs.verdict.places import FLIGHT, AirframeAnswer, Change, DecidingParameter, ReferenceFlights
 from logs.verdict.summary import most_urgent_failure
 from logs.verdict.trials import least_change
 from logs.verdict.verdict import Verdict
 from planfly.workflow.mission_context import JudgedMission, MissionContext
-from planfly.workflow.suggestion_trials import MAX_TRIED_LEGS, SuggestionTrials, tried_suggestions
-from planfly.workflow.trial_flight import AbortCheck, Trial, TrialAborted, max_explaining_flights, never_abort
+from planfly.workflow.suggestion_trials import MAX_TRIED_LEGS, PassedTrial, SuggestionTrials, tried_suggestions
+from planfly.workflow.trial_flight import (
+    ALTITUDE_ERROR_M,
+    AbortCheck,
+    Trial,
+    TrialAborted,
+    max_explaining_flights,
+    never_abort,
+)
 
 # ----------------------------------------------------------------------
 # Find the autopilot parameter that decides a failed flight, by flying again with one parameter changed at a time.
@@ -192,9 +199,6 @@ def find_deciding_parameter(
 # Cross-track error of the simulated autopilot compared with the real one, as a fraction of the distance from the legs.
 # Nine in ten corners that ArduPlane flew within the corridor are within this error.
 CROSS_TRACK_ERROR_FRACTION = 0.1
-# Altitude error of the simulated autopilot compared with the real one, m.  The minimum clearances of 20 ArduPlane
-# climbs are within this error.
-ALTITUDE_ERROR_M = 1.2
 
 
 def passes_with_margin(trial_findings: Sequence[Finding], failed_findings: Sequence[Finding]) -> bool:
@@ -216,6 +220,22 @@ def passes_with_margin(trial_findings: Sequence[Finding], failed_findings: Seque
         if finding.margin < required_margins.get(finding.rule, -math.inf):
             return False
     return True
+
+
+def _suggested_parameter(verdict: Verdict, passed_trials: Sequence[PassedTrial]) -> DecidingParameter | None:
+    """Return the parameter whose suggested value alone makes a flight pass; None without such a suggestion.
+
+    The parameter acts on the failing leg, so that it is better advice than any other parameter.
+    """
+    if len(verdict.failed) != 1:
+        return None
+    finding = verdict.failed[0]
+    for trial in passed_trials:
+        match trial.suggestion:
+            case (Change(what="parameter", current=float(current)) as change,):
+                values = (current, change.wanted, change.unit)
+                return DecidingParameter(change.parameter, *values, finding.rule, finding.place)
+    return None
 
 
 # Cases in which reference flights are flown: "failed" if a finding of the flight fails, "always" also if all pass.
@@ -249,15 +269,18 @@ def explain_verdict(
         is_affordable = is_requested or (max_explaining_flights(setup) > 1 and requirements.legs <= MAX_TRIED_LEGS)
         if setup.autopilot.answer_name != "airframe" and not is_only_return and is_affordable:
             reference = replace(reference, airframe=judge_airframe_flight(setup, aircraft, should_abort))
-        is_affordable = max_explaining_flights(setup) >= _MAX_PARAMETER_FLIGHTS
-        if reference.airframe is not None and reference.airframe.flyable and is_affordable:
-            reference = replace(reference, deciding=find_deciding_parameter(setup, aircraft, verdict, should_abort))
+        passed_trials: list[PassedTrial] = []
         if verdict.failed:
             judged_mission = JudgedMission(setup.mission, setup, requirements, verdict)
             passed_trials = SuggestionTrials(
                 MissionContext.from_setup(setup), judged_mission, should_abort
             ).find_passing()
             reference = replace(reference, tried=tried_suggestions(passed_trials))
+        is_affordable = max_explaining_flights(setup) >= _MAX_PARAMETER_FLIGHTS
+        if reference.airframe is not None and reference.airframe.flyable and is_affordable:
+            deciding = _suggested_parameter(verdict, passed_trials)
+            deciding = deciding or find_deciding_parameter(setup, aircraft, verdict, should_abort)
+            reference = replace(reference, deciding=deciding)
     if reference == ReferenceFlights():
         return verdict, None
     return with_reference(verdict, requirements, reference), reference

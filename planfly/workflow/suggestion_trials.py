@@ -27,12 +27,20 @@ from logs.verdict.places import (
     TriedSuggestions,
 )
 from logs.verdict.rules.registry import with_passing_suggestions
+from logs.verdict.suggestions import RTL_ALTITUDE_STEP_M
 from logs.verdict.tolerances import HEIGHT_ERROR_LIMIT_M
 from logs.verdict.trials import first_that_passes
 from logs.verdict.verdict import Verdict
 from planfly.workflow.apply_suggestion import apply_suggestion, item_moves
 from planfly.workflow.mission_context import JudgedMission, MissionContext
-from planfly.workflow.trial_flight import AbortCheck, Trial, TrialAborted, max_explaining_flights, never_abort
+from planfly.workflow.trial_flight import (
+    ALTITUDE_ERROR_M,
+    AbortCheck,
+    Trial,
+    TrialAborted,
+    max_explaining_flights,
+    never_abort,
+)
 from world.errors import PlanflyError
 
 # Greatest number of findings whose suggestions are tried, the worst of each rule first.
@@ -45,8 +53,8 @@ _MAX_STEPS = 10
 _MAX_FAILED_FINDINGS = 40
 # Greatest number of legs of a mission with trials and a reference flight: each judges all legs, 2 s for a thousand.
 MAX_TRIED_LEGS = 5000
-# Changes by a step, m, which are enlarged while the finding fails.
-_STEP_KINDS = frozenset(("height", "descent", "inset", "distance", "north", "east", "south", "west"))
+# Changes by a step, m, and of a parameter in m, which are enlarged while the finding fails.
+_STEP_KINDS = frozenset(("height", "descent", "inset", "distance", "north", "east", "south", "west", "parameter"))
 # Changes of the energy carried or needed, as a ratio or a percentage.
 _ENERGY_KINDS = frozenset(("battery", "tank", "duration"))
 # Greatest share of a leg's height error that may remain with a suggestion for its slope.
@@ -265,12 +273,16 @@ class SuggestionTrials:
             for rank, finding in enumerate(self._findings_to_try())
             for number in range(len(finding.suggestions))
         ]
-        passed_trials = []
+        passed_trials: list[PassedTrial] = []
         with suppress(TrialAborted):
             for number, _, finding in sorted(requests, key=lambda request: request[:2]):
+                if _has_passing_part(passed_trials, finding, finding.suggestions[number]):
+                    continue
                 passed_trial = self.try_suggestion(finding, number)
                 passed_trials += [] if passed_trial is None else [passed_trial]
-        return passed_trials
+        return [
+            trial for trial in passed_trials if not _has_passing_part(passed_trials, trial.finding, trial.suggestion)
+        ]
 
     def _findings_to_try(self) -> list[Finding]:
         """Return the failed findings to try, the worst of each rule first, the most urgent rules first.
@@ -295,7 +307,14 @@ class SuggestionTrials:
         number: index of the suggestion among those of the finding.
         """
         candidates = islice(self._growing_suggestions(finding, finding.suggestions[number]), _MAX_STEPS)
-        passed_candidate = first_that_passes(candidates, lambda candidate: self._passes_trial(finding, candidate[1]))
+        passed_candidate = first_that_passes(
+            candidates,
+            lambda candidate: (
+                _has_margin(finding, candidate[0], candidate[1].geometry_verdict)
+                and self._passes_trial(finding, candidate[1])
+                and _has_margin(finding, candidate[0], self._compared_verdicts(candidate[1], finding)[1])
+            ),
+        )
         if passed_candidate is None:
             return None
         (*first_changes, last_change), trial = passed_candidate
@@ -356,7 +375,8 @@ class SuggestionTrials:
             except PlanflyError:
                 return
             new_trial = Trial(setup, self.context.uav.aircraft, self.should_abort)
-            key = mission.items, mission.home, setup.battery, setup.scenario.launch
+            parameters = tuple(_parameters(suggestion).items())
+            key = mission.items, mission.home, setup.battery, setup.scenario.launch, parameters
             trial = self._trials.setdefault(key, new_trial)
             yield suggestion, trial
             verdict = trial.flight_verdict if "flight_verdict" in vars(trial) else trial.geometry_verdict
@@ -393,8 +413,43 @@ class SuggestionTrials:
                 if change.what == "launch course":
                     launch = replace(setup.scenario.launch, course=math.radians(change.wanted))
                 return self.judged.mission, replace(setup, scenario=replace(setup.scenario, launch=launch))
-        mission = apply_suggestion(self.context, self.judged, finding, suggestion)
+        moves = tuple(change for change in suggestion if change.what != "parameter")
+        mission = apply_suggestion(self.context, self.judged, finding, moves) if moves else self.judged.mission
+        if parameters := _parameters(suggestion):
+            return mission, self.context.setup_with_parameters(mission, parameters)
         return mission, self.context.setup(mission)
+
+
+def _has_margin(finding: Finding, suggestion: Suggestion, verdict: Verdict) -> bool:
+    """Return True if a suggested parameter passes a finding's stop with `ALTITUDE_ERROR_M` to spare.
+
+    The result is True for a suggestion without a parameter.
+
+    verdict: verdict on the mission with the suggestion applied.
+    """
+    place = finding.place
+    margins = [
+        other.margin
+        for other in verdict.findings
+        if other.rule == finding.rule and (other.place.kind, other.place.number) == (place.kind, place.number)
+    ]
+    return not _parameters(suggestion) or all(margin is None or margin >= ALTITUDE_ERROR_M for margin in margins)
+
+
+def _parameters(suggestion: Suggestion) -> dict[str, float]:
+    """Return the autopilot parameters that a suggestion changes, with their values."""
+    return {change.parameter: change.wanted for change in suggestion if change.what == "parameter"}
+
+
+def _has_passing_part(passed_trials: Sequence[PassedTrial], finding: Finding, suggestion: Suggestion) -> bool:
+    """Return True if a part of a finding's suggestion passes by itself, whatever the sizes of its changes."""
+
+    def change_keys(changes: Suggestion) -> set[object]:
+        """Return what identifies changes, except their sizes."""
+        return {(change.what, change.place, change.parameter) for change in changes}
+
+    passing_parts = [change_keys(trial.suggestion) for trial in passed_trials if trial.finding is finding]
+    return any(part < change_keys(suggestion) for part in passing_parts)
 
 
 def _larger_suggestion(finding: Finding, suggestion: Suggestion, verdict: Verdict) -> Suggestion | None:
@@ -418,6 +473,12 @@ def _larger_suggestion(finding: Finding, suggestion: Suggestion, verdict: Verdic
     larger_suggestion = None
     for open_finding in same_finding or same_rule_legs:
         larger_suggestion = _add_needed_change(larger_suggestion or suggestion, open_finding) or larger_suggestion
+    if not (same_finding or same_rule_legs) and _parameters(suggestion):
+        # The finding passes without the margin of a parameter.
+        return tuple(
+            replace(change, wanted=change.wanted + RTL_ALTITUDE_STEP_M) if change.what == "parameter" else change
+            for change in suggestion
+        )
     return larger_suggestion
 
 
@@ -443,9 +504,14 @@ def _merge_steps(suggestion: Suggestion, needed_steps: Suggestion) -> Suggestion
 
     If a place already has a step of the same kind, the needed step is enlarged and added to it.
     """
-    steps = {(change.what, change.place.kind, change.place.index): change for change in suggestion}
+    steps = {(change.what, change.place.kind, change.place.index, change.parameter): change for change in suggestion}
     for change in needed_steps:
-        key = change.what, change.place.kind, change.place.index
+        key = change.what, change.place.kind, change.place.index, change.parameter
+        if change.what == "parameter" and key in steps:
+            further_step = (_GROWTH_FACTOR - 1.0) * (change.wanted - (change.current or 0.0))
+            wanted = RTL_ALTITUDE_STEP_M * math.ceil((change.wanted + further_step) / RTL_ALTITUDE_STEP_M)
+            steps[key] = replace(steps[key], wanted=wanted)
+            continue
         merged_step = change.wanted
         if key in steps:
             merged_step = steps[key].wanted + _GROWTH_FACTOR * change.wanted + _GROWTH_M

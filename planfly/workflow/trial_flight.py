@@ -16,6 +16,9 @@ from logs.verdict.verdict import Verdict
 from planfly.workflow.flight_limits import predicted_seconds
 from world.errors import StartError
 
+# Altitude error of a simulated autopilot against the real one, m.  The minimum clearances of 20 ArduPlane climbs are
+# within this error.
+ALTITUDE_ERROR_M = 1.2
 # Longest predicted time of all flights that explain one verdict, reference flights and trial flights, s of flight.
 MAX_EXPLAINING_TIME_S = 6 * 3600.0
 

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from flight.mission.items import TAKEOFFS, Command, MissionItem
+from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.verdict.measures.path_moves import straight_moves
 from logs.verdict.measures.path_sweeps import path_spheres
@@ -116,21 +117,32 @@ def has_ground_paths(requirements: RouteRequirements) -> bool:
     return setup.scenario.terrain is not None and has_ground_phases and setup.imported_log is None
 
 
-def takeoff_item(requirements: RouteRequirements) -> tuple[int, MissionItem | None]:
+def takeoff_item(setup: FlightSetup) -> tuple[int, MissionItem | None]:
     """Return the first waypoint that has a mission item, and this item if it is a take-off, else None."""
-    route = requirements.setup.route
+    route = setup.route
     first = next((k for k, seq in enumerate(route.items.tolist()) if seq >= 0), 0)
-    items = [item for item in requirements.setup.mission.items if item.seq == int(route.items[first])]
+    items = [item for item in setup.mission.items if item.seq == int(route.items[first])]
     return first, items[0] if items and items[0].command in TAKEOFFS else None
 
 
-def landing_item(requirements: RouteRequirements) -> tuple[int, MissionItem] | None:
+def landing_item(setup: FlightSetup) -> tuple[int, MissionItem] | None:
     """Return the index of the last waypoint that belongs to a NAV_LAND, and this item.
 
     Return None if no waypoint after the first belongs to a NAV_LAND.
     """
-    landings = {item.seq: item for item in requirements.setup.mission.items if item.command == Command.NAV_LAND}
+    landings = {item.seq: item for item in setup.mission.items if item.command == Command.NAV_LAND}
     landing_waypoints = [
-        (k, landings[seq]) for k, seq in enumerate(requirements.setup.route.items.tolist()) if k and seq in landings
+        (k, landings[seq]) for k, seq in enumerate(setup.route.items.tolist()) if k and seq in landings
     ]
     return landing_waypoints[-1] if landing_waypoints else None
+
+
+def first_landing_leg(setup: FlightSetup, landing: int, final_leg: int) -> int:
+    """Return the first leg of a landing sequence: from DO_LAND_START, or else the leg before the final approach.
+
+    landing: number of the landing's item.
+    final_leg: index of the final approach.
+    """
+    starts = [item.seq for item in setup.mission.items if item.command == Command.DO_LAND_START and item.seq < landing]
+    later_waypoints = np.flatnonzero(setup.route.items > max(starts)) if starts else np.zeros(0)
+    return max(0, int(later_waypoints[0]) - 1 if later_waypoints.size else final_leg - 1)

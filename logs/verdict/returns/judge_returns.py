@@ -76,8 +76,8 @@ POINT_MASS_ERROR_M = 10.0
 POINT_MASS_POSITION_ERROR_M = 35.0
 # Distance to a limit within which the difference between point mass and JSBSim matters, m.
 _DECISIVE_MARGIN_M = 50.0
-# Height lost in the turn of a return, m.  If the flight itself is below the required height above ground at the start,
-# as after a take-off, the return has to keep the flight's height minus this loss.
+# Height lost in the turn of a return, m.  A return that begins in a take-off or a landing, below the required height
+# above ground, has to keep the flight's own height minus this loss.
 TURN_HEIGHT_LOSS_M = 2.0
 # Fraction of its starting height that a return from a flown take-off or landing has to keep: it may be sinking.
 _LOW_START_FRACTION = 0.5
@@ -108,6 +108,7 @@ class SimulatedReturn:
     time_to_loiter: time from the start to the return's loiter, s; NaN if the loiter is not reached.
     required_height: required height above ground, m; see `required_heights`.
     energy_used: energy used before the return, Wh; NaN if unknown.
+    starts_too_low: True if the flight itself is lower than the required height at the start.
     """
 
     time: float
@@ -124,6 +125,7 @@ class SimulatedReturn:
     time_to_loiter: float
     required_height: float = math.nan
     energy_used: float = math.nan
+    starts_too_low: bool = False
 
     @property
     def safe(self) -> bool:
@@ -278,6 +280,8 @@ class Returns:
 def _report_key(ret: SimulatedReturn) -> tuple[object, ...]:
     """Return the grouping key of returns: outcome and destination, and the entered sphere or zone."""
     key = (ret.kind, ret.target.name)
+    if ret.kind == "low":
+        return (*key, ret.starts_too_low)
     return (*key, ret.threat, ret.zone) if ret.kind in ("threat", "zone") else key
 
 
@@ -553,25 +557,26 @@ def judge_returns(
     returns: list[SimulatedReturn] = []
     differences: list[float] = []
     omitted_count, total_count = 0, len(world.endings) * len(starts)
+    start_heights, min_heights = heights_above_ground(world, starts), required_heights(world, starts)
     for number, ending in enumerate(world.endings):
         advance(number * len(starts), total_count)
         if not world.is_simulated or ("landing" in world.unjudged_parts and ending == "straight to land"):
             continue
         targets = [world.target(row, ending) for row in starts.rows]
-        min_heights = required_heights(world, starts)
         results, paths = simulate_judged_returns(world, starts, targets, min_heights)
         judged_returns = []
         for k, row in enumerate(results):
             advance(number * len(starts) + k, total_count)
-            judged_returns.append(
-                _judge_return(world, starts, k, targets[k], row, paths[k] if paths else _NO_PATH, float(min_heights[k]))
+            ret = _judge_return(
+                world, starts, k, targets[k], row, paths[k] if paths else _NO_PATH, float(min_heights[k])
             )
+            starts_too_low = bool(start_heights[k] < min_heights[k] - CLEARANCE_TOLERANCE_M)
+            judged_returns.append(replace(ret, starts_too_low=starts_too_low))
         if fly_again is not None and ending == "circle":
             judged_returns, new_differences = _recheck_in_jsbsim(
                 world, starts, judged_returns, results, fly_again, max_flights
             )
             differences += new_differences
-        start_heights = heights_above_ground(world, starts)
         reported_returns = [
             ret
             for k, ret in enumerate(judged_returns)
@@ -673,8 +678,16 @@ def simulate_judged_returns(
 def required_heights(world: ReturnWorld, starts: ReturnStarts) -> Floats:
     """Return the required height above ground of the RTL from each start, m, (n,).
 
-    It is `ReturnWorld.limit`, or less if the flight itself is below this limit at the start or soon afterwards, as in a
-    landing sequence.
+    This is the limit, also where the flight itself is lower.  Only in a take-off or a landing it is what the flight's
+    own height permits.
+    """
+    return np.where(starts.is_ground_phase, possible_heights(world, starts), world.limit)
+
+
+def possible_heights(world: ReturnWorld, starts: ReturnStarts) -> Floats:
+    """Return the height above ground that the RTL from each start can keep, at most the limit, m, (n,).
+
+    It is below the limit for a start at which the flight itself is below the limit, or soon will be.
     """
     start_heights = heights_above_ground(world, starts)
     flight_heights = start_heights - starts.height_loss

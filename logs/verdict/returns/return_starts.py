@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,9 +12,11 @@ from flight.autopilots.simulated_returns import RETURN_START
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import ROLL, Track
 from logs.verdict.measures.energy import leg_energies, predicted_energy
+from logs.verdict.measures.ground_paths import first_landing_leg, landing_item, takeoff_item
 from logs.verdict.measures.path_moves import path_moves
 from logs.verdict.measures.route_requirements import RouteRequirements, find_leg_winds, route_requirements
 from logs.verdict.measures.track_alignment import ground_phase_rows
+from logs.verdict.tolerances import GROUND_LEG_CLEARANCE_M
 from world.arrays import Flags, Floats
 from world.geometry import leg_courses
 from world.kernels import Records
@@ -36,6 +39,8 @@ class ReturnStarts:
     rows: states, (n,) of dtype `flight.autopilots.simulated_returns.RETURN_START`.
     energy_used: energy used before the return, Wh, (n,); NaN if unknown.
     is_flown: True for a flown track, False for the planned path.
+    is_ground_phase: True for a start in the climb-out of a take-off or the approach of a landing, (n,); see
+        `_ground_phase_starts`.
     is_low: True for a start in a flown take-off or landing that is lower above ground than the required clearance plus
         `SINK_HEIGHT_LOSS_M`, (n,).
     height_loss: height above ground that the flight itself loses in the `SINK_TIME_S` after the start, m, (n,).
@@ -46,6 +51,7 @@ class ReturnStarts:
     rows: Records
     energy_used: Floats
     is_flown: bool
+    is_ground_phase: Flags
     is_low: Flags
     height_loss: Floats
     grounded_count: int = 0
@@ -57,9 +63,8 @@ class ReturnStarts:
     def subset(self, indices: NDArray[np.intp]) -> "ReturnStarts":
         """Return the starts with these indices."""
         arrays = (self.time[indices], self.rows[indices], self.energy_used[indices])
-        return ReturnStarts(
-            *arrays, self.is_flown, self.is_low[indices], self.height_loss[indices], self.grounded_count
-        )
+        masks = (self.is_ground_phase[indices], self.is_low[indices])
+        return ReturnStarts(*arrays, self.is_flown, *masks, self.height_loss[indices], self.grounded_count)
 
 
 def flown_starts(setup: FlightSetup, track: Track, interval: float) -> ReturnStarts:
@@ -90,14 +95,17 @@ def flown_starts(setup: FlightSetup, track: Track, interval: float) -> ReturnSta
     energy = track.energy[start_rows].astype(np.float64)
     times = track.time[start_rows]
     records = _start_records(times, track.position[start_rows], velocity, np.nan_to_num(roll))
-    height_loss = _height_losses(setup, time, track.position[usable_rows], times)
-    return ReturnStarts(times, records, energy, True, is_low_start, height_loss, int(is_slow.sum()))
+    position = track.position[usable_rows]
+    height_loss = _height_losses(setup, time, position, times)
+    legs = None if setup.imported_log is not None else track.leg[usable_rows]
+    is_ground_phase = is_low_start | _ground_phase_starts(setup, time, position, legs, times)
+    return ReturnStarts(times, records, energy, True, is_ground_phase, is_low_start, height_loss, int(is_slow.sum()))
 
 
 def _empty_starts(*, is_flown: bool) -> ReturnStarts:
     """Return a `ReturnStarts` without any start."""
-    is_low = np.zeros(0, dtype=np.bool_)
-    return ReturnStarts(np.zeros(0), np.zeros(0, RETURN_START), np.zeros(0), is_flown, is_low, np.zeros(0))
+    mask = np.zeros(0, dtype=np.bool_)
+    return ReturnStarts(np.zeros(0), np.zeros(0, RETURN_START), np.zeros(0), is_flown, mask, mask, np.zeros(0))
 
 
 def _height_losses(setup: FlightSetup, time: Floats, position: Floats, start_times: Floats) -> Floats:
@@ -113,6 +121,39 @@ def _height_losses(setup: FlightSetup, time: Floats, position: Floats, start_tim
     end_rows = np.searchsorted(time, start_times + SINK_TIME_S, side="right")
     losses = [heights[first] - heights[first:end].min() for first, end in zip(first_rows, end_rows, strict=True)]
     return np.nan_to_num(np.array(losses, dtype=np.float64))
+
+
+def _ground_phase_starts(
+    setup: FlightSetup, time: Floats, position: Floats, legs: NDArray[np.integer[Any]] | None, start_times: Floats
+) -> Flags:
+    """Return a mask (n,): True for each start in the climb-out of a take-off or the approach of a landing.
+
+    The climb-out lasts until the flight first has the required height above ground, at most up to the end of the leg
+    after NAV_TAKEOFF.  The approach begins `SINK_TIME_S` before the flight last has this height, but not before its
+    landing sequence.  In an imported log, whose legs are unknown, both belong to a flight that begins or ends lower
+    than `GROUND_LEG_CLEARANCE_M`.
+
+    time, position: times of the flight, s, (t,), and its positions, m, (t, 3).
+    legs: leg of the route at these times, (t,); None for an imported log.
+    start_times: s, (n,), within these times.
+    """
+    if setup.scenario.terrain is None:
+        return np.zeros(len(start_times), dtype=np.bool_)
+    heights = position[:, 2] - setup.scenario.terrain.height(position[:, 0], position[:, 1])
+    clear_rows = np.flatnonzero(heights >= setup.limits.min_clearance)
+    first_clear_time = time[clear_rows[0]] if clear_rows.size else math.inf
+    last_clear_time = time[clear_rows[-1]] if clear_rows.size else -math.inf
+    if legs is None:
+        may_climb_out, may_approach = (np.full(len(time), heights[row] < GROUND_LEG_CLEARANCE_M) for row in (0, -1))
+    else:
+        (waypoint, take_off), landing = takeoff_item(setup), landing_item(setup)
+        may_climb_out = np.full(len(time), take_off is not None) & (legs <= waypoint)
+        landing_leg = math.inf if landing is None else first_landing_leg(setup, landing[1].seq, landing[0] - 1)
+        may_approach = legs >= landing_leg
+    is_ground_phase = (may_climb_out & (time < first_clear_time)) | (
+        may_approach & (time >= last_clear_time - SINK_TIME_S)
+    )
+    return np.asarray(is_ground_phase[np.searchsorted(time, start_times, side="right") - 1])
 
 
 def _low_and_slow_rows(setup: FlightSetup, track: Track, rows: NDArray[np.intp]) -> tuple[Flags, Flags]:
@@ -172,9 +213,12 @@ def planned_starts(setup: FlightSetup, interval: float, requirements: RouteRequi
     move_energy = leg_energy[moves["leg"]] * moves["lasts"] / np.maximum(1e-9, leg_duration[moves["leg"]])
     energy = np.cumsum(move_energy)[move_numbers] - (1.0 - fraction) * move_energy[move_numbers]
     is_low = np.zeros(len(times), dtype=np.bool_)
-    path_times, _, _, path_position = _sample_positions(moves, min(interval, _PATH_INTERVAL_S))
+    path_times, path_move_numbers, _, path_position = _sample_positions(moves, min(interval, _PATH_INTERVAL_S))
     height_loss = _height_losses(setup, path_times, path_position, times)
-    return ReturnStarts(times, _start_records(times, position, velocity, bank), energy, False, is_low, height_loss)
+    path_legs = moves["leg"][path_move_numbers]
+    is_ground_phase = _ground_phase_starts(setup, path_times, path_position, path_legs, times)
+    records = _start_records(times, position, velocity, bank)
+    return ReturnStarts(times, records, energy, False, is_ground_phase, is_low, height_loss)
 
 
 def planned_positions(setup: FlightSetup, interval: float) -> tuple[Floats, Floats]:
@@ -231,8 +275,8 @@ def flown_end(track: Track) -> ReturnStarts:
     row = np.array([len(track) - 1], dtype=np.intp)
     roll = np.nan_to_num(track.attitude[row, ROLL].astype(np.float64))
     records = _start_records(track.time[row], track.position[row], _ground_velocities(track, row), roll)
-    is_low = np.zeros(1, dtype=np.bool_)
-    return ReturnStarts(track.time[row], records, track.energy[row].astype(np.float64), True, is_low, np.zeros(1))
+    energy, mask = track.energy[row].astype(np.float64), np.zeros(1, dtype=np.bool_)
+    return ReturnStarts(track.time[row], records, energy, True, mask, mask, np.zeros(1))
 
 
 def planned_end(requirements: RouteRequirements) -> ReturnStarts:
@@ -247,7 +291,8 @@ def planned_end(requirements: RouteRequirements) -> ReturnStarts:
     time = requirements.path.times[-1:]
     energy = np.array([predicted_energy(requirements)[0]])
     records = _start_records(time, requirements.points[-1:], velocity, np.zeros(1))
-    return ReturnStarts(time, records, energy, False, np.zeros(1, dtype=np.bool_), np.zeros(1))
+    mask = np.zeros(1, dtype=np.bool_)
+    return ReturnStarts(time, records, energy, False, mask, mask, np.zeros(1))
 
 
 def _ground_speeds(setup: FlightSetup) -> Floats:

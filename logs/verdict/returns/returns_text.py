@@ -362,6 +362,8 @@ def _range_outcome_text(worst_return: SimulatedReturn, returns: Returns, scenari
             )
     if worst_return.required_height < returns.limit:
         height_text += " (taking off or landing: the flight itself is below the required height)"
+    elif worst_return.starts_too_low:
+        height_text += " (the flight itself is below the required height where this return begins)"
     energy_text = "" if math.isnan(worst_return.energy_left) else f", {energy_left_text(worst_return.energy_left)}"
     sphere_text = (
         ""

@@ -8,7 +8,7 @@ away from a better point.
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,7 @@ from logs.verdict.returns.judge_returns import (
     ReturnWorld,
     heights_above_ground,
     most_violated_zone,
+    possible_heights,
     required_heights,
     simulate_judged_returns,
 )
@@ -98,7 +99,7 @@ def _return_limits(world: ReturnWorld, starts: ReturnStarts, margin: float = MAR
     for center, radius in zip(world.environment.spheres, world.environment.radii, strict=True):
         if radius > 0.0:
             sphere_distances = np.minimum(sphere_distances, np.linalg.norm(positions - center, axis=1) - radius)
-    min_heights = required_heights(world, starts)
+    min_heights = possible_heights(world, starts)
     return _ReturnLimits(
         np.where(
             starts.is_low,
@@ -111,7 +112,8 @@ def _return_limits(world: ReturnWorld, starts: ReturnStarts, margin: float = MAR
 
 def meets_return_limits(world: ReturnWorld, starts: ReturnStarts) -> Flags:
     """Return a mask (n,): True for each start whose simulated RTL keeps all limits, without `MARGIN`."""
-    return _rtls_meet_criterion(world, starts, _return_limits(world, starts, 0.0), _meets_all_limits)
+    limits = replace(_return_limits(world, starts, 0.0), clearance=required_heights(world, starts))
+    return _rtls_meet_criterion(world, starts, limits, _meets_all_limits)
 
 
 def _clears_ground(_world: ReturnWorld, results: Records, limits: _ReturnLimits) -> Flags:

@@ -5,9 +5,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flight.mission.items import Command
 from logs.verdict.findings import GROUND_PATH, Finding, Message, make_finding, message
-from logs.verdict.measures.ground_paths import has_ground_paths, landing_item, takeoff_item
+from logs.verdict.measures.ground_paths import (
+    first_landing_leg,
+    has_ground_paths,
+    landing_item,
+    takeoff_item,
+)
 from logs.verdict.measures.path_sweeps import path_clearance
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
@@ -227,7 +231,7 @@ def _find_landing(requirements: RouteRequirements) -> _Landing | None:
     approach = (setup.ground_phases if ground is None else ground.procedures).approach
     if approach is not None:
         return _Landing(approach.leg, approach.item, (float(approach.point[0]), float(approach.point[1])), True)
-    landing = landing_item(requirements)
+    landing = landing_item(requirements.setup)
     if landing is None or (setup.imported_log is None and not has_ground_paths(requirements)):
         return None
     waypoint, item = landing
@@ -252,14 +256,9 @@ def _fields_by_leg(
             (float(procedures.take_off.home[0]), float(procedures.take_off.home[1])),
         )
     elif (home := _logged_takeoff_home(requirements)) is not None:
-        fields_by_leg = dict.fromkeys(range(takeoff_item(requirements)[0] + 1), (home,))
+        fields_by_leg = dict.fromkeys(range(takeoff_item(requirements.setup)[0] + 1), (home,))
     if landing is not None:
-        landing_starts = [item.seq for item in setup.mission.items if item.command == Command.DO_LAND_START]
-        sequence_start = max((seq for seq in landing_starts if seq < landing.item), default=None)
-        first_leg = max(0, landing.leg - 1)
-        if sequence_start is not None:
-            later_waypoints = np.flatnonzero(setup.route.items > sequence_start)
-            first_leg = max(0, int(later_waypoints[0]) - 1) if later_waypoints.size else first_leg
+        first_leg = first_landing_leg(setup, landing.item, landing.leg)
         for leg in range(max(first_leg, _last_clear_waypoint(requirements, landing.leg)), landing.leg + 1):
             fields_by_leg[leg] = (*fields_by_leg.get(leg, ()), landing.point)
     return fields_by_leg
@@ -268,7 +267,7 @@ def _fields_by_leg(
 def _logged_takeoff_home(requirements: RouteRequirements) -> tuple[float, float] | None:
     """Return home's position (east, north, m) if an imported log has a take-off, otherwise None."""
     setup, home = requirements.setup, requirements.setup.mission.home
-    if setup.imported_log is None or home is None or takeoff_item(requirements)[1] is None:
+    if setup.imported_log is None or home is None or takeoff_item(requirements.setup)[1] is None:
         return None
     east, north = to_map(setup.scenario.origin, home.lat_deg, home.lon_deg)
     return float(east), float(north)
@@ -282,7 +281,7 @@ def _first_airborne_segment(requirements: RouteRequirements, aligned: AlignedTra
     """
     first, last = aligned.leg_segments(leg)
     home = _logged_takeoff_home(requirements)
-    if home is None or leg > takeoff_item(requirements)[0]:
+    if home is None or leg > takeoff_item(requirements.setup)[0]:
         return first
     is_airborne = aligned.clearance[first:last] >= GROUND_LEG_CLEARANCE_M
     climb_rows = int(np.argmax(is_airborne)) if is_airborne.any() else 0

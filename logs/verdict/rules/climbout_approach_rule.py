@@ -124,7 +124,7 @@ def climbout_findings(
         return []
     east, north = to_map(requirements.setup.scenario.origin, home.lat_deg, home.lon_deg)
     start = (float(east), float(north))
-    first_waypoint, takeoff = takeoff_item(requirements)
+    first_waypoint, takeoff = takeoff_item(requirements.setup)
     first_point, ground_altitude = requirements.points[first_waypoint], float(terrain.height(*start))
     place = requirements.waypoint(first_waypoint)
     if takeoff is not None:
@@ -436,7 +436,7 @@ def approach_findings(
 
     Return [] if the mission does not land, if the terrain is unknown, or if the landing was flown.
     """
-    landing, terrain, setup = landing_item(requirements), requirements.setup.scenario.terrain, requirements.setup
+    landing, terrain, setup = landing_item(requirements.setup), requirements.setup.scenario.terrain, requirements.setup
     if landing is None or terrain is None or not has_ground_paths(requirements):
         return []
     if requirements.ground_phases is not None and requirements.ground_phases.procedures.approach is not None:

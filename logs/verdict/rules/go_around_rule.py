@@ -170,7 +170,7 @@ def go_around_findings(
     return_requirements, terrain, home = setup.scenario.returns, setup.scenario.terrain, setup.mission.home
     is_required = return_requirements is not None and "go_around" in return_requirements.require
     landing_place = (
-        landing_item(requirements)
+        landing_item(requirements.setup)
         if has_ground_paths(requirements) and terrain is not None and home is not None
         else None
     )
@@ -199,7 +199,7 @@ def _find_landing(
     leg_length, course = float(requirements.runs[leg]), float(requirements.courses[leg])
     home_position = home_point(setup.mission, setup.scenario.origin, terrain)
     home_altitude = math.nan if home_position is None else home_position.up
-    first, takeoff = takeoff_item(requirements)
+    first, takeoff = takeoff_item(requirements.setup)
     takeoff_climb = 0.0 if takeoff is None else float(requirements.points[first, 2]) - home_altitude
     climb_height = setup.autopilot.ground.go_around_height(item.params[0], takeoff_climb)
     destinations = _go_around_destinations(requirements, waypoint)

@@ -251,7 +251,8 @@ def with_suggestions(
 ) -> tuple[Finding, ...]:
     """Add ``suggestions`` to the failed or undecided findings that a change could fix.
 
-    Findings on the legs of a return to launch get no suggestions, because the autopilot chooses the path of a return.
+    On the legs of a return to launch only findings on clearance get suggestions, because the autopilot chooses the path
+    of a return, of which the mission decides the start and a parameter the altitude.
     If more than `MAX_SUGGESTED_FINDINGS` findings need suggestions, no finding gets any.
     """
     return_legs = {requirements.leg(i) for i in requirements.setup.route.rtl_legs}
@@ -266,7 +267,7 @@ def with_suggestions(
         for k, finding in enumerate(findings)
         if (finding.ok is False or is_open(finding))
         and RULES[finding.rule].suggest is not None
-        and finding.place not in return_legs
+        and (finding.place not in return_legs or finding.rule == "clearance")
     ]
     results = list(findings)
     for k in places if len(places) <= MAX_SUGGESTED_FINDINGS else ():

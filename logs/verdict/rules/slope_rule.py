@@ -530,7 +530,8 @@ def _performance_faults(requirements: RouteRequirements, leg: int, measure: Slop
     return [
         message(
             f"measured over {ability.duration:.0f} s at {throttle_text}: the aircraft can {verb} at most"
-            f" {math.degrees(ability.slope):.1f}° at {speed:.0f} m/s here",
+            f" {math.degrees(ability.slope):.1f}° at {speed:.0f} m/s here, over the ground in the mean wind, without"
+            " gusts, vertical wind or a change of airspeed",
         )
     ]
 

@@ -7,7 +7,9 @@ import pytest
 
 from flight.simulation.setup import FlightSetup
 from logs.verdict.judge_flight import judge_geometry
+from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.places import Disagreement, Place
+from logs.verdict.suggestions import _slope_speed
 from logs.verdict.tolerances import SUGGESTION_LENGTH_MARGIN_M
 from logs.verdict.wording import suggestions_text
 from tests.logs.verdict.judging import judge, leg, missile, of, suggested, waypoint
@@ -32,6 +34,14 @@ def test_a_gentler_slope_a_longer_leg_and_a_lower_speed_each_pass() -> None:
     assert of(judge_geometry(make_setup(steeper)), "slope", leg(1)).ok is False
     shorter = [[0, 0, 300], [0, 2000, 300], [0, 2000 + 0.97 * run, 600], [0, 6000, 600]]
     assert of(judge_geometry(make_setup(shorter)), "slope", leg(1)).ok is False
+
+
+def test_the_present_airspeed_is_no_other_airspeed() -> None:
+    """A gentle slope is held at the present 25 m/s and, of the steps of 0.5 m/s, next at 24.5 m/s."""
+    gentle = [[0.0, 0.0, 400.0], [0.0, 3000.0, 420.0], [0.0, 6000.0, 420.0]]
+    for airspeed, nearest in ((25.0, 24.5), (25.1, 25.5), (25.2, 25.5)):
+        requirements = route_requirements(make_setup(gentle, airspeed=airspeed))
+        assert _slope_speed(requirements, 0, float(requirements.slopes[0])) == nearest
 
 
 def test_a_gentler_turn_longer_legs_and_a_lower_speed_each_pass() -> None:

@@ -21,7 +21,7 @@ from logs.recording.reader import read_log
 from logs.verdict.findings import PITCH_LIMIT_TIME, Fact, Finding, make_finding
 from logs.verdict.judge_flight import judge_flight
 from logs.verdict.measures.route_requirements import route_requirements
-from logs.verdict.places import Place, ReferenceFlights
+from logs.verdict.places import FLIGHT, Change, DecidingParameter, Place, ReferenceFlights
 from logs.verdict.verdict import Verdict, verdict_json
 from logs.verdict.wording import deciding_text
 from planfly.flight_logs import judge_log
@@ -35,6 +35,7 @@ from planfly.workflow.reference_flights import (
     judge_airframe_flight,
     passes_with_margin,
 )
+from planfly.workflow.suggestion_trials import PassedTrial, SuggestionTrials
 from tests.setups import setup_maker
 
 LEG = Place("leg", 4)
@@ -334,6 +335,25 @@ def test_a_failed_flight_that_is_too_long_has_fewer_flights_beside_it(
     assert not verdict.flyable
     assert reference is not None
     assert (reference.airframe is not None, reference.deciding is not None) == (has_airframe, has_deciding)
+
+
+def test_no_other_parameter_decides_where_the_failing_leg_is_offered_its_own(
+    flown: tuple[FlownMission, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    judged, _ = flown
+    higher_return = (Change("parameter", FLIGHT, 100.0, 120.0, "m", parameter="RTL_ALTITUDE"),)
+
+    def find_passing(trials: SuggestionTrials) -> list[PassedTrial]:
+        return [PassedTrial(trials.judged.verdict.failed[0], higher_return, judged.setup)]
+
+    monkeypatch.setattr(SuggestionTrials, "find_passing", find_passing)
+    verdict, reference = explain_verdict(route_requirements(judged.setup), AIRCRAFT, unexplained(judged))
+    assert reference is not None
+    assert reference.airframe is not None
+    (failed,) = verdict.failed
+    assert reference.airframe.flyable
+    assert reference.deciding == DecidingParameter("RTL_ALTITUDE", 100.0, 120.0, "m", failed.rule, failed.place)
+    assert failed.suggestion == "set RTL_ALTITUDE to 120 m instead of 100 m"
 
 
 @pytest.mark.parametrize(("legs", "has_airframe"), [(0, True), (-1, False)])

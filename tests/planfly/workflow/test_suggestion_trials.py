@@ -441,3 +441,62 @@ def test_an_autopilot_that_does_not_follow_the_ground_is_not_offered_to() -> Non
     law = ArduPlane(ArduPilotParameters.defaults().changed(TERRAIN_ENABLE=0.0))
     assert len(following(judge_mission_geometry(setup))) == 1
     assert following(judge_mission_geometry(replace(setup, autopilot=law))) == []
+
+
+# ----------------------------------------------------------------------
+# Legs of a return to launch have no height of their own: a parameter and the item before them decide.
+
+RTL = "3 20 0 0 0 0 0 0 0"
+
+
+def test_a_return_is_not_offered_to_follow_the_ground() -> None:
+    """The way there crosses the hill 20 m below its top, and the return, which climbs to 100 m, 20 m above it."""
+    judged = judge_mission_geometry(over_a_hill(wp(0, 0, 60.0), wp(0, 4000, 60.0), RTL))
+    (low_leg, low_return) = [finding.place for finding in judged.failed if finding.rule == "clearance"]
+    assert (low_leg.to_item, low_return.to_item) == (2, 3)
+    assert all(places == [("terrain height", low_leg.index, 60.0)] for _, places in following(judged))
+    assert not any("item 3 at" in finding.suggestion for finding in judged.failed)
+
+
+def low_return(height: float = 100.0, rtl_altitude: float = 100.0) -> FlightSetup:
+    """A return by ArduPlane from 150 m, 4 km away, down to its RTL_ALTITUDE over a hill in the middle."""
+    setup = over_a_hill(wp(0, 0, 150.0), wp(0, 4000, 150.0), RTL, height=height)
+    context = MissionContext.from_setup(replace(setup, autopilot=ArduPlane(ArduPilotParameters.defaults())))
+    return context.setup_with_parameters(setup.mission, {"RTL_ALTITUDE": rtl_altitude})
+
+
+def test_a_low_return_is_offered_the_parameter_of_its_altitude_or_a_higher_start() -> None:
+    """Half way it is at 125 m, over a top of 100 m: 5 m too low, so that its end or its start has to be 10 m higher."""
+    (finding,) = [finding for finding in judge_mission_geometry(low_return()).failed if finding.rule == "clearance"]
+    (end,), (start,) = finding.suggestions
+    assert (end.what, end.place, end.parameter, end.current) == ("parameter", FLIGHT, "RTL_ALTITUDE", 100.0)
+    # In steps of 5 m, with the margin of 1.2 m, and the enlargement of steps.
+    assert end.wanted in (115.0, 120.0)
+    assert (start.what, start.place) == ("height", Place("waypoint", 1, 2))
+    assert 10.0 <= start.wanted <= 22.0
+    assert f"set RTL_ALTITUDE to {end.wanted:g} m instead of 100 m" in finding.suggestion
+    assert (
+        f"raise waypoint 1 (item 2) by {start.wanted:.0f} m (move item 2 by {start.wanted:.0f} m up)"
+        in finding.suggestion
+    )
+    # It passes with the parameter, and with its margin.
+    passing = judge_mission_geometry(low_return(rtl_altitude=end.wanted))
+    assert not passing.failed
+    margins = [other.margin for other in passing.findings if other.rule == "clearance" and other.place.to_item == 3]
+    assert all(margin is not None and margin >= 1.2 for margin in margins)
+
+
+def test_a_return_that_keeps_its_altitude_is_offered_a_higher_start_only() -> None:
+    judged = judge_mission_geometry(low_return(125.0, -1.0))
+    (finding,) = [finding for finding in judged.failed if finding.rule == "clearance" and finding.place.to_item == 3]
+    assert [change.what for way in finding.suggestions for change in way] == ["height"]
+
+
+def test_both_are_offered_where_neither_is_enough_and_not_where_one_is() -> None:
+    end = Change("parameter", FLIGHT, 100.0, 120.0, "m", parameter="RTL_ALTITUDE")
+    start = Change("height", Place("waypoint", 1, 2), None, 12.0, "m")
+    finding = low(1, (end,), (end, start), (start,))
+    alone = PassedTrial(finding, (replace(start, wanted=40.0),), SESSION.judged.setup)
+    assert suggestion_trials._has_passing_part([alone], finding, (end, start))
+    assert not suggestion_trials._has_passing_part([alone], finding, (start,))
+    assert not suggestion_trials._has_passing_part([alone], low(1), (end, start))

@@ -26,7 +26,7 @@ from logs.verdict.returns.judge_returns import (
     without_engine_world,
     worst_first_key,
 )
-from logs.verdict.returns.return_starts import ReturnStarts, planned_starts
+from logs.verdict.returns.return_starts import ReturnStarts, _ground_phase_starts, planned_starts
 from logs.verdict.returns.returns_text import headline, range_text
 from planfly.api.returning import ReturnsResult
 from tests.logs.verdict.returns.hill import DEGREE, HEAD, hill_setup, mission_text
@@ -276,19 +276,67 @@ def test_no_flight_begins_where_none_can(
     judge_returns(world, starts, OFTEN, lambda *_: pytest.fail("it was flown"))
 
 
-def test_one_that_begins_low_is_held_to_what_it_has(tmp_path: Path) -> None:
-    """A take-off: the way climbs from 10 m to 100 m over level ground, and the returns go to 100 m."""
-    way = HEAD + "1\t0\t0\t16\t0\t0\t0\t0\t46.0\t8.0010000\t10\t1\n2\t0\t0\t16\t0\t0\t0\t0\t46.0\t8.0140000\t100\t1\n"
-    found = judged(hill_setup(tmp_path, mission=way), 2.0)
+def climb(first_command: int) -> str:
+    """A mission that climbs from 10 m to 100 m over level ground, with the command of its first item."""
+    return HEAD + (
+        f"1\t0\t0\t{first_command}\t0\t0\t0\t0\t46.0\t8.0010000\t10\t1\n"
+        "2\t0\t0\t16\t0\t0\t0\t0\t46.0\t8.0140000\t100\t1\n"
+    )
+
+
+def test_one_that_begins_low_in_a_take_off_is_held_to_what_it_has(tmp_path: Path) -> None:
+    """The returns go to 100 m."""
+    setup = hill_setup(tmp_path, mission=climb(Command.NAV_TAKEOFF))
+    found = judged(setup, 2.0)
     low = [one for one in found.each if one.start[2] < 30.0]
     assert len(low) > 2
     assert all(one.required_height == pytest.approx(one.start[2] - 2.0, abs=0.2) for one in low)
     assert {one.kind for one in found.each} == {"safe"}
-    assert "taking off" in range_text(found.ranges[0], found, hill_setup(tmp_path, mission=way).scenario)
+    assert "taking off" in range_text(found.ranges[0], found, setup.scenario)
     # Down to 15 m over home it is lower than those that begin higher, and than the least height where they begin above.
-    sinks = judged(hill_setup(tmp_path, mission=way), 2.0, RTL_ALTITUDE=15.0)
+    sinks = judged(setup, 2.0, RTL_ALTITUDE=15.0)
     assert {one.kind for one in sinks.each if one.start[2] > 20.0} == {"low"}
     assert {one.kind for one in sinks.each if one.start[2] < 14.0} == {"safe"}
+
+
+def test_a_flight_that_is_too_low_without_a_take_off_excuses_no_return(tmp_path: Path) -> None:
+    setup = hill_setup(tmp_path, mission=climb(Command.NAV_WAYPOINT))
+    found = judged(setup, 2.0)
+    assert {one.required_height for one in found.each} == {30.0}
+    assert {one.kind for one in found.each if one.start[2] < 29.0} == {"low"}
+    assert {one.kind for one in found.each if one.start[2] > 35.0} == {"safe"}
+    (low,) = [one for one in found.ranges if one.worst.starts_too_low]
+    text = range_text(low, found, setup.scenario)
+    assert ": too low; " in text
+    assert (
+        text.partition("Wh")[0].count("(the flight itself is below the required height where this return begins)") == 1
+    )
+    assert not any("taking off" in range_text(one, found, setup.scenario) for one in found.ranges)
+
+
+def test_a_climb_out_ends_where_the_required_height_is_reached_or_its_leg_ends(tmp_path: Path) -> None:
+    """It climbs to 40 m, sinks to 15 m, and the leg after it stays there."""
+    way = HEAD + "".join(
+        f"{k}\t0\t0\t{22 if k == 1 else 16}\t0\t0\t0\t0\t46.0\t{8.0 + x / DEGREE:.7f}\t{up:g}\t1\n"
+        for k, (x, up) in enumerate(((0.0, 10.0), (500.0, 40.0), (1000.0, 15.0), (1500.0, 15.0)), 1)
+    )
+    found = judged(hill_setup(tmp_path, mission=way), 1.0)
+    assert all(one.required_height < 30.0 for one in found.each if one.start[0] < 300.0)
+    assert {one.required_height for one in found.each if one.start[0] > 400.0} == {30.0}
+    assert {one.kind for one in found.each if one.start[0] > 800.0} == {"low"}
+
+
+def test_a_lower_flight_never_has_more_safe_returns(tmp_path: Path) -> None:
+    """In cruise over the hill, 400 m high, from 40 m above its top down to 2 m; the returns climb to 600 m."""
+    counts = []
+    for amsl in (440.0, 431.0, 425.0, 415.0, 402.0):
+        world = make_return_world(hill_setup(tmp_path, mission=mission_text(2000.0, 4000.0, amsl=amsl)))
+        starts = planned_starts(world.setup, 2.0)
+        found = judge_returns(world.with_parameters(RTL_ALTITUDE=600.0), starts, 2.0)
+        counts.append(found.count("safe"))
+        assert not any(one.safe and one.clearance < 29.9 for one in found.each)
+    assert counts == sorted(counts, reverse=True)
+    assert counts[0] > counts[-1]
 
 
 def test_what_was_low_before_it_left_the_elevation_file_is_low(tmp_path: Path) -> None:
@@ -395,3 +443,16 @@ def test_glides_and_returns_with_px4_have_the_airspeeds_of_its_file(tmp_path: Pa
     assert [of_file[name] for name in ("AIRSPEED_MIN", "AIRSPEED_CRUISE", "AIRSPEED_MAX")] == [19.5, 24.0, 30.0]
     assert of_aircraft.min_airspeed == 18.0
     assert of_file.roll_limit == of_aircraft.autopilot.turns.max_bank
+
+
+@pytest.mark.parametrize(("first", "has_take_off"), [(5.0, True), (19.9, True), (20.1, False)])
+def test_a_log_without_legs_has_a_take_off_if_it_begins_near_the_ground(
+    tmp_path: Path, first: float, has_take_off: bool
+) -> None:
+    """Over level ground it is at 30 m after 10 s and after 50 s, and lands after 60 s."""
+    setup = hill_setup(tmp_path)
+    time = np.arange(61.0)
+    up = np.interp(time, [0.0, 10.0, 20.0, 40.0, 50.0, 60.0], [first, 30.0, 80.0, 80.0, 30.0, 0.0])
+    position = np.stack([np.zeros(61), np.zeros(61), up], axis=1)
+    found = time[_ground_phase_starts(setup, time, position, None, time)].tolist()
+    assert found == [*(range(10) if has_take_off else ()), *range(45, 61)]

@@ -98,19 +98,24 @@ def test_a_sphere_that_nothing_goes_around_leaves_no_altitude(tmp_path: Path) ->
         assert judged.count("ground") == judged.count("low") == 0
 
 
-def test_a_take_off_below_the_least_height_leaves_the_altitude_to_be_found(tmp_path: Path) -> None:
-    """A way that begins 25 m over the ground, where the least height is 30 m, and goes over the hill at 600 m."""
+@pytest.mark.parametrize("first_command", [22, 16])
+def test_a_start_below_the_least_height_leaves_the_altitude_to_be_found(tmp_path: Path, first_command: int) -> None:
+    """It begins 25 m over the ground, where the least height is 30 m, and goes over the hill at 600 m."""
     rows = ((300.0, 25.0), (2000.0, 300.0), (2600.0, 600.0), (6500.0, 600.0))
     way = HEAD + "".join(
-        f"{k}\t0\t0\t16\t0\t0\t0\t0\t46.0\t{8.0 + x / DEGREE:.7f}\t{up:g}\t1\n" for k, (x, up) in enumerate(rows, 1)
+        f"{k}\t0\t0\t{first_command if k == 1 else 16}\t0\t0\t0\t0\t46.0\t{8.0 + x / DEGREE:.7f}\t{up:g}\t1\n"
+        for k, (x, up) in enumerate(rows, 1)
     )
     setup = hill_setup(tmp_path, mission=way)
     world, starts = make_return_world(setup), planned_starts(setup, 4.0)
-    assert judge_returns(world, starts, 4.0).each[0].required_height == pytest.approx(23.0, abs=0.1)
+    required_height = judge_returns(world, starts, 4.0).each[0].required_height
+    assert required_height == pytest.approx(23.0 if first_command == 22 else 30.0, abs=0.1)
     (found,) = suggest_parameters(world, starts)
     # As without the take-off.
     assert found.parameters["RTL_ALTITUDE"] in (250.0, 275.0)
-    assert all(one.safe for one in judge_returns(found.apply_to(world), starts, 4.0).each)
+    after = judge_returns(found.apply_to(world), starts, 4.0)
+    assert all(one.safe or one.starts_too_low for one in after.each)
+    assert any(one.starts_too_low for one in after.each) is (first_command == 16)
 
 
 def kinds(counts: dict[Kind, int]) -> Returns:

@@ -127,8 +127,11 @@ def test_a_return_too_low_over_ground_fails_by_the_clearance(parameters: dict[st
     failed = {item.rule for item in verdict.findings if item.ok is False}
     assert failed == ({"clearance"} if parameters else set())
     assert {item.rule for item in judge_geometry(setup).findings if item.ok is False} == failed
-    # No change of its legs could be made: none is suggested.
-    assert not [item for item in verdict.findings if item.suggestions]
+    # Its legs have no items: its altitude is suggested first, 10 m and a margin higher in steps of 5 m.
+    suggested = [item.suggestions[0] for item in verdict.findings if item.suggestions]
+    assert [[(change.parameter, change.wanted) for change in way] for way in suggested] == (
+        [[("RTL_ALTITUDE", 35.0)]] if parameters else []
+    )
 
 
 def test_a_return_that_meets_a_ridge_has_not_got_to_its_end() -> None:
