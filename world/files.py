@@ -388,7 +388,10 @@ def lock_path(path: Path) -> Iterator[None]:
     handle = os.open(lock_file, os.O_RDONLY if file_locks.LOCKS_FOLDERS else os.O_RDWR | os.O_CREAT)
     try:
         if not file_locks.try_lock(handle):
-            raise PlanflyError(f"{path}: another planfly process is writing there; name another target", file=path)
+            raise PlanflyError(
+                f"{path}: another planfly process is writing there; wait until it ends, or name another file or folder",
+                file=path,
+            )
         yield
     finally:
         os.close(handle)

@@ -55,7 +55,7 @@ def check_in_area(key: str, point: Floats, source: str, bounds: Floats, origin: 
         if not min_coordinate <= point[axis] <= max_coordinate:
             outside = max(min_coordinate - point[axis], point[axis] - max_coordinate)
             allowed = (
-                f"outside the area {min_coordinate:.0f}..{max_coordinate:.0f} m, {outside:.0f} m from its edge"
+                f"{outside:.0f} m outside the area, which reaches from {min_coordinate:.0f} to {max_coordinate:.0f} m"
                 f" (the area covers {_area_text(bounds, origin)})"
             )
             raise ScenarioError.at(source, key, float(point[axis]), allowed, shown=f"{name} {point[axis]:.0f} m")
@@ -76,7 +76,8 @@ def check_altitude(key: str, point: Floats, source: str, floor: float, ceiling: 
     """
     amsl = f"{point[2]:.0f} m AMSL"
     if not floor <= point[2] <= ceiling:
-        allowed = f"outside floor..ceiling {floor:.0f}..{ceiling:.0f}"
+        limit_text = f"above the ceiling, {ceiling:.0f}" if point[2] > ceiling else f"below the floor, {floor:.0f}"
+        allowed = f"{limit_text} m AMSL"
         raise ScenarioError.at(source, key, float(point[2]), allowed, shown=amsl)
     check_above_ground(key, point, source, ground)
 

@@ -8,6 +8,7 @@ from typing import Any
 from logs.verdict.places import Place, numbered_place
 from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.wording import place_text
+from world.wording import count_text
 
 
 @dataclass(frozen=True)
@@ -88,10 +89,12 @@ def failure_lines(by_rule: Iterable[RuleFailures], mission_fault: str = "") -> l
     lines = []
     for failures in by_rule:
         texts = [
-            mission_fault if place.kind == "mission" and place.item is None else f"{place_text(place)} in {count}"
+            mission_fault
+            if place.kind == "mission" and place.item is None
+            else f"{place_text(place)} in {count_text(count, 'flight')}"
             for place, count in failures.places[:3]
         ]
         places_text = ", ".join(filter(None, texts))
-        line = f"  failed  {RULE_WORDS[failures.rule].title} in {failures.flights}"
+        line = f"  failed  {RULE_WORDS[failures.rule].title} in {count_text(failures.flights, 'flight')}"
         lines.append(f"{line}: {places_text}" if places_text else line)
     return lines

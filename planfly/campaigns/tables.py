@@ -241,8 +241,8 @@ class LockedTable:
         for name in self._kind.fixed:
             if stored_request[name] != settings[name]:
                 raise StoreError(
-                    f"{self.path}: {name} {settings[name]}: expected {stored_request[name]},"
-                    " as in the campaign that is resumed",
+                    f"{self.path}: {name} {settings[name]}: the campaign in this file has"
+                    f" {stored_request[name]}; resume it with the same value, or name another folder",
                     file=self.path,
                 )
 

@@ -15,7 +15,7 @@ def answer_line(result: WindowResult) -> str:
     """Return the answer in one line: the result for the requested departure, or the windows."""
     goal, departure = result.goal, result.asked
     windows = ", ".join(_window_text(*window) for window in result.windows)
-    open_text = f"open for take-off: {windows} UTC" if windows else "no take-off time is open"
+    open_text = f"take-off windows: {windows} UTC" if windows else "no take-off time is open"
     if departure is None:
         unknown_text = ", but not judged in full" if windows and result.is_go is None else ""
         return f"{open_text}{unknown_text}{_best_text(result)}"
@@ -34,7 +34,7 @@ def answer_line(result: WindowResult) -> str:
 def _window_text(first: datetime, last: datetime) -> str:
     """Return a window as text; the date is not repeated if the window ends on the same day."""
     if first == last:
-        return f"{first:{TIME_FORMAT}}"
+        return f"{first:{TIME_FORMAT}} only"
     return f"{first:{TIME_FORMAT}} to {last:{'%H:%M' if first.date() == last.date() else TIME_FORMAT}}"
 
 

@@ -94,8 +94,8 @@ def add_aircraft_parser(command_line: LineParser) -> None:
     )
     add_result_options(
         parser,
-        "folder for the pictures (default: runs/aircraft-NAME; an existing one is replaced); "
-        "with --identify, the folder to make for the aircraft",
+        "folder for the pictures (default: runs/aircraft-NAME; an existing folder is replaced); "
+        "with --identify, the folder to create for the aircraft",
     )
 
 

@@ -129,7 +129,9 @@ def _add_shared_options(parser: CommandParser) -> None:
     add_flights_options(parser)
     parser.add_argument("--resume", action="store_true", help="continue the campaign in --out")
     add_result_options(
-        parser, "folder for the files (default: runs/<name>-<command>; an existing one is kept)", junit=True
+        parser,
+        "folder for the files (default: runs/<name>-<command>; an existing folder is not replaced; see --resume and --overwrite)",
+        junit=True,
     )
 
 

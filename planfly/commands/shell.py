@@ -67,7 +67,7 @@ def show_help(args: argparse.Namespace) -> int:
         line_parser.print_help()
         return FLYABLE
     if args.topic not in line_parser.commands:
-        return _report_bad_usage(f"{args.topic!r}: no such command{did_you_mean(args.topic, line_parser.commands)}")
+        return _report_bad_usage(f"{args.topic!r}: unknown command{did_you_mean(args.topic, line_parser.commands)}")
     if args.schema:
         if args.topic not in commands_with_json():
             return _report_bad_usage(

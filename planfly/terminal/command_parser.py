@@ -211,7 +211,7 @@ class LineParser(CommandParser):
         arguments = _join_negative_numbers(sys.argv[1:] if args is None else list(args))
         if arguments and not arguments[0].startswith("-") and arguments[0] not in self.commands:
             hint = did_you_mean(arguments[0], self.commands) or f"; there are {', '.join(self.commands)}"
-            self.error(f"{arguments[0]!r}: no such command{hint}")
+            self.error(f"{arguments[0]!r}: unknown command{hint}")
         parsed, unknown_arguments = self.parse_known_args(arguments, namespace)
         parser = self.commands[parsed.command]
         if unknown_arguments and not parser.take_late_arguments(parsed, unknown_arguments):

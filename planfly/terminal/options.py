@@ -206,8 +206,9 @@ def add_autopilot_options(parser: CommandParser) -> OptionGroup:
     group.add_argument(
         "--guidance",
         choices=CHOICES["guidance"],
-        help="fly with planfly's own guidance instead of an autopilot: path follows the path with its arcs, l1 follows "
-        "the legs by L1, and vector-field follows the path by Beard and McLain's vector field",
+        help="fly with planfly's own guidance instead of an autopilot: path follows the legs and the arcs at "
+        "waypoints, l1 follows the legs with L1 guidance, vector-field follows both with "
+        "Beard and McLain's vector field",
     )
     return group
 

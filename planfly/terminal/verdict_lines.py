@@ -102,7 +102,9 @@ def _failed_lines(rule: RuleFindings) -> list[str]:
     worst_finding, *other_findings = rule.failed
     place_text = finding_heading(worst_finding)
     if other_findings:
-        place_text = f"{rule.words.word}: {len(rule.failed)} of {rule.judged} fail; the worst at {worst_finding.where}"
+        place_text = (
+            f"{rule.words.word}: {len(rule.failed)} of {rule.judged} places fail; the worst is at {worst_finding.where}"
+        )
     lines = [colour_text("  failed  ", "bad") + f"{place_text}: {worst_finding.reason}"]
     if worst_finding.suggestions:
         lines.append(colour_text("          would pass: ", "hint") + worst_finding.suggestion)

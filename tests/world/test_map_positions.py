@@ -57,7 +57,7 @@ def test_a_point_outside_the_area_says_by_how_far_and_where_the_area_is() -> Non
         check_in_area("start", np.array([1250.0, 0.0, 400.0]), "s.toml", BOUNDS, ORIGIN)
     # A degree of latitude at 46 degrees on WGS84 is 111.15 km, one of longitude 77.46 km.
     assert str(caught.value) == (
-        "s.toml: start: east 1250 m: outside the area -1000..1000 m, 250 m from its edge"
+        "s.toml: start: east 1250 m: 250 m outside the area, which reaches from -1000 to 1000 m"
         " (the area covers latitude 45.9820..46.0180, longitude 7.9871..8.0129)"
     )
 
@@ -71,9 +71,9 @@ def test_a_point_outside_the_area_says_by_how_far_and_where_the_area_is() -> Non
         ((-1000.1, 0.0, 400.0), "east -1000 m: outside the area -1000..1000"),
         ((0.0, 2000.1, 400.0), "north 2000 m: outside the area -2000..2000"),
         ((0.0, math.nan, 400.0), "north nan m: outside the area"),
-        ((0.0, 0.0, 149.0), "149 m AMSL: outside floor..ceiling 150..500"),
-        ((0.0, 0.0, 501.0), "501 m AMSL: outside floor..ceiling 150..500"),
-        ((0.0, 0.0, math.nan), "nan m AMSL: outside floor..ceiling"),
+        ((0.0, 0.0, 149.0), "149 m AMSL: below the floor, 150 m AMSL"),
+        ((0.0, 0.0, 501.0), "501 m AMSL: above the ceiling, 500 m AMSL"),
+        ((0.0, 0.0, math.nan), "nan m AMSL: "),
         ((500.0, 0.0, 249.9), "250 m AMSL: not above the terrain, which is at 250 m"),
         ((500.0, 0.0, 250.1), ""),
     ],

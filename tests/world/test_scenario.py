@@ -33,12 +33,12 @@ CASES: dict[str, tuple[str, str, str]] = {
     "ceiling under the start": (
         "[start]",
         "ceiling_amsl_m = 350\n[start]",
-        "start: 400 m AMSL: outside floor..ceiling",
+        "start: 400 m AMSL: above the ceiling, ",
     ),
     "floor above the start": (
         "[start]",
         "floor_amsl_m = 450\n[start]",
-        "start: 400 m AMSL: outside floor..ceiling 450..",
+        "start: 400 m AMSL: below the floor, 450 m AMSL",
     ),
     "start outside the map": ("east_m = -4000", "east_m = -5001", "start: east -5001 m: outside the area -5000..5000"),
     "destination outside": ("east_m = 4000", "east_m = 6000", "destination: east 6000 m: outside the area"),

@@ -168,8 +168,8 @@ def test_rules_that_fail_in_calm_air_are_named_with_their_places() -> None:
         "by the best estimate, not flyable with P >= 0.9 even in light wind from 0°;"
         " from 270°, flyable in wind up to 2.0 m/s",
         "in calm air, 3 of 4 flights fail",
-        "  failed  slopes in 1: leg 2 in 1",
-        "  failed  clearance in 3: leg 4 in 3",
+        "  failed  slopes in 1 flight: leg 2 in 1 flight",
+        "  failed  clearance in 3 flights: leg 4 in 3 flights",
     ]
     # Four directions that fail in calm air need no flights in wind.
     nowhere = replace(

@@ -69,7 +69,8 @@ def test_the_target_and_each_failed_rule_are_cases_of_continuous_integration(
                 ("planfly.clearance", "flights", result),
             ]
             assert suite.cases[1].message == f"{failed} of 60 flights failed"
-            assert suite.cases[1].text == f"failed  clearance in {failed}: leg 1 in {failed}"
+            count = "1 flight" if failed == 1 else f"{failed} flights"
+            assert suite.cases[1].text == f"failed  clearance in {count}: leg 1 in {count}"
             assert suites_text([suite]).count("<failure") == (2 if result == "failure" else 0)
 
 
@@ -128,8 +129,8 @@ def test_failed_rules_come_first_in_the_ranking_also_without_a_margin(base: Camp
     ]
     lines = campaign_lines(summary)
     assert [line for line in lines if line.startswith(("  failed", "  narrow"))] == [
-        "  failed  slopes in 2: leg 2 in 2",
-        "  failed  corridor in 1: leg 2 in 1",
+        "  failed  slopes in 2 flights: leg 2 in 2 flights",
+        "  failed  corridor in 1 flight: leg 2 in 1 flight",
         "  narrow  clearance: the smallest margin of all flights is -0.5 m, within the tolerance",
         "  narrow  waypoints: the smallest margin of all flights is +4.0 m",
     ]
@@ -318,6 +319,7 @@ def test_undecided_flights_are_no_failures_and_name_the_reason_of_the_first(base
 
 def test_a_mission_that_fails_as_a_whole_is_named_once(base: CampaignBase, tmp_path: Path) -> None:
     summary = summary_of_outcomes(base, tmp_path, Goal(None, False, 4), 1, 3, 0)
-    assert [line for line in campaign_lines(summary) if line.startswith("  failed")] == ["  failed  mission in 3"]
+    failed_lines = [line for line in campaign_lines(summary) if line.startswith("  failed")]
+    assert failed_lines == ["  failed  mission in 3 flights"]
     named = replace(summary, mission_fault="starts with landing")
-    assert "  failed  mission in 3: starts with landing" in campaign_lines(named)
+    assert "  failed  mission in 3 flights: starts with landing" in campaign_lines(named)

@@ -109,9 +109,9 @@ def test_what_was_asked_for_comes_back_in_order(base: CampaignBase, tmp_path: Pa
 @pytest.mark.parametrize(
     ("name", "value", "words"),
     [
-        ("target", 0.9, "target 0.9: expected 0.99, as in the campaign that is resumed"),
+        ("target", 0.9, "target 0.9: the campaign in this file has 0.99"),
         ("confidence", 0.9, "confidence 0.9"),
-        ("directions", 8, "directions 8: expected 16, as in the campaign that is resumed"),
+        ("directions", 8, "directions 8: the campaign in this file has 16"),
         ("most", 30.0, "most 30.0"),
     ],
 )

@@ -49,7 +49,7 @@ def test_the_schema_of_an_answer(capsys: Output) -> None:
 @pytest.mark.parametrize(
     ("line", "said"),
     [
-        ("help flyy", "planfly help: 'flyy': no such command: did you mean 'fly'?\n"),
+        ("help flyy", "planfly help: 'flyy': unknown command: did you mean 'fly'?\n"),
         ("help --schema", "planfly help: --schema: name a command"),
         ("help serve --schema", "planfly help: --schema: serve has no --json; these have: run, plan"),
     ],

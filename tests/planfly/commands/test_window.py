@@ -66,7 +66,7 @@ def test_a_window_around_a_storm(folder: Path, capsys: pytest.CaptureFixture[str
         (
             "07:00",
             0,
-            "take-off at 2026-05-01 07:00 UTC: go, 10 of 10 flights are flyable; open for take-off: 2026-05-01 06:",
+            "take-off at 2026-05-01 07:00 UTC: go, 10 of 10 flights are flyable; take-off windows: 2026-05-01 06:",
         ),
         (
             "08:00",

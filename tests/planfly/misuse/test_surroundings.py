@@ -223,7 +223,7 @@ def test_two_runs_into_one_folder(folder: Path, capsys: pytest.CaptureFixture[st
     with lock_path(folder / "out"):
         assert main(["run", "tight", "--out", "out"]) == 2
     assert capsys.readouterr().err.endswith(
-        "planfly: out: another planfly process is writing there; name another target\n"
+        "planfly: out: another planfly process is writing there; wait until it ends, or name another file or folder\n"
     )
     assert list((folder / "out").iterdir()) == []
     with lock_path(folder / "out"):

@@ -156,7 +156,7 @@ def test_an_aircraft_named_by_its_folder_can_be_chosen_again(tmp_path: Path) -> 
         ({"limits": {"max_dive_deg": 99.0}}, 'Steepest descent: 99: allowed above 0, below 90, or "aircraft"'),
         ({"ceiling": -9999.0}, "Ceiling: -9999: allowed -500..9000"),
         # What a setting makes impossible elsewhere is said of the setting.
-        ({"ceiling": 100.0}, "Ceiling: 100: start: 485 m AMSL: outside floor..ceiling -500..100"),
+        ({"ceiling": 100.0}, "Ceiling: 100: start: 485 m AMSL: above the ceiling, 100 m AMSL"),
         ({"wind_speed": 500.0}, "Wind: 500: allowed 0..40"),
         ({"wind_from": -361.0}, "Wind from: -361: allowed -360..360"),
         # One range on both sides, the aircraft's (its TOML); the Zagi flies from 11 m/s, and a scenario takes 15 m/s.

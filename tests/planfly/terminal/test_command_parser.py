@@ -86,7 +86,7 @@ Output = pytest.CaptureFixture[str]
 @pytest.mark.parametrize(
     ("line", "said"),
     [
-        ("flyy m.plan", "planfly: 'flyy': no such command: did you mean 'fly'? (see planfly --help)"),
+        ("flyy m.plan", "planfly: 'flyy': unknown command: did you mean 'fly'? (see planfly --help)"),
         ("fly m.plan --wnd 8,270", "planfly fly: --wnd: no such option: did you mean '--wind'?"),
         # All options share their dashes: "--overwrite" is not like "--terrain".
         ("export a.plan b.plan --terrain x", "planfly export: --terrain: no such option (see planfly export --help)"),
@@ -97,7 +97,7 @@ Output = pytest.CaptureFixture[str]
         ("fly m.plan -- --wnd", "planfly fly: --wnd: no such argument (see planfly fly --help)"),
         ("fly --wnd -- m.plan --terain", "planfly fly: --wnd: no such option: did you mean '--wind'?"),
         ("fly m.plan -- --wnd=3 x", "planfly fly: --wnd=3: no such argument (see planfly fly --help)"),
-        ("qqqq", "planfly: 'qqqq': no such command; there are run, plan, "),
+        ("qqqq", "planfly: 'qqqq': unknown command; there are run, plan, "),
     ],
 )
 def test_what_was_meant_is_named(line: str, said: str, capsys: Output) -> None:

@@ -108,7 +108,7 @@ def test_large_numbers_stand_without_a_power_of_ten(
 def test_failures_of_one_rule_are_one_paragraph_the_worst_first(capsys: pytest.CaptureFixture[str]) -> None:
     findings = (*(slope(k, 9.0 + k, 8.0) for k in range(9)), slope(9, 4.0, 8.0))
     lines = printed(capsys, Verdict(findings, False, True, ("not flyable",), "flown"))
-    assert lines[1] == "  failed  slope: 9 of 10 fail; the worst at leg 8: leg 8 is as it is"
+    assert lines[1] == "  failed  slope: 9 of 10 places fail; the worst is at leg 8: leg 8 is as it is"
     assert lines[2].endswith("would pass: lengthen leg 8 from 300 m to 400 m")
     assert lines[3] == (
         "          also at leg 7 (16°); leg 6 (15°); leg 5 (14°); leg 4 (13°); leg 3 (12°); leg 2 (11°); 2 more"
