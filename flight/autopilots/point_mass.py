@@ -33,6 +33,11 @@ _ALTITUDES_M = (0.0, 2000.0, 4000.0)
 # Height above the start of a mission up to which the strongest wind of a forecast counts, m.
 _MAX_WIND_HEIGHT_M = 2000.0
 
+# Bank beyond which the induced drag of a point mass does not increase further, rad.
+_MAX_DRAG_BANK_RAD = 1.2
+# Lowest airspeed of a point mass, m/s.
+_MIN_AIRSPEED_MPS = 3.0
+
 # The aircraft as a point mass, for compiled code.  Its tables have a row for each airspeed and a column for each
 # altitude of the grid.
 POINT_MASS = record_dtype(
@@ -256,44 +261,45 @@ def wind_at(position: Record, seconds: float, aircraft: Record, field: Floats) -
 
 @inner
 def advance_point_mass(
-    estimated: Record,
+    motion: Record,
     state: Record,
     path_angle: float,
     throttle: float,
     aircraft: Record,
     excess_table: Floats,
-    power: Floats,
-    field: Floats,
+    power_table: Floats,
+    wind_field: Floats,
     dt: float,
 ) -> float:
     """Move a point mass by ``dt`` s, and return the electric power that it uses, W.
 
-    estimated: position and velocity over the ground, a record of `flight.guidance.navigation_error.MOTION`.
-    state: airspeed, attitude, time and wind, a record of `flight.dynamics.state.STATE`.
+    motion: position and velocity over the ground, a record of `flight.guidance.navigation_error.MOTION`; updated.
+    state: airspeed, attitude, time and wind, a record of `flight.dynamics.state.STATE`. Airspeed, yaw and time are
+        updated, and the wind is set for the new time and position.
     path_angle: climb angle relative to the air, rad.
+    throttle: 0 to 1.
     aircraft: a record of `POINT_MASS`.
-    excess_table, power: tables of a `PointMass`.
-    field: packed wind field, as in `PointMass`; empty for none.
-
-    The wind in the state is updated to the new time and position.
+    excess_table: specific excess power, m/s, `PointMass.excess`.
+    power_table: electric power, W, `PointMass.power`.
+    wind_field: packed wind field, as in `PointMass`; empty for none.
     """
-    thrust_power = excess_power(excess_table, throttle, state.airspeed, estimated.up, aircraft)
-    tan_bank = math.tan(min(1.2, abs(state.roll)))
+    thrust_power = excess_power(excess_table, throttle, state.airspeed, motion.up, aircraft)
+    tan_bank = math.tan(min(_MAX_DRAG_BANK_RAD, abs(state.roll)))
     net_power = thrust_power - aircraft.induced / state.airspeed * tan_bank * tan_bank
-    electric_power = _electric_power(thrust_power, excess_table, power, state.airspeed, estimated.up, aircraft)
+    electric_power = _electric_power(thrust_power, excess_table, power_table, state.airspeed, motion.up, aircraft)
     state.yaw += GRAVITY * math.tan(state.roll) / state.airspeed * dt
     state.airspeed = max(
-        3.0, state.airspeed + (GRAVITY * net_power / state.airspeed - GRAVITY * math.sin(path_angle)) * dt
+        _MIN_AIRSPEED_MPS, state.airspeed + (GRAVITY * net_power / state.airspeed - GRAVITY * math.sin(path_angle)) * dt
     )
     horizontal_airspeed = state.airspeed * math.cos(path_angle)
-    estimated.velocity_east = horizontal_airspeed * math.sin(state.yaw) + state.wind_east
-    estimated.velocity_north = horizontal_airspeed * math.cos(state.yaw) + state.wind_north
-    estimated.velocity_up = state.airspeed * math.sin(path_angle)
-    estimated.east += estimated.velocity_east * dt
-    estimated.north += estimated.velocity_north * dt
-    estimated.up += estimated.velocity_up * dt
+    motion.velocity_east = horizontal_airspeed * math.sin(state.yaw) + state.wind_east
+    motion.velocity_north = horizontal_airspeed * math.cos(state.yaw) + state.wind_north
+    motion.velocity_up = state.airspeed * math.sin(path_angle)
+    motion.east += motion.velocity_east * dt
+    motion.north += motion.velocity_north * dt
+    motion.up += motion.velocity_up * dt
     state.time += dt
-    state.wind_east, state.wind_north = wind_at(estimated, state.time, aircraft, field)
+    state.wind_east, state.wind_north = wind_at(motion, state.time, aircraft, wind_field)
     return electric_power
 
 

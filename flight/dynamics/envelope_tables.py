@@ -186,7 +186,7 @@ def _power(fdm: Fdm, trim: Trim) -> float:
 def _grid_airspeeds(aircraft: Aircraft) -> Floats:
     """Return the airspeeds of the grid, m/s, (v,).
 
-    They extend from the stall to 5 m/s above the maximum airspeed of the guidance.
+    They extend from the stall speed to 5 m/s above the maximum commanded airspeed; both speeds are rounded up.
     """
     return np.linspace(math.ceil(aircraft.stall_speed), math.ceil(aircraft.airspeed_max) + 5.0, _AIRSPEED_COUNT)
 

@@ -436,7 +436,7 @@ class Fdm:
         return model if self._gear is None else with_contacts(model, self.aircraft, self._gear)
 
     def attitudes(self) -> Floats:
-        """Return roll, pitch and yaw of all n evaluations of initial conditions in order, rad, (n, 3)."""
+        """Return roll, pitch and yaw of the n initial conditions evaluated so far, in call order, rad, (n, 3)."""
         return np.array(self._attitudes).reshape(-1, 3)
 
     def specific_force(self) -> tuple[float, float, float]:

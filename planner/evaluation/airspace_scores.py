@@ -169,7 +169,7 @@ def add_airspace_violations(
         offset_before, offset_after = float(flown_corners[i].fly_by_offset), float(flown_corners[i + 1].fly_by_offset)
         below, above = float(lags[i].max_below), -float(lags[i].min_below)
         if has_max_height:
-            violations.terrain += _leg_excess_height(data, required, path[i], path[i + 1], legs[i], lags[i], across)
+            violations.terrain += _leg_excess_height(data, required, path[i], path[i + 1], lags[i], across)
         max_offset = max(offset_before, offset_after)
         if has_zones and _leg_zone_penetration(data, path[i], path[i + 1], across + max_offset, below, above) > 0.0:
             first_fraction = min(1.0, END_DISTANCE_M / max(legs[i].run, 1e-6)) if i == 0 else 0.0
@@ -238,25 +238,31 @@ def _leg_excess_height(
     required: RequiredClearance,
     leg_start: Floats,
     leg_end: Floats,
-    leg: Record,
     lag: Record,
-    across: float,
+    half_width: float,
 ) -> float:
-    """Return the excess of a leg over the maximum height above ground, integrated along the leg, m x km.
+    """Return the excess of a leg over the maximum height above ground, integrated along the leg, m·km.
 
-    lag: height lag of the autopilot on the leg, which is added to the altitude of the leg.
-    across: half width of the examined ground strip below the leg, m.
+    required: the maximum height, expressed as a clearance by `required_headroom`.
+    leg_start, leg_end: (3,) m.
+    lag: `HEIGHT_LAG` record of the leg; a height above the leg, by which the aircraft lags in a descent, adds to the
+        excess.
+    half_width: half width of the examined ground strip below the leg, m.
+
+    Lag and half width are ignored for an autopilot without tracking error.
     """
     if not data.tracking.has_error:
         return _swath_excess_height(data, required, leg_start, leg_end, 0.0, 0.0, math.inf)
     total, start, end = 0.0, np.empty(3), np.empty(3)
+    # The lag decays exponentially along the leg. The leg is cut at fixed multiples of the decay length, and each part
+    # gets the largest height above the leg at its two ends.
     for k in range(len(_LAG_CUTS)):
         begin_fraction = min(1.0, _LAG_CUTS[k] / max(1e-9, lag.decay))
         end_fraction = min(1.0, _LAG_CUTS[k + 1] / max(1e-9, lag.decay)) if k + 1 < len(_LAG_CUTS) else 1.0
         if end_fraction > begin_fraction:
             _cut_segment(leg_start, leg_end, begin_fraction, end_fraction, start, end)
             above = max(0.0, -lag_at(lag, begin_fraction), -lag_at(lag, end_fraction))
-            total += _swath_excess_height(data, required, start, end, across, above, math.inf)
+            total += _swath_excess_height(data, required, start, end, half_width, above, math.inf)
     return total
 
 
@@ -275,7 +281,7 @@ def _swath_excess_height(
     The excess is the largest of three lines: the line itself, and one line at the distance `lateral` (m) on each side.
 
     required: the maximum height, expressed as a clearance by `required_headroom`.
-    max_excess: value beyond which the computation stops; the result is then a lower bound above it.
+    max_excess: value beyond which the computation stops; the result is then a lower bound above it. inf never stops.
     """
     horizontal_length = max(1e-9, math.hypot(end[0] - start[0], end[1] - start[1]))
     east, north = lateral * (end[1] - start[1]) / horizontal_length, -lateral * (end[0] - start[0]) / horizontal_length

@@ -230,7 +230,13 @@ def with_end_course_points(data: ProblemArrays, path: Floats) -> Floats:
 
 @compiled
 def turn_and_roll_lengths(data: ProblemArrays, waypoints: Floats) -> tuple[Floats, Floats]:  # pragma: no cover
-    """Return the lengths that each leg needs for its turns and for the roll between them, (w - 1,) m each."""
+    """Return the lengths that each leg needs for its turns, and for rolling from one bank to the next.
+
+    waypoints: (w, 3) m.
+
+    Returns the turn lengths and the roll lengths, (w - 1,) m each. The roll lengths of fly-over waypoints are 0: such a
+    turn begins at its waypoint, and its turn length already extends to where the track has rejoined the next leg.
+    """
     count = waypoints.shape[0]
     legs, corners = np.zeros(count - 1, dtype=LEG), np.zeros(count, dtype=CORNER)
     turns, rolls = np.zeros(count - 1), np.zeros(count - 1)

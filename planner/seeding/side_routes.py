@@ -63,9 +63,9 @@ class GridCosts(NamedTuple):
 
 @inner
 def _relax_stage_back(
-    goal_costs: Floats,
+    next_costs: Floats,
     cell_costs: Floats,
-    previous_goal_costs: Floats,
+    costs: Floats,
     successors: Codes,
     spans: Records,
     step_layers: Records,
@@ -75,16 +75,19 @@ def _relax_stage_back(
 ) -> None:
     """Compute the costs from the cells of a stage to the destination, from the costs of the next stage.
 
-    goal_costs, previous_goal_costs: (layers, across) costs to the destination from the cells of the next stage, and of
-        this stage.
-    successors: (layers, across) cells of the next stage to which the cheapest routes lead.
-    spans: `SPAN` records (layers,) of this stage's cells that are within the bound.
-
-    The other arguments are the same as for `relax_stage`.
+    next_costs: (layers, across) costs from the cells of the next stage to the destination.
+    cell_costs: (layers, across) cost per m of the steps to the cells of the next stage.
+    costs: output, (layers, across): costs from the cells of this stage to the destination.
+    successors: output, (layers, across): cells of the next stage to which the cheapest routes lead.
+    spans: `SPAN` records (layers,) of this stage's cells whose cost is within the route-cost bound.
+    step_layers: `STEP_LAYERS` records (sideways, layers): steepest climb and descent from this stage.
+    step: length of a step along the line, m.
+    layer_spacing: m.
+    ratio: spacing across as a fraction of a step.
     """
-    layer_count, width = goal_costs.shape
-    flat_goal_costs = goal_costs.ravel()
-    flat_previous = previous_goal_costs.ravel()
+    layer_count, width = next_costs.shape
+    flat_next_costs = next_costs.ravel()
+    flat_costs = costs.ravel()
     flat_successors = successors.ravel()
     flat_cell_costs = cell_costs.ravel()
     for z in range(layer_count):
@@ -101,9 +104,9 @@ def _relax_stage_back(
                 length = math.sqrt(step * step * (1.0 + (side * ratio) ** 2) + ((next_z - z) * layer_spacing) ** 2)
                 source, target = z * width + first_cell, next_z * width + first_cell + side
                 relax_cells(
-                    flat_goal_costs,
+                    flat_next_costs,
                     flat_cell_costs,
-                    flat_previous,
+                    flat_costs,
                     flat_successors,
                     target,
                     source,
@@ -412,10 +415,14 @@ def optimistic_grid(
     spread: float,
     ratio: float,
 ) -> Grid:
-    """Make a grid with smaller kill spheres and lower ground, so that its routes also use narrow gaps.
+    """Make a grid that underestimates threats and terrain, so that its routes also use narrow gaps.
 
-    shrink, spread, ratio: reduction of the spheres, size of the area of highest ground, and spacing across, as in
-    `Grid`.
+    frame: frame of the direct line from start to destination.
+    span: smallest and largest offset of the cells across the line, m.
+    stages: number of stages along the line.
+    shrink: fraction of a step by which the kill spheres are reduced.
+    spread: fraction of a step around a cell over which the highest ground is taken.
+    ratio: spacing across as a fraction of a step.
 
     The highest layer is at the ceiling, where the spheres of missiles on the ground are narrowest.
     """

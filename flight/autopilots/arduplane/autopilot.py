@@ -196,21 +196,27 @@ class ArduPlane(Autopilot):
 
     @cached_property
     def checks(self) -> MissionChecks:
-        """Rules of mission commands, and checks from TERRAIN_ENABLE, MIS_OPTIONS, FENCE_OPTIONS and BATT_*."""
+        """ArduPlane's rules for mission commands, and checks that TERRAIN_ENABLE, MIS_OPTIONS and others decide.
+
+        The others are FENCE_OPTIONS and BATT_*. Unsimulated settings are those of the simulated autopilot, not those of
+        a flight with the ArduPlane program.
+        """
         parameters = self.parameters
         return MissionChecks(
             dialect="ardupilot",
             resets_jump_counters=parameters.resets_jump_counters,
             follows_terrain=parameters.terrain_enable == 1.0,
-            unites_inclusions=bool(int(self._stated_values.get("FENCE_OPTIONS", 0.0)) & _UNION_OF_INCLUSIONS_BIT),
+            any_inclusion_suffices=bool(
+                int(self._parameter_values.get("FENCE_OPTIONS", 0.0)) & _UNION_OF_INCLUSIONS_BIT
+            ),
             battery_failsafes=battery_failsafes(parameters),
             describe_unsimulated_settings=partial(self.describe_unsimulated_settings, by_program=False),
             parameter_notes=(*parameters.notes, *_mission_notes(parameters)),
         )
 
     @property
-    def _stated_values(self) -> dict[str, float]:
-        """Value of each parameter of the set, by name."""
+    def _parameter_values(self) -> dict[str, float]:
+        """Values of the set's parameters by name, including default values."""
         return {name: value for name, value, _ in self.parameters.values}
 
     def describe_unsimulated_settings(self, mission: MissionParts, *, by_program: bool) -> list[str]:
@@ -218,7 +224,7 @@ class ArduPlane(Autopilot):
 
         by_program: True for a flight with the ArduPlane program, in which more settings have an effect.
         """
-        parameters, values = self.parameters, self._stated_values
+        parameters, values = self.parameters, self._parameter_values
         texts = [
             f"{name} {values[name]:g} affects the flight, but is not simulated"
             for name, neutral in _NEUTRAL.items()
@@ -350,12 +356,15 @@ class ArduPlane(Autopilot):
         )
 
     def _failsafe_causes(self, mission: ReturnMission) -> tuple[Cause, ...]:
-        """Return the events that can end a mission in AUTO, each with ArduPlane's reaction."""
+        """Return the events that can end a mission in AUTO, each with ArduPlane's reaction.
+
+        A landing sequence begins with DO_LAND_START; a mission with a landing item ends on the ground.
+        """
         return failsafe_causes(
             self.parameters,
             has_fence=mission.has_fence,
-            has_landing=bool(mission.landings),
-            ends_landed=not mission.commands.isdisjoint(LANDINGS),
+            has_landing_sequence=bool(mission.landings),
+            ends_with_landing=not mission.commands.isdisjoint(LANDINGS),
         )
 
     def _unsimulated_return_text(self, mission: ReturnMission) -> str:
@@ -614,7 +623,7 @@ class ArduPlaneFromGround:
         glide = self.autopilot.ground.glide(
             approach.start_altitude - landing_altitude, approach.length, approach.tail_wind, landing_altitude
         )
-        ground.has_landing, ground.landing_leg = True, approach.leg
+        ground.has_landing_sequence, ground.landing_leg = True, approach.leg
         ground.east, ground.north, ground.up = approach.point
         ground.glide_start_altitude, ground.slope = approach.start_altitude, glide.slope
         # `AP_TECS::_update_height_demand`.
