@@ -293,7 +293,14 @@ def measure_zone_margin(
 
 @inner
 def _update_margin(zone: Record, required: Record, z: int, horizontal: float, vertical: float, margin: Record) -> None:
-    """Update a `ZONE_MARGIN` record with the distances between a piece of the path and zone z."""
+    """Update a `ZONE_MARGIN` record with the distances between a piece of the path and zone z.
+
+    zone: shape and altitude limits of the zone.
+    required: required horizontal and vertical distances, m.
+    horizontal: distance outside an exclusion or inside an inclusion, m.
+    vertical: distance below the zone's floor or above its ceiling, m.
+    margin: the record to update.
+    """
     excess = max(horizontal - required.horizontal, vertical - required.vertical)
     if not zone.exclusion:
         excess = min(horizontal - required.horizontal, -vertical - required.vertical)

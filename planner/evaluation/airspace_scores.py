@@ -306,7 +306,12 @@ def _swath_excess_height(
 def _cut_segment(
     leg_start: Floats, leg_end: Floats, begin_fraction: float, end_fraction: float, start: Floats, end: Floats
 ) -> None:  # pragma: no cover
-    """Fill `start` and `end` with the ends of a part of a leg, between two fractions of the leg's length."""
+    """Fill `start` and `end` with the ends of a part of a leg, between two fractions of the leg's length.
+
+    leg_start, leg_end: (3,) ends of the leg, m.
+    begin_fraction, end_fraction: 0 to 1.
+    start, end: (3,) arrays to fill, m.
+    """
     for axis in range(3):
         start[axis] = leg_start[axis] + begin_fraction * (leg_end[axis] - leg_start[axis])
         end[axis] = leg_start[axis] + end_fraction * (leg_end[axis] - leg_start[axis])

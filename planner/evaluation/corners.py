@@ -92,8 +92,13 @@ def measure_corner(
 ) -> None:
     """Measure the turn between the unit courses u and v, and fill its `CORNER` record.
 
+    aircraft: performance, with the bank limit and the wind.
+    tracking: tracking error of the autopilot; it can lengthen the parts of the legs that the turn takes.
+    wind: downwind unit vector.
+    is_turning: False for a waypoint without a turn; all values are then 0.
+    ux, uy, vx, vy: east and north of the courses before and after the turn.
     amsl: altitude of the turn, m.
-    All values are 0 if `is_turning` is False.
+    corner: the record to fill.
     """
     tangent, radius, excursion = 0.0, 0.0, 0.0
     if is_turning:
@@ -157,7 +162,11 @@ def turn_length(fly_over: bool, corners: Records, i: int) -> float:
 def roll_length(aircraft: PerformanceTable, legs: Records, corners: Records, i: int, amsl: float, wind: Wind) -> float:
     """Return the length of leg i that the aircraft needs to roll between opposite turns at its ends, m.
 
-    The length is 0 if both turns have the same direction.
+    legs, corners: filled `LEG` records (w - 1,) and `CORNER` records (w,) of the path.
+    amsl: altitude of the leg, m.
+    wind: downwind unit vector.
+
+    The length is 0 on the first and the last leg, between turns of the same direction, and next to an unflyable turn.
     """
     if i == 0 or i == legs.shape[0] - 1 or corners[i].tangent <= 0.0 or corners[i + 1].tangent <= 0.0:
         return 0.0

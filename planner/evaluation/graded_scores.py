@@ -103,9 +103,14 @@ def score_path(
     violations: Record,
     objectives: Record,
 ) -> None:
-    """Score a path (w, 3): add to a `VIOLATIONS` record of zeros, and fill an `OBJECTIVES` record.
+    """Score a path: add its violations, and fill its objectives.
 
+    data: the planning problem.
+    limits: limits that are precomputed from the problem.
     scratch: working memory for a path of w waypoints.
+    path: (w, 3) m.
+    violations: `VIOLATIONS` record of zeros, to which the violations are added.
+    objectives: `OBJECTIVES` record to fill.
     """
     score_legs(data, limits, scratch, path, violations, objectives)
     score_ground(data, limits, scratch, path, violations)
@@ -179,7 +184,17 @@ def score_missiles(
     violations: Record,
     objectives: Record,
 ) -> None:
-    """Set the exposure to missiles, and add the clearance violations of corners, as part of `score_path`."""
+    """Set the exposure to missiles, and add the clearance violations of corners, as part of `score_path`.
+
+    scratch: legs, corners, ground samples and lags of the path from `score_legs` and `score_ground`; its missile gaps
+        are overwritten.
+    path: (w, 3) m.
+    violations: `VIOLATIONS` record; the violations of flown corners are added to its terrain violation.
+    objectives: `OBJECTIVES` record, whose kill exposure is set.
+
+    A corner is examined as flown only if it is near ground or missiles, or deviates by more than `CORNER_TOLERANCE_M`
+    from its legs.
+    """
     # Take arrays out of the data once, because passing the data on costs more than evaluating a leg.
     heights, to_pixel, missiles = data.heights, data.to_pixel, data.missiles
     slope_bounds, aircraft, required, margin = data.slope_bounds, data.aircraft, limits.required, data.kill_margin

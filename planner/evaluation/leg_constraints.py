@@ -235,7 +235,15 @@ def _straight_distance(start: Floats, destination: Floats) -> float:
 def _course_slope_limits(
     data: ProblemArrays, ux: float, uy: float, start_altitude: float, end_altitude: float, wind: Wind
 ) -> tuple[float, float]:
-    """Return the climb and dive limits on the unit course u between two altitudes, rad."""
+    """Return the climb and dive limits on the unit course u between two altitudes, rad.
+
+    ux, uy: east and north of the course.
+    start_altitude, end_altitude: m AMSL.
+    wind: downwind unit vector.
+
+    A limit of the scenario applies if there is one. Otherwise the limit is the aircraft's lowest one at the two altitudes
+    and half-way between them. The angle margin is subtracted.
+    """
     climb, dive = data.max_climb, data.max_dive
     if math.isnan(climb) or math.isnan(dive):
         wx, wy = wind
@@ -304,9 +312,13 @@ def slope_excess(
 
 @inlined
 def _turn_excess(cos_max_turn: float, max_turn: float, ux: float, uy: float, vx: float, vy: float) -> float:
-    """Return the excess of the turn between the unit courses u and v over its limit, rad (eq. 1-2).
+    """Return the excess of the turn between the unit courses u and v over its limit, rad.
 
-    The excess is 0 for a turn within the limit.
+    The excess follows eqs. 1 and 2 of Yang, Tang and Lozano 2014. It is 0 for a turn within the limit, and if either leg
+    has no course.
+
+    max_turn, cos_max_turn: the limit, rad, and its cosine.
+    ux, uy, vx, vy: east and north of the courses; (0, 0) for a leg without length.
     """
     dot = ux * vx + uy * vy
     if dot >= cos_max_turn or (ux == 0.0 and uy == 0.0) or (vx == 0.0 and vy == 0.0):
@@ -411,6 +423,11 @@ def _add_leg_length_violations(
     """Add the missing lengths of legs that are too short for their turns, in units of 100 m.
 
     A leg must be long enough for its turns, the roll between them, and settling.
+
+    path: (w, 3) m.
+    legs, corners: filled `LEG` records (w - 1,) and `CORNER` records (w,) of the path.
+    by_amount: True to add the amounts, at most 10 each; False to add 1 for each leg that is too short.
+    violations: `VIOLATIONS` record, to whose turn violation the amounts are added.
     """
     for i in range(legs.shape[0]):
         required_length, horizontal_length = turn_length(data.fly_over, corners, i), legs[i].run
@@ -430,6 +447,10 @@ def _arc_slope_excess(
     data: ProblemArrays, limits: PrecomputedLimits, path: Floats, i: int, legs: Records, corners: Records
 ) -> float:
     """Return the excess of the slope of the arc at waypoint i over the aircraft's limits, m per m.
+
+    path: (w, 3) m.
+    i: index of an inner waypoint.
+    legs, corners: filled `LEG` records (w - 1,) and `CORNER` records (w,) of the path.
 
     The limits on both courses of the corner apply.
     """

@@ -186,11 +186,15 @@ def terrain_excess(
     bz: float,
     max_excess: float,
 ) -> float:
-    """Return the depth below the required clearance along the line a-b, summed over samples, m x km.
+    """Return the depth below the required clearance along the line a-b, summed over samples, m·km.
 
+    heights: ground heights by pixel, m.
+    slope_bounds: steepest slopes of the ground near each pixel, which set the steps between samples.
+    required: required clearance, with the spacing of samples near the ground.
     extra_height: additional height that is required on this line, m.
     ends: columns and rows of a and b.
-    max_excess: value beyond which the sum ends.
+    ax, ay, az, bx, by, bz: east, north and altitude of the two ends, m.
+    max_excess: value beyond which the sum ends, m·km.
     """
     column, row, last_column, last_row = ends
     column_step, row_step = last_column - column, last_row - row
@@ -232,7 +236,15 @@ def terrain_excess(
 def _start_sampling(
     to_pixel: PolyMapRecord, sample_spacing: float, path: Floats, legs: Records, extents: Floats, terrain_legs: Records
 ) -> None:
-    """Fill `TERRAIN_LEG` records (w - 1,) with their state before the first sample."""
+    """Fill `TERRAIN_LEG` records (w - 1,) with their state before the first sample.
+
+    to_pixel: map from east and north to column and row.
+    sample_spacing: spacing of samples near the ground, m.
+    path: (w, 3) m.
+    legs: filled `LEG` records (w - 1,) of the path.
+    extents: (w,) distance from each waypoint within which the flight leaves the legs, m.
+    terrain_legs: the records to fill.
+    """
     start = path[0]
     column, row = polymap(to_pixel, start[0], start[1])
     for i in range(legs.shape[0]):

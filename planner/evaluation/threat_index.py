@@ -107,6 +107,12 @@ def _list_units(
     """List the units that reach each cell; return each cell's first entry in the list, and the list.
 
     The list contains the units of one cell after another; the last cell lists all units.
+
+    position: (u, 3) positions of the units, m; altitudes are ignored.
+    radius: (u,) horizontal reach of the units, m; a unit with 0 or less is left out.
+    west, south: edges of the grid, m.
+    cell_size: side of a cell, m.
+    columns, rows: size of the grid.
     """
     count = columns * rows
     first = np.zeros(count + 2, dtype=np.int32)
@@ -238,16 +244,19 @@ def kill_density(
 ) -> tuple[float, float, float]:
     """Return the mean kill density over the segment a-b, and the distances to spheres near its ends, m.
 
+    index: missiles of the map, sorted into grids of cells.
     margin: distance that is added to the radii, m.
-    max_distance: a returned distance is exact if it is below this, m.
-    length_a, length_b: lengths at a and at b on which the distances are measured, m.
-    below, above: vertical tracking error, m.
+    max_distance: a returned distance is exact if it is below this, m. Without a sphere so near, it may be inf.
+    ax, ay, az, bx, by, bz: east, north and altitude of the two ends, m.
+    length_a, length_b: lengths at a and at b on which the distances to the surfaces of spheres are measured, m.
+    below, above: largest distance of the aircraft below and above the segment, from its tracking error, m.
     """
     dx, dy, dz = bx - ax, by - ay, bz - az
     length2 = dx * dx + dy * dy + dz * dz
     inverse, inverse_dy = 1.0 / length2 if length2 > 0.0 else 0.0, 1.0 / dy if abs(dy) > 1e-9 else 0.0
     missiles, starts = index.missiles, index.first
     density, distance_a, distance_b = 0.0, math.inf, math.inf
+    # Missiles of similar radii form a class, which has its own grid of cells.
     for class_number in range(index.classes.shape[0]):
         missile_class = index.classes[class_number]
         per_metre, columns, rows = missile_class.cells_per_metre, missile_class.columns, missile_class.rows

@@ -491,6 +491,13 @@ def _add_step_model(
 ) -> None:
     """Add a leg's curvature and gradient, given with respect to its vector, to the arrays for its two ends.
 
+    curvature: (2, 3, 2, 3) second derivatives of the leg's cost by its ends; updated.
+    slopes: (2, 3) derivatives of the leg's cost by its ends; updated.
+    step_curvature: (3, 3) second derivatives with respect to the vector.
+    factor: factor on `step_curvature`.
+    gradient: derivatives with respect to the vector.
+    slope_factor: factor on `gradient`.
+
     The vector is the end minus the start, so the gradient with respect to the start has the opposite sign.
     """
     for axis in range(3):

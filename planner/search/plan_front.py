@@ -400,7 +400,15 @@ def _run_generations(
     stop: StopCondition | None,
     generations: int,
 ) -> tuple[int, str]:
-    """Sample generations from the seeds; return the number of evaluated paths and why the search ended."""
+    """Sample generations from the seeds; return the number of evaluated paths and why the search ended.
+
+    task: the planning task, which scores paths.
+    search: sampler, whose archive receives the front.
+    default: (w, 3) path of the default plan, from which the seeds are made, m.
+    progress: called after each generation, or None.
+    stop: returns a reason to end the search, or "" to continue; or None.
+    generations: maximum number of generations.
+    """
     paths, reason = [], ""
     for path in seed_paths(task, np.array(default)):
         paths.append(path)

@@ -69,7 +69,13 @@ class _ClosedHeights(NamedTuple):
 def _fill_column(
     data: ProblemArrays, frame: RotatedFrame, grid: AirspaceGrid, along: float, across: float, column: Record
 ) -> None:
-    """Fill the `COLUMN` record of a grid position: its ground and its range of allowed altitudes."""
+    """Fill the `COLUMN` record of a grid position: its ground and its range of allowed altitudes.
+
+    along, across: position in the rotated frame, m.
+    column: the record to fill; its lowest altitude exceeds its highest outside the area and above unknown ground.
+
+    The range obeys the floor, the ceiling, the clearance, and the limits of inclusion zones.
+    """
     east, north = to_world_position(frame, along, across)
     column.lowest, column.highest = math.inf, -math.inf
     if not (data.west <= east <= data.east and data.south <= north <= data.north):
@@ -198,8 +204,16 @@ def _relax_airspace_stage(
 ) -> None:
     """Compute the costs of the cheapest routes to the cells of a stage, and store their parents.
 
-    cost, next_cost: (across, layers) costs of the routes to the cells of the previous stage and of this stage.
+    stage: number of the stage, from 1.
+    previous_columns, columns: `COLUMN` records (across,) of the previous stage and of this stage.
+    cost: (across, layers) costs of the routes to the cells of the previous stage.
+    cell_costs: (across, layers) cost per m of the steps to the cells of this stage; inf for a closed cell.
+    next_cost: updated, (across, layers): costs of the routes to the cells of this stage.
+    previous_parents: (across, layers) parents of the previous stage's cells.
+    parents: updated, (across, layers): cells of the previous stage from which the routes come, numbered as
+        across x layers + layer.
 
+    A step is not made through a zone, nor at a steeper slope than the limits allow.
     A change of course is measured from the cheapest route to a cell only, so the result is not exactly the optimum.
     """
     step, width, zones, spacing = frame.length / grid.stages, grid.across.size, data.airspace.zones, grid.layer_spacing
@@ -328,7 +342,12 @@ def continue_airspace_route(
     search: AirspaceSearch,
     max_stages: int,
 ) -> AirspaceSearch:
-    """Continue a search by up to `max_stages` stages, or until no route can continue; return it."""
+    """Continue a search by up to `max_stages` stages, or until no route can continue; return it.
+
+    extra: (stages + 1, across) additional cost per m of path in each position.
+    bound: upper limit on the cost of the route; cells that only dearer routes can use are dropped.
+    search: state of the search; its arrays are overwritten.
+    """
     stages, width, step = grid.stages, grid.across.size, frame.length / grid.stages
     obstacles, columns, cells, cost, next_cost, cell_costs, centre_index, reached_stage = search
     last_stage, goal_distances = min(stages, reached_stage + max_stages), np.empty(width)
@@ -509,7 +528,9 @@ def _find_route(
 ) -> GridRoute | None:
     """Return the cheapest route over a grid that keeps away from earlier routes; None if there is none.
 
-    expected_cost: upper limit on the cost with which the search is tried first.
+    earlier_routes: routes near which a path costs more.
+    expected_cost: upper limit on the cost with which the search is tried first; the second search has no limit.
+    pause: called from time to time; an exception raised there stops the search.
     """
     extra = proximity_cost(np.linspace(0.0, frame.length, grid.stages + 1), grid.across, earlier_routes)
     for bound in (expected_cost, math.inf):

@@ -153,6 +153,8 @@ def spare_arc_length(
 ) -> float:
     """Return the length by which a corner's arc exceeds the length that its climb or descent needs, m.
 
+    previous, waypoint, next_waypoint: (3,) m.
+    radius: radius of the arc, m.
     sign: 1 for a climb, -1 for a descent.
     max_slope: tangent of the maximum slope.
 

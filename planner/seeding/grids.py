@@ -351,9 +351,14 @@ def fill_goal_distances(
 ) -> None:
     """Fill `out` with the shortest horizontal distance to the destination from each position across, m.
 
+    columns: number of positions across.
     goal_index: index across of the destination.
+    remaining_stages: number of stages between this stage and the destination.
+    step: length of a step along the line, m.
+    ratio: spacing across as a fraction of a step.
+    out: (columns,) array to fill; inf if the destination cannot be reached in the remaining stages.
 
-    The distance is inf if the destination cannot be reached in the remaining stages.
+    Each step moves k or k + 1 positions across; k is the mean number, rounded down.
     """
     for y in range(columns):
         offset = abs(y - goal_index)
@@ -487,7 +492,12 @@ def continue_route(
     search: GridSearch,
     max_stages: int,
 ) -> GridSearch:
-    """Continue a search by up to `max_stages` stages, or until no route can continue; return it."""
+    """Continue a search by up to `max_stages` stages, or until no route can continue; return it.
+
+    extra: (stages + 1, across) additional cost per m of path in each position.
+    bound: upper limit on the cost of the route; cells that only dearer routes can use are dropped.
+    search: state of the search; its arrays are overwritten.
+    """
     stages, width, layer_count = grid.stages, grid.across.size, grid.layers.size
     step = frame.length / stages
     layer_spacing = grid.layers[1] - grid.layers[0] if layer_count > 1 else 1.0

@@ -132,7 +132,11 @@ def _expand_state(
 ) -> None:
     """Expand a state: push the successors that it reaches at a lower cost than before to the open list.
 
+    lattice: points of the lattice; a state is a point, a layer and one of eight courses.
+    table: costs, parents and flags of all states; updated.
+    state: number of the state: (point x layers + layer) x 8 + course.
     max_turn: largest turn per step, in units of 45 degrees.
+    open_states: heap of (priority, state), to which the successors are added.
 
     The priority of a successor is its cost plus its distance to the goal.
     """

@@ -190,6 +190,10 @@ def _evaluate_merit(
 ) -> tuple[float, bool]:
     """Return the merit of a vector (length ratio plus priced violations), and True if its path is feasible.
 
+    frames: origin and rotation of the frame in which each waypoint moves.
+    vector: (3 n,) along, across and altitude of the n inner waypoints in their frames, m.
+    candidate: scratch; its path is overwritten with the waypoints, and its records with the scores.
+
     Each part of the evaluation only adds to the merit. Therefore the evaluation ends as soon as the merit reaches
     `best_merit`. If the path is feasible so far, it must also reach `feasible_merit`. The returned merit is then a
     lower bound.

@@ -194,7 +194,14 @@ def begin_grid_costs(data: ProblemArrays, frame: RotatedFrame, grid: Grid) -> Si
 def continue_grid_costs(
     data: ProblemArrays, frame: RotatedFrame, grid: Grid, bound: float, search: SideSearch, max_stages: int
 ) -> SideSearch:
-    """Continue a search by up to `max_stages` stages, or end it if no route can continue; return it."""
+    """Continue a search by up to `max_stages` stages, or end it if no route can continue; return it.
+
+    The first half of the stages computes the costs from the start forwards, the second half those to the destination
+    backwards.
+
+    bound: upper limit on the cost of a route; cells that only dearer routes can use are dropped.
+    search: state of the search; its arrays are overwritten.
+    """
     stages, width, layer_count = grid.stages, grid.across.size, grid.layers.size
     step, required = frame.length / stages, required_clearance(data)
     layer_spacing = grid.layers[1] - grid.layers[0] if layer_count > 1 else 1.0

@@ -102,6 +102,11 @@ def _max_depth_below_leg(
     """Return the largest distance of the aircraft below a long leg, m; negative if it stays above the leg.
 
     east, north: unit course of the leg.
+    horizontal_length: m.
+    start_altitude, end_altitude: m AMSL.
+
+    The altitude lags by the lag length times the slope. A leg with a smaller change of altitude than the step of the
+    tracking error is demanded at its final altitude from its start, so that the aircraft is low by the whole change.
     """
     altitude_change = end_altitude - start_altitude
     if abs(altitude_change) < data.tracking.step:
