@@ -432,7 +432,9 @@ def step_repeatedly(
     """Advance the model by ``count`` time steps.
 
     frames: one record of `FRAME`, (1,), which shares the memory of the first registers.
-    Other arguments as for `step`.
+    numbers: registers of the model.
+    code: header and sections of instructions.
+    contacts, frictions: `CONTACT` and `FRICTION` records of the landing gear, possibly none.
     """
     for _ in range(count):
         step(frames[0], numbers, code, contacts, frictions)

@@ -285,9 +285,13 @@ def _arm_about_center(position: Sequence[float], centre: Sequence[float]) -> lis
 
 
 def _inertia_matrices(xx: float, yy: float, zz: float, xy: float, xz: float, yz: float) -> tuple[Floats, Floats]:
-    """Return the inertia matrix and the inverse of this matrix, from JSBSim's inertia properties.
+    """Return the inertia matrix and its inverse, (3, 3) each, from JSBSim's inertia properties.
 
-    As in FGMassBalance, the sign convention of xz differs from that of the other products of inertia.
+    xx, yy, zz: moments of inertia about the body axes, slug ft^2.
+    xy, xz, yz: products of inertia, slug ft^2.
+
+    As in FGMassBalance, the sign convention of xz differs from that of the other products of inertia. The inverse has
+    the elements k1 to k6, which are cofactors divided by the determinant.
     """
     ixz = -xz
     k1, k2, k3 = yy * zz - yz * yz, yz * ixz + xy * zz, xy * yz + yy * ixz

@@ -241,8 +241,8 @@ def _course_slope_limits(
     start_altitude, end_altitude: m AMSL.
     wind: downwind unit vector.
 
-    A limit of the scenario applies if there is one. Otherwise the limit is the aircraft's lowest one at the two altitudes
-    and half-way between them. The angle margin is subtracted.
+    A limit of the scenario applies if there is one. Otherwise the lowest limit of the aircraft at the two altitudes and
+    half-way between them applies. The angle margin is subtracted.
     """
     climb, dive = data.max_climb, data.max_dive
     if math.isnan(climb) or math.isnan(dive):
@@ -314,8 +314,8 @@ def slope_excess(
 def _turn_excess(cos_max_turn: float, max_turn: float, ux: float, uy: float, vx: float, vy: float) -> float:
     """Return the excess of the turn between the unit courses u and v over its limit, rad.
 
-    The excess follows eqs. 1 and 2 of Yang, Tang and Lozano 2014. It is 0 for a turn within the limit, and if either leg
-    has no course.
+    The excess follows eqs. 1 and 2 of Yang, Tang and Lozano 2014. It is 0 for a turn within the limit, and for a leg
+    without a course.
 
     max_turn, cos_max_turn: the limit, rad, and its cosine.
     ux, uy, vx, vy: east and north of the courses; (0, 0) for a leg without length.

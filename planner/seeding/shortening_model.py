@@ -544,8 +544,9 @@ def _add_turns(
 ) -> float:
     """Add the turn margins and the lengths of legs between turns; return their contribution to the merit.
 
-    A turn margin is the angle below the turn limit, scaled to m by `TURN_SCALE_M_PER_RAD`. A length (m) is the part of a
-    leg that remains after its turns, the roll between them and settling; it is added only if legs must hold their turns.
+    A turn margin is the angle below the turn limit, scaled to m by `TURN_SCALE_M_PER_RAD`. A length (m) is the part of
+    a leg that remains after its turns, the roll between them and settling; it is added only if legs must hold their
+    turns.
 
     path: (w, 3) m.
     multipliers: (c,) multipliers of all constraints.

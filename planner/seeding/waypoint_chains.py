@@ -265,7 +265,7 @@ def _corner_cost(
     previous_waypoint, waypoint, next_waypoint: (3,) m.
     corners: scratch, one `CORNER` record.
 
-    A missing leg length of 100 m costs as much as an excess of 1 rad; it costs at most as much as 10 rad. A corner with a
+    A missing leg length of 100 m costs as much as an excess of 1 rad; it costs at most as much as 10 rad. A corner at a
     leg without length costs as much as 1 rad.
     """
     ux = waypoint[0] - previous_waypoint[0]

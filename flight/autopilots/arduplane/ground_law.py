@@ -220,9 +220,14 @@ def ground_loop(
     frictions: Records,
     count: int,
 ) -> int:
-    """Fly up to ``count`` ticks with a `flight.dynamics.compiled_model.CompiledModel`, and return a status.
+    """Fly up to ``count`` ticks with a compiled model, and return a status.
 
     The status is 0 if the flight continues, otherwise a key of `flight.simulation.tick.ENDS`.
+
+    block: state, settings and path of the flight, the memory of a `flight.simulation.tick.Workspace`; updated.
+    heights: ground heights of the terrain by pixel, m.
+    frames, numbers, code, contacts, frictions: arrays of a `flight.dynamics.compiled_model.CompiledModel`: state of the
+        motion, registers, instructions, landing-gear contacts and scratch for their friction.
     """
     for _ in range(count):
         read_state(block, numbers, code)
@@ -438,6 +443,13 @@ def _begin_first_leg(
     """Begin the leg after the take-off at the aircraft's position.
 
     The aircraft flies straight to the end of the leg, without a line to follow (`Plane::set_next_WP`).
+
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    waypoints: `WAYPOINT` records of the route, (w,); the end of the leg is marked as without cross-track control.
+    pieces: pieces of the reference path; the guidance advances to the first one of the leg.
+    guidance: `GUIDANCE_MEMORY` record; its piece is updated.
+    ground: state of take-off and landing; its stage becomes `IN_AIR`.
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record; updated.
     """
     ground.stage = IN_AIR
     memory.leg = ground.leg

@@ -375,9 +375,14 @@ def arduplane_loop(
     frictions: Records,
     count: int,
 ) -> int:
-    """Fly up to ``count`` ticks with a `flight.dynamics.compiled_model.CompiledModel`, and return a status.
+    """Fly up to ``count`` ticks with a compiled model, and return a status.
 
     The status is 0 if the flight continues, otherwise a key of `flight.simulation.tick.ENDS`.
+
+    block: state, settings and path of the flight, the memory of a `flight.simulation.tick.Workspace`; updated.
+    heights: ground heights of the terrain by pixel, m.
+    frames, numbers, code, contacts, frictions: arrays of a `flight.dynamics.compiled_model.CompiledModel`: state of the
+        motion, registers, instructions, landing-gear contacts and scratch for their friction.
     """
     for _ in range(count):
         read_state(block, numbers, code)
@@ -402,14 +407,21 @@ def control_as_ardupilot(
     commands: Record,
     dt: float,
 ) -> None:
-    """Compute the commands for one tick of ``dt`` seconds, and update ``guidance`` and ``memory``.
+    """Compute the commands for one tick, and update the memories.
 
-    guidance: a record of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.
-    parameters: a record of `flight.autopilots.arduplane.parameters.ARDUPILOT_PARAMETERS`.
-    memory: a record of `flight.autopilots.arduplane.law.ARDUPILOT_MEMORY`.
-    Other arguments as for `flight.autopilots.planfly.law.guide`.
+    ArduPlane's navigation and TECS run every `NAVIGATION_TICK_S`, its attitude controllers in each tick. ArduPlane does
+    not use the path: the track is only measured against it.
 
-    ArduPlane does not use the path; the track is only measured against it.
+    state: attitude, airspeed and rates of the aircraft, a `STATE` record.
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    pieces, nodes: course and altitude profile of the reference path, arrays of a `FlyByPath`.
+    waypoints: `WAYPOINT` records of the route, (w,).
+    gains: gains of the inner loops, a `GAINS` record.
+    guidance: memory of the inner loops and progress on the path, a `GUIDANCE_MEMORY` record; updated.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record; updated.
+    commands: `COMMANDS` record to fill.
+    dt: duration of a tick, s.
     """
     find_on_path(estimated, pieces, guidance)
     target = waypoints[memory.leg + 1]
@@ -452,7 +464,17 @@ def control_as_ardupilot(
 def initialise_memory(
     state: Record, estimated: Record, waypoints: Records, guidance: Record, parameters: Record, memory: Record
 ) -> None:
-    """Initialise the control law's memory for steady flight at the first waypoint (`AP_TECS::_initialise_states`)."""
+    """Initialise the control law's memory for steady flight at the first waypoint.
+
+    Follows `AP_TECS::_initialise_states`.
+
+    state: attitude, airspeed and rates of the aircraft, a `STATE` record.
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    waypoints: `WAYPOINT` records of the route, (w,).
+    guidance: `GUIDANCE_MEMORY` record, which states the throttle of level flight.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    memory: `ARDUPILOT_MEMORY` record to initialise.
+    """
     memory.is_initialised = True
     memory.from_east, memory.from_north, memory.from_up = waypoints[0].east, waypoints[0].north, waypoints[0].up
     memory.altitude_demand_in = estimated.up
@@ -485,10 +507,17 @@ def control_attitude(
 ) -> None:
     """Drive roll and pitch to their demands with the lags of ArduPlane's controllers; set the throttle.
 
-    Represents `Plane::stabilize_roll`, `Plane::stabilize_pitch` and `Plane::set_servos`.
+    Follows `Plane::stabilize_roll`, `Plane::stabilize_pitch` and `Plane::set_servos`.
 
+    state: attitude, airspeed and rates of the aircraft, a `STATE` record.
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    gains: gains of the inner loops, a `GAINS` record.
+    guidance: memory of the inner loops and progress on the path, a `GUIDANCE_MEMORY` record; updated.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record; updated.
     eas2tas: ratio of true to equivalent airspeed.
-    dt: s.
+    commands: `COMMANDS` record to fill.
+    dt: duration of a tick, s.
     """
     memory.roll_demand = limited_nav_roll(
         memory.lateral_acceleration, state.pitch, state.airspeed / eas2tas, parameters

@@ -290,12 +290,19 @@ def _update_loiter(
 ) -> None:
     """Fly to a loiter and around it, until the loiter is complete and the aircraft heads for the next waypoint.
 
-    Follows `Plane::update_loiter`.
+    Follows `Plane::update_loiter`: far from the circle the aircraft flies straight to its centre, then around it. The
+    next leg begins once the loiter is complete and the course leads to the next waypoint that is not on the circle.
 
-    loiter: waypoint on the loiter; its loiter_radius is the radius at the altitude of the waypoint.
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    waypoints: `WAYPOINT` records of the route, (w,).
+    loiter: waypoint on the loiter; its loiter_radius (m) is the radius at the altitude of the waypoint. The radius grows
+        with the square of the true airspeed.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record; updated.
     l1_distance: L1 distance, m.
     ground_speed: m/s.
     eas2tas: ratio of true to equivalent airspeed.
+    dt: duration of a tick, s.
     """
     eas2tas_ratio = eas2tas / eas_to_tas_ratio(loiter.up)
     radius = abs(loiter.loiter_radius) * eas2tas_ratio * eas2tas_ratio

@@ -383,9 +383,14 @@ def _demand_climb(
 ) -> None:
     """Demand a climb straight ahead: level wings, a fixed pitch, and increasing throttle.
 
-    Both pitch limits of ``climb_parameters`` are this pitch.
-
+    state: attitude, airspeed and rates of the aircraft, a `STATE` record.
+    estimated: position and velocity over the ground, a `MOTION` record.
+    climb_parameters: `ARDUPILOT_PARAMETERS` record, both of whose pitch limits are the pitch of the climb.
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record; updated.
+    climb: throttle of the climb and the rate at which it increases, a `CLIMB` record.
     airspeed_demand: equivalent airspeed, m/s.
+    eas2tas: ratio of true to equivalent airspeed.
+    dt: duration of a tick, s.
     """
     memory.lateral_acceleration = 0.0
     memory.altitude_demand_in = estimated.up
@@ -484,6 +489,12 @@ def _initialise_memory(
 
     Follows `flight.autopilots.arduplane.law.initialise_memory`, which assumes level flight. In a climb or descent the
     input of the altitude demand is ahead of the aircraft by the lag of the demand.
+
+    start: position, velocity, bank and time of the start, a `RETURN_START` record.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    aircraft, excess_table, field: record, excess power and wind field of a `PointMass`.
+    state: `STATE` record to fill.
+    memory: `ARDUPILOT_MEMORY` record to fill.
     """
     initialise_state(start, aircraft, field, state)
     climb_rate = start.velocity_up
@@ -550,14 +561,21 @@ def _demand_throttle_and_pitch(
 ) -> None:
     """Demand throttle and pitch by TECS; in a gliding turn, demand the pitch that holds the airspeed.
 
-    airspeed_demand: equivalent airspeed, m/s. In a bank it is multiplied by the square root of the load factor, so that
-        the angle of attack stays the same.
+    state: attitude, airspeed and rates of the aircraft, a `STATE` record.
+    estimated: position and velocity over the ground, a `MOTION` record.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record; updated.
+    aircraft: a `POINT_MASS` record.
+    excess_table: specific excess power, m/s, `PointMass.excess`.
+    airspeed_demand: equivalent airspeed, m/s. In a gliding turn it is multiplied by the square root of the load factor,
+        so that the angle of attack stays the same.
+    eas2tas: ratio of true to equivalent airspeed.
+    is_gliding: True while the aircraft flies its RTL without an engine.
+    dt: duration of a tick, s.
 
     In six of eight ArduPlane flights, the aircraft held its airspeed in this way and lost 55 m in the turn back. In the
     other two, which had been sinking before, it held its altitude, slowed down, and lost half as much. The worse case
     is simulated.
-
-    is_gliding: True while the aircraft flies its RTL without an engine.
     """
     seb_integrator, ske_integrator = memory.seb_integrator, memory.ske_integrator
     update_tecs(state, estimated, parameters, memory, airspeed_demand * eas2tas, eas2tas, dt)

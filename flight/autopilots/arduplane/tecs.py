@@ -209,8 +209,13 @@ def airspeed_target(
     The increase rises at once, but falls only in steps of at least `_GROUND_SPEED_HYSTERESIS_MPS`. The result is
     limited to AIRSPEED_MIN..AIRSPEED_MAX. Follows `Plane::calc_airspeed_errors` and `Plane::calc_gndspeed_undershoot`.
 
+    state: attitude, airspeed and rates of the aircraft, a `STATE` record.
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
     commanded_airspeed: equivalent airspeed, m/s.
     waypoint: end of the leg, which states the minimum ground speed, m/s; 0 for none.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record; updated.
+    eas2tas: ratio of true to equivalent airspeed.
     """
     target_airspeed = commanded_airspeed
     if waypoint.min_ground_speed > 0.0:
@@ -237,10 +242,15 @@ def update_tecs(
     Follows `AP_TECS::update_pitch_throttle`: `_update_speed`, `_detect_underspeed`, `_update_speed_demand`,
     `_update_energies`, `_update_throttle_with_airspeed` and `_update_pitch`.
 
-    state: a record of `flight.dynamics.state.STATE`.
-    tas_target: m/s, true.
+    state: attitude, airspeed and rates of the aircraft, a `STATE` record.
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record; updated.
+    tas_target: target true airspeed, m/s.
     eas2tas: ratio of true to equivalent airspeed.
-    Other arguments as for `flight.autopilots.arduplane.law.update_height_demand`.
+    dt: duration of a tick, s.
+
+    SPE, SKE and STE are the specific potential, kinetic and total energy, m^2/s^2.
     """
     _update_speed(state, estimated, parameters, memory, dt)
     tas = memory.tas
@@ -282,8 +292,12 @@ def _update_tas_max(
     The maximum falls towards AIRSPEED_CRUISE while the throttle is saturated, and rises again afterwards. With this
     rule `AP_TECS::_update_speed` slows down an aircraft that cannot climb at its maximum airspeed.
 
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    memory: `ARDUPILOT_MEMORY` record; its drop of the maximum airspeed is updated.
     tas_min: minimum true airspeed, m/s.
-    ste_rate_max, ste_rate_min: STE rates at full and at idle throttle, m^2/s^3.
+    eas2tas: ratio of true to equivalent airspeed.
+    ste_rate_max, ste_rate_min: rates of the specific total energy at full and at idle throttle, m^2/s^3.
+    dt: duration of a tick, s.
     """
     tas_max = parameters.airspeed_max * eas2tas
     ste_rate = ste_rate_min if memory.is_throttle_saturated else ste_rate_max
@@ -305,11 +319,15 @@ def _update_speed_demand(
 ) -> float:
     """Move the airspeed demand towards a target, and return the demanded SKE rate, m^2/s^3.
 
-    Follows `AP_TECS::_update_speed_demand`. A rise of the airspeed may use half of the energy rate of a climb at
-    TECS_CLMB_MAX. A fall may use nine tenths of the energy rate of a descent: at TECS_SINK_MIN at AIRSPEED_CRUISE, at
-    TECS_SINK_MAX at the maximum airspeed, and interpolated in between.
+    SKE is the specific kinetic energy. Follows `AP_TECS::_update_speed_demand`. A rise of the airspeed may use half of
+    the energy rate of a climb at TECS_CLMB_MAX. A fall may use nine tenths of the energy rate of a descent: at
+    TECS_SINK_MIN at AIRSPEED_CRUISE, at TECS_SINK_MAX at the maximum airspeed, and interpolated in between.
 
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record; updated.
     tas_target, tas_min, tas_max: true airspeeds, m/s.
+    eas2tas: ratio of true to equivalent airspeed.
+    dt: duration of a tick, s.
     """
     tas, tas_cruise = memory.tas, parameters.airspeed_cruise * eas2tas
     fraction = 1.0 if tas_max <= tas_cruise else min(1.0, max(0.0, (tas - tas_cruise) / (tas_max - tas_cruise)))
@@ -457,8 +475,15 @@ def _update_pitch(
 
     Follows `AP_TECS::_update_pitch`.
 
-    spe_error, ske_error: m^2/s^2.
-    spe_rate, ske_rate: m^2/s^3.
+    state: attitude, airspeed and rates of the aircraft, a `STATE` record.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record; updated.
+    spe_error, ske_error: errors of the specific potential and kinetic energy, m^2/s^2.
+    spe_rate, ske_rate: rates of the specific potential and kinetic energy, m^2/s^3.
+    is_underspeed: True to use the pitch only to regain airspeed.
+    dt: duration of a tick, s.
+
+    SEB is the specific energy balance: potential minus kinetic energy, each with its weight.
     """
     ske_weight = 1.0 if is_underspeed else min(1.0, parameters.tecs_speed_weight)
     spe_weight = 0.0 if is_underspeed else min(1.0, 2.0 - parameters.tecs_speed_weight)

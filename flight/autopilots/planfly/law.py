@@ -101,9 +101,14 @@ def planfly_loop(
     frictions: Records,
     count: int,
 ) -> int:
-    """Fly up to ``count`` ticks with a `flight.dynamics.compiled_model.CompiledModel`, and return a status.
+    """Fly up to ``count`` ticks with a compiled model, and return a status.
 
     The status is 0 if the flight continues, otherwise a key of `flight.simulation.tick.ENDS`.
+
+    block: state, settings and path of the flight, the memory of a `flight.simulation.tick.Workspace`; updated.
+    heights: ground heights of the terrain by pixel, m.
+    frames, numbers, code, contacts, frictions: arrays of a `flight.dynamics.compiled_model.CompiledModel`: state of the
+        motion, registers, instructions, landing-gear contacts and scratch for their friction.
     """
     for _ in range(count):
         read_state(block, numbers, code)
@@ -163,7 +168,13 @@ def _cross_track_bank_command(
     The command is a feed-forward of the path's curvature plus a correction of the cross-track error. The sideslip
     setpoint and the maximum ground speed for the arcs ahead are set as well.
 
+    state: attitude, airspeed and rates of the aircraft, a `STATE` record.
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    pieces: straight and circular pieces of the reference path.
+    gains: gains of the inner loops, a `GAINS` record.
+    memory: memory of the guidance between ticks, a `GUIDANCE_MEMORY` record; updated.
     course: course of the path at the aircraft, rad.
+    dt: duration of a tick, s.
     """
     speed = max(5.0, math.hypot(estimated.velocity_east, estimated.velocity_north))
     ground_course = math.atan2(estimated.velocity_east, estimated.velocity_north)
@@ -259,9 +270,17 @@ def _lateral_correction(
 ) -> float:
     """Return the acceleration to the right that corrects cross-track errors and disturbances, m/s^2.
 
+    The cross-track error demands a cross-track rate, whose error demands an acceleration. The integrator and the
+    acceleration that neither lift nor ailerons explain are subtracted, each times its gain.
+
+    state: attitude, airspeed and rates of the aircraft, a `STATE` record.
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    gains: gains of the inner loops, a `GAINS` record.
+    memory: memory of the guidance between ticks, a `GUIDANCE_MEMORY` record; updated.
     speed: ground speed, m/s.
     course_error: ground course minus course of the path, rad.
     crab: cosine of the angle between heading and ground course.
+    dt: duration of a tick, s.
     """
     frequency = gains.cross_track_frequency
     rate_gain = 2.0 * gains.cross_track_damping * frequency
@@ -293,8 +312,13 @@ def _unexplained_acceleration(
 
     The estimate starts at the second tick, because it needs the previous velocity.
 
+    state: attitude, airspeed and rates of the aircraft, a `STATE` record.
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    gains: gains of the inner loops, a `GAINS` record.
+    memory: `GUIDANCE_MEMORY` record; the estimate and the last velocity are stored in it.
     speed: ground speed, m/s.
     crab: cosine of the angle between heading and ground course.
+    dt: duration of a tick, s.
     """
     if memory.last_velocity_east != 0.0 or memory.last_velocity_north != 0.0:
         change_east = estimated.velocity_east - memory.last_velocity_east
@@ -314,7 +338,15 @@ def _unexplained_acceleration(
 def _l1_bank_command(
     state: Record, estimated: Record, waypoints: Records, gains: Record, memory: Record, dt: float
 ) -> float:
-    """Return the bank command of L1 (rad); begin the next leg once L1 has reached the waypoint."""
+    """Return the bank command of L1 (rad); begin the next leg once L1 has reached the waypoint.
+
+    state: attitude, airspeed and rates of the aircraft, a `STATE` record.
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    waypoints: `WAYPOINT` records of the route, (w,).
+    gains: gains of the inner loops, a `GAINS` record.
+    memory: `GUIDANCE_MEMORY` record; its leg and integrator of L1 are updated.
+    dt: duration of a tick, s.
+    """
     speed = max(0.1, math.hypot(estimated.velocity_east, estimated.velocity_north))
     damping = gains.l1_damping
     l1_distance = l1_length(speed, gains.l1_period, damping)
@@ -340,10 +372,14 @@ def _field_bank_command(
 ) -> float:
     """Return the bank command of the vector field, rad.
 
-    The command is the bank for the arc plus a PI law on the course error.
+    The command is the bank for the arc plus a PI law on the course error. The integrator is frozen at the bank limit.
 
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
     curvature: curvature of the path at the aircraft, 1/m.
+    gains: gains of the inner loops, a `GAINS` record.
+    memory: `GUIDANCE_MEMORY` record; its integrator of the course error is updated.
     course: course of the path at the aircraft, rad.
+    dt: duration of a tick, s.
     """
     speed = math.hypot(estimated.velocity_east, estimated.velocity_north)
     course_demand = field_course(
@@ -373,7 +409,14 @@ def follow_altitude_profile(
 ) -> None:
     """Set the elevator to follow the path's altitude profile, and the throttle to hold the airspeed.
 
+    state: attitude, airspeed and rates of the aircraft, a `STATE` record.
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    nodes: altitude profile of the reference path.
+    gains: gains of the inner loops, a `GAINS` record.
+    memory: memory of the guidance between ticks, a `GUIDANCE_MEMORY` record; updated.
+    commands: `COMMANDS` record to fill.
     course: course of the path at the aircraft, rad.
+    dt: duration of a tick, s.
     """
     airspeed = max(8.0, state.airspeed)
     speed_along = max(1.0, estimated.velocity_east * math.sin(course) + estimated.velocity_north * math.cos(course))
@@ -419,8 +462,14 @@ def _max_upward_acceleration(
     airspeed, because a gust can stall the aircraft within a second. In a steep turn this protection starts at a higher
     airspeed, because the stall speed grows with the square root of the load factor.
 
+    state: attitude, airspeed and rates of the aircraft, a `STATE` record.
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    gains: gains of the inner loops, a `GAINS` record.
+    memory: `GUIDANCE_MEMORY` record; its filtered airspeed and energy rate are updated.
+    commands: `COMMANDS` record with the throttle of the last tick.
     airspeed: m/s.
     rate_gain: acceleration per error of the climb rate, 1/s.
+    dt: duration of a tick, s.
     """
     climb_rate = estimated.velocity_up
     if memory.last_airspeed < 0.0:
@@ -457,10 +506,17 @@ def _set_throttle(
 ) -> None:
     """Set the throttle from the trim of level flight, the slope ahead and the airspeed error.
 
-    The slope ahead gives a feed-forward, the airspeed error a PI feedback.
+    The slope ahead gives a feed-forward, the airspeed error a PI feedback. Before and in an arc that requires a lower
+    ground speed, the airspeed error is reduced. The integrator is frozen while the throttle is saturated.
 
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    gains: gains of the inner loops, a `GAINS` record.
+    memory: `GUIDANCE_MEMORY` record; its integrator of the airspeed error is updated.
+    commands: `COMMANDS` record, whose throttle is set.
+    airspeed: m/s.
     slope_ahead: slope of the altitude profile ahead, m per m.
     speed_along: ground speed along the path, m/s.
+    dt: duration of a tick, s.
     """
     airspeed_error = memory.speed_command - airspeed
     if memory.max_arc_speed > 0.0:
@@ -482,6 +538,13 @@ def steer_bank(state: Record, gains: Record, memory: Record, commands: Record, b
 
     A roll model answers the bank command as a critically damped oscillator within the limits of roll rate and roll
     acceleration, so it never overshoots. `follow_roll` makes the aircraft follow the model.
+
+    state: attitude, airspeed and rates of the aircraft, a `STATE` record.
+    gains: gains of the inner loops, a `GAINS` record.
+    memory: `GUIDANCE_MEMORY` record; bank and bank rate of the roll model are updated.
+    commands: `COMMANDS` record, whose aileron and rudder are set.
+    bank: bank command, rad.
+    dt: duration of a tick, s.
     """
     bank, roll_rate, roll_acceleration = step_roll_model(bank, memory.bank, memory.bank_rate, gains, dt)
     follow_roll(state, gains, memory, commands, bank, roll_rate, roll_acceleration, dt)

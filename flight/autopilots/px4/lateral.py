@@ -253,8 +253,12 @@ def follow_leg(
     An aircraft that is before the start, and further from it than the switch distance, flies straight to the start. An
     aircraft that is past the end flies straight back to the end.
 
-    end_east, end_north: end of the leg, m.
-    Other arguments as for `guide_to_path`.
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    end_east, end_north: end of the leg, m. Its start is in the memory.
+    wind_east, wind_north: velocity of the air, m/s.
+    target_airspeed: m/s.
+    parameters: PX4's parameters, a `PX4_PARAMETERS` record.
+    memory: `PX4_MEMORY` record; its lateral acceleration is set.
     """
     leg_east, leg_north = end_east - memory.from_east, end_north - memory.from_north
     length = math.hypot(leg_east, leg_north)
@@ -314,9 +318,15 @@ def follow_loiter(
 ) -> None:
     """Guide the aircraft onto a loiter circle (`navigateLoiter`).
 
+    At the centre of the circle, where no radius leads to the aircraft, the direction of its ground speed is used.
+
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
     center_east, center_north: center of the circle, m.
     radius: m, positive to the right.
-    Other arguments as for `guide_to_path`.
+    wind_east, wind_north: velocity of the air, m/s.
+    target_airspeed: m/s.
+    parameters: PX4's parameters, a `PX4_PARAMETERS` record.
+    memory: `PX4_MEMORY` record; its lateral acceleration is set.
     """
     radial_east, radial_north = estimated.east - center_east, estimated.north - center_north
     distance = math.hypot(radial_east, radial_north)

@@ -144,8 +144,15 @@ def _navigate_waypoint(
 
     If the aircraft is too high or too low at the waypoint, it loiters there first. At the last waypoint of a mission it
     loiters without end: about the waypoint, or up to 1.16 about the position at which it reached the waypoint.
+
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    waypoints: `WAYPOINT` records of the route, (w,).
     target_index: index of the waypoint.
-    Other arguments as for `navigate`.
+    wind_east, wind_north: velocity of the air, m/s.
+    target_airspeed: m/s.
+    parameters: PX4's parameters, a `PX4_PARAMETERS` record.
+    memory: memory of the control law between ticks, a `PX4_MEMORY` record; updated.
+    dt: duration of a tick, s.
     """
     target = waypoints[target_index]
     ground_speed = math.hypot(estimated.velocity_east, estimated.velocity_north)
@@ -205,8 +212,16 @@ def _navigate_loiter(
 ) -> None:
     """Fly to a loiter and around it until the loiter's end condition is met, then begin the next leg.
 
+    A loiter to an altitude first keeps the altitude at the start of the leg until the aircraft is on the circle.
+
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    waypoints: `WAYPOINT` records of the route, (w,).
     loiter: waypoint on the loiter.
-    Other arguments as for `navigate`.
+    wind_east, wind_north: velocity of the air, m/s.
+    target_airspeed: m/s.
+    parameters: PX4's parameters, a `PX4_PARAMETERS` record.
+    memory: memory of the control law between ticks, a `PX4_MEMORY` record; updated.
+    dt: duration of a tick, s.
     """
     ground_speed = math.hypot(estimated.velocity_east, estimated.velocity_north)
     distance = math.hypot(loiter.centre_east - estimated.east, loiter.centre_north - estimated.north)
@@ -297,8 +312,12 @@ def climb_before_return(
     During the climb ``memory.from_east`` and ``from_north`` are the position at which the RTL began; after it, the
     position at which the climb ended. ``memory.from_up`` always is the altitude at which the RTL began.
 
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
     lowest_return_altitude: return altitude of an RTL that begins lower, m AMSL.
-    Other arguments as for `navigate`.
+    wind_east, wind_north: velocity of the air, m/s.
+    target_airspeed: m/s.
+    parameters: PX4's parameters, a `PX4_PARAMETERS` record.
+    memory: memory of the control law between ticks, a `PX4_MEMORY` record; updated.
     """
     if not memory.is_in_rtl:
         memory.is_in_rtl, memory.is_loitering = True, False
@@ -341,8 +360,12 @@ def _navigate_rtl(
     destination, or the altitude at the start of the RTL if that is higher. The aircraft does not descend on the way.
     Over its target it descends to RTL_DESCEND_ALT.
 
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
     rtl: waypoint of the RTL's loiter.
-    Other arguments as for `navigate`.
+    wind_east, wind_north: velocity of the air, m/s.
+    target_airspeed: m/s.
+    parameters: PX4's parameters, a `PX4_PARAMETERS` record.
+    memory: memory of the control law between ticks, a `PX4_MEMORY` record; updated.
     """
     # The target is RTL_DESCEND_ALT above the destination, but no higher than the return altitude.
     lowest_return_altitude = rtl.up + max(0.0, parameters.rtl_altitude - parameters.rtl_descend_altitude)

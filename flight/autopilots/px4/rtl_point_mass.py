@@ -122,7 +122,15 @@ def _fly_one(
 ) -> None:
     """Simulate one RTL with `fly_rtl`.
 
+    start: position, velocity, bank and time of the start, a `RETURN_START` record.
+    route: the start, then the loiter at the RTL's end, or the stops of a landing sequence and the landing.
+    transit_altitude: altitude to which an RTL to a landing sequence climbs first, m AMSL.
+    parameters: PX4's parameters, a `PX4_PARAMETERS` record.
+    aircraft: point mass of the aircraft in the wind.
+    environment: terrain and kill spheres from which the clearances are measured.
     limits: timeout, s, and height above ground and distance outside spheres, m, below which the RTL is aborted.
+    positions: array (t, 3), m, to fill with one position per second until it is full.
+    result: `RETURN_RESULT` record to fill.
     """
     timeout, min_clearance, min_distance = limits
     fly_rtl(
@@ -307,9 +315,15 @@ def _steer(
 
     Return True once an RTL to a landing flies the landing sequence instead of the climb before it.
 
+    state: attitude, airspeed and rates of the aircraft, a `STATE` record.
+    estimated: position and velocity over the ground, a `MOTION` record.
+    waypoints: `WAYPOINT` records (w,): the start, then the loiter or the landing sequence.
     transit_altitude: altitude to which an RTL to a landing sequence climbs first, m AMSL.
+    parameters: PX4's parameters, a `PX4_PARAMETERS` record.
+    memory: `PX4_MEMORY` record, which receives the setpoints.
     lands: True for an RTL to a landing sequence.
     has_begun_sequence: True once the aircraft flies this sequence.
+    dt: duration of a tick, s.
     """
     wind_east, wind_north = state.wind_east, state.wind_north
     eas_to_tas = eas_to_tas_ratio(estimated.up)
@@ -356,7 +370,18 @@ def _begin_sequence(
 def _follow_setpoints(
     state: Record, parameters: Record, memory: Record, aircraft: Record, pitch: float, path_angle: float, dt: float
 ) -> tuple[float, float]:
-    """Let the bank follow its setpoint; return the pitch and path angle after a tick, rad."""
+    """Let the bank follow its setpoint; return the pitch and path angle after a tick, rad.
+
+    Bank, pitch and path angle follow as first-order lags: the bank its setpoint, within PX4's roll rate; the pitch its
+    setpoint; and the path angle the pitch minus the angle of attack.
+
+    state: `STATE` record; its roll is updated.
+    parameters: PX4's parameters, a `PX4_PARAMETERS` record.
+    memory: `PX4_MEMORY` record with the setpoints.
+    aircraft: a `POINT_MASS` record.
+    pitch, path_angle: values before the tick, rad.
+    dt: duration of a tick, s.
+    """
     roll_change = (1.0 - math.exp(-dt / (ROLL_LAG_RATIO * parameters.roll_time_constant))) * (
         memory.roll_setpoint - state.roll
     )
@@ -384,6 +409,13 @@ def _initialise_memory(
     """Set the state of the point mass, and the control law's memory as after a long steady flight.
 
     The steady flight may be a climb, in which the altitude reference is ahead of the aircraft by the lag of TECS.
+
+    start: position, velocity, bank and time of the start, a `RETURN_START` record.
+    waypoints: `WAYPOINT` records (w,) of the RTL, of which the first is the start.
+    parameters: PX4's parameters, a `PX4_PARAMETERS` record.
+    aircraft, excesses, field: record, excess power and wind field of a `PointMass`.
+    state: `STATE` record to fill.
+    memory: `PX4_MEMORY` record to fill.
     """
     initialise_state(start, aircraft, field, state)
     climb_rate, eas_to_tas = start.velocity_up, eas_to_tas_ratio(start.up)

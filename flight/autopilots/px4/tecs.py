@@ -152,9 +152,13 @@ def _calc_pitch_control(
     `TECSControl::_updateSpeedAltitudeWeights`, `_calcPitchControlSebRate`, `_calcPitchControlUpdate` and
     `_calcPitchControlOutput`.
 
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    parameters: PX4's parameters, a `PX4_PARAMETERS` record.
+    memory: memory of the control law between ticks, a `PX4_MEMORY` record; updated.
     altitude_rate_setpoint: m/s.
-    ske_rate_setpoint: rate of the kinetic energy, m^2/s^3.
-    underspeed_ratio: see `detect_underspeed`.
+    ske_rate_setpoint: rate of the specific kinetic energy, m^2/s^3.
+    underspeed_ratio: 0 in normal flight to 1 in full underspeed, in which the pitch controls only the airspeed.
+    dt: duration of a tick, s.
     """
     tas = memory.tas
     speed_weight = parameters.pitch_speed_weight * (1.0 - underspeed_ratio) + 2.0 * underspeed_ratio
