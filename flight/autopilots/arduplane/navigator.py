@@ -295,8 +295,8 @@ def _update_loiter(
 
     estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
     waypoints: `WAYPOINT` records of the route, (w,).
-    loiter: waypoint on the loiter; its loiter_radius (m) is the radius at the altitude of the waypoint. The radius grows
-        with the square of the true airspeed.
+    loiter: waypoint on the loiter; its loiter_radius (m) is the radius at the altitude of the waypoint. The radius
+        grows with the square of the true airspeed.
     parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
     memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record; updated.
     l1_distance: L1 distance, m.
