@@ -307,14 +307,18 @@ def advance_point_mass(
 def _electric_power(
     thrust_power: float, excess_table: Floats, power: Floats, airspeed: float, amsl: float, aircraft: Record
 ) -> float:
-    """Return the electric power (W) for a specific excess power (m/s), by the parabola of `Envelope.power`.
+    """Return the electric power (W) for a specific excess power (m/s).
 
-    The power is constant below the excess power at idle, and above the excess power at full throttle.
+    The power is a parabola through the points at idle, in level flight and at full throttle, as in `Envelope.power`. It
+    is constant below the excess power at idle, and above the excess power at full throttle. It is 0 for an aircraft
+    without known power.
 
-    excess_table: specific excess power, see `PointMass`.
-    power: electric power, see `PointMass`.
+    thrust_power: specific excess power in straight flight, m/s.
+    excess_table: specific excess power, m/s, `PointMass.excess`.
+    power: electric power, W, `PointMass.power`.
     airspeed: m/s.
     amsl: altitude, m.
+    aircraft: a record of `POINT_MASS`.
     """
     if not aircraft.has_power:
         return 0.0
@@ -338,9 +342,11 @@ def _electric_power(
 def excess_power(excess_table: Floats, throttle: float, airspeed: float, amsl: float, aircraft: Record) -> float:
     """Return the specific excess power in straight flight at a throttle, airspeed and altitude, m/s.
 
+    excess_table: specific excess power, m/s, `PointMass.excess`.
     throttle: 0..1.
     airspeed: m/s.
     amsl: altitude, m.
+    aircraft: a record of `POINT_MASS`.
     """
     grid_position = min(1.0, max(0.0, throttle)) * (excess_table.shape[0] - 1)
     row = min(excess_table.shape[0] - 2, int(grid_position))

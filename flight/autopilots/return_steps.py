@@ -72,7 +72,10 @@ def initialise_outcome(start: Record, estimated: Record, has_terrain: bool, resu
 def initialise_state(start: Record, aircraft: Record, field: Floats, state: Record) -> None:
     """Set the point mass's time, wind, airspeed and attitude from the ground velocity at the start.
 
-    field: as in `flight.autopilots.point_mass.PointMass`.
+    start: position, velocity, bank and time of the start, a `RETURN_START` record.
+    aircraft: a record of `POINT_MASS`.
+    field: packed wind field of a `PointMass`; empty for none.
+    state: `STATE` record to fill.
     """
     state.time = start.time
     state.wind_east, state.wind_north = wind_at(start, start.time, aircraft, field)
@@ -88,7 +91,10 @@ def initialise_state(start: Record, aircraft: Record, field: Floats, state: Reco
 def steady_throttle(start: Record, state: Record, aircraft: Record, excess_table: Floats) -> float:
     """Return the throttle (0..1) at which the aircraft holds the climb rate of an RTL's start, in steps of 0.01.
 
-    excess_table: specific excess power, see `flight.autopilots.point_mass.PointMass`.
+    start: position and velocity of the start, a `RETURN_START` record.
+    state: `STATE` record with the airspeed.
+    aircraft: a record of `POINT_MASS`.
+    excess_table: specific excess power, m/s, `PointMass.excess`.
     """
     throttle = 1.0
     while (
@@ -148,7 +154,8 @@ def update_clearances(
     aircraft is `MAX_IMPACT_DEPTH_M` below the ground.
 
     time: time since the start, s.
-    heights, to_pixel, spheres, radii: see `flight.autopilots.simulated_returns.ReturnEnvironment`.
+    heights, to_pixel: ground heights, m, and the map from east and north to column and row.
+    spheres, radii: centres (m, 3) and radii (m,) of the kill spheres, m; a radius of 0 stands for none.
     has_terrain: True if the terrain is known.
     """
     result.end_time = time

@@ -255,6 +255,8 @@ def _local_axes(sin_lat: float, cos_lat: float, sin_lon: float, cos_lon: float) 
     """Return the matrix that transforms vectors from axes fixed to the earth to local axes.
 
     Local axes point north, east and down.
+
+    sin_lat, cos_lat, sin_lon, cos_lon: sines and cosines of latitude and longitude.
     """
     return (
         (-cos_lon * sin_lat, -sin_lon * sin_lat, cos_lat),

@@ -312,7 +312,13 @@ def steady_flight(
 def full_throttle_climb(
     simulator: Simulator, airspeed: float, amsl: float, initial_trim: Trim | None = None
 ) -> Trim | None:
-    """Return the steady climb at full throttle at an airspeed (m/s) and altitude (m), or None."""
+    """Return the steady climb at full throttle, or None if there is none.
+
+    simulator: JSBSim instance with the aircraft.
+    airspeed: m/s.
+    amsl: altitude, m.
+    initial_trim: trim from which the iteration starts, or None.
+    """
     return trim(simulator, amsl, {"airspeed": airspeed, "throttle": 1.0}, initial_trim)
 
 

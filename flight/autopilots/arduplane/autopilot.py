@@ -424,7 +424,10 @@ class ArduPlane(Autopilot):
     def _landing_glide(self, height: float, run: float, tail_wind: float, amsl: float) -> LandingGlide:
         """Return the landing glide that ArduPlane flies, by LAND_FLARE_*, LAND_WIND_COMP and TECS_LAND_*.
 
-        Arguments as for `flight.autopilots.parts.GroundRules.glide`.
+        height: height of the approach's start above the landing point, m.
+        run: horizontal length of the approach, m.
+        tail_wind: tail wind on the landing course, m/s.
+        amsl: altitude of the landing point, m.
         """
         airspeed = self._landing_airspeed(0.0, tail_wind, amsl)
         return landing_glide(height, run, airspeed + tail_wind, self.parameters)

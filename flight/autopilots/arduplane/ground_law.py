@@ -301,7 +301,16 @@ def end_status(work: Record, ground: Record) -> int:
 
 @inner
 def _tick_take_off(work: Record, arduplane: Record, waypoints: Records, pieces: Records) -> None:
-    """Set the commands for one tick of the take-off; begin the first leg once the take-off is complete."""
+    """Set the commands for one tick of the take-off; begin the first leg once the take-off is complete.
+
+    Navigation and TECS run every `NAVIGATION_TICK_S`, the attitude controllers in each tick. The take-off is complete
+    above its end altitude, or once the aircraft has leveled.
+
+    work: state, commands and settings of the flight, a `WORKSPACE` record; updated.
+    arduplane: parameters and memories of the control law and of take-off and landing; updated.
+    waypoints: `WAYPOINT` records of the route, (w,).
+    pieces: pieces of the reference path.
+    """
     state = work.state
     estimated = work.estimated
     ground = arduplane.ground
@@ -357,6 +366,11 @@ def _limit_rotation_pitch(estimated: Record, parameters: Record, ground: Record,
 
     Below TKOFF_ROTATE_SPD the pitch demand is TKOFF_GND_PITCH. Above it, the pitch limit grows with the ground speed,
     from at least five degrees, until the ground speed exceeds AIRSPEED_CRUISE. Follows `Plane::takeoff_calc_pitch`.
+
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    ground: state of the take-off; the end of the rotation is stored in it.
+    memory: `ARDUPILOT_MEMORY` record; its pitch demand (rad) is limited.
     """
     if ground.rotation_complete:
         return
@@ -378,6 +392,10 @@ def _set_take_off_parameters(
 
     Follows `Plane::takeoff_calc_pitch` and `Plane::takeoff_calc_roll`.
 
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    stage_parameters: copy of the parameters in which the limits of the take-off are set.
+    ground: state of the take-off: its pitch and launch altitude, m AMSL.
     roll_error: magnitude of demanded roll minus roll, rad; a large error reduces the pitch.
     """
     stage_parameters.tecs_speed_weight = 2.0
@@ -418,7 +436,13 @@ def _leveling_fraction(estimated: Record, parameters: Record, ground: Record) ->
 def _demand_heading(state: Record, estimated: Record, parameters: Record, ground: Record, memory: Record) -> None:
     """Set the lateral acceleration demand that holds the take-off heading; 0 until the heading is known.
 
-    Follows `AP_L1_Control::update_heading_hold`.
+    The heading is known after some time at a minimum ground speed. Follows `AP_L1_Control::update_heading_hold`.
+
+    state: attitude, airspeed and rates of the aircraft, a `STATE` record.
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    ground: state of the take-off; its heading is set once it is known.
+    memory: `ARDUPILOT_MEMORY` record; its lateral acceleration (m/s^2) is set.
     """
     ground_speed = math.hypot(estimated.velocity_east, estimated.velocity_north)
     if ground.time_at_course_speed > 0.0 or ground_speed > _COURSE_SPEED_MPS:
@@ -511,6 +535,11 @@ def _follow_line_to_point(
 
     Follows `AP_L1_Control::update_waypoint`.
 
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    ground: state of the landing, with the landing point.
+    memory: `ARDUPILOT_MEMORY` record with the start of the line; its demand and L1's integrator are updated.
+
     Return the remaining distance along the line (m), the fraction of the line already flown, the magnitude of L1's
     angle (`_last_Nu`, rad), and the magnitude of the cross-track error (m).
     """
@@ -552,7 +581,12 @@ def _update_stage(
 
     Follows `AP_Landing::type_slope_verify_land`.
 
-    line_position: result of `_follow_line_to_point`.
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    ground: state of the landing; its stage and the entry into the flare are set.
+    memory: `ARDUPILOT_MEMORY` record with the altitude and climb rate demands.
+    line_position: remaining distance (m), flown fraction, angle (rad) and cross-track error (m) on the line to the
+        landing point, as `_follow_line_to_point` returns them.
     """
     _, fraction, line_angle, cross_track = line_position
     height, sink_rate = estimated.up - ground.up, -estimated.velocity_up
@@ -593,6 +627,10 @@ def _demand_glide(
 
     Follows `AP_Landing::type_slope_setup_landing_glide_slope` and `AP_TECS::_update_height_demand`.
 
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    ground: state of the landing; its altitudes in the flare are updated.
+    memory: `ARDUPILOT_MEMORY` record; its demands are set.
     remaining_distance: distance to the landing point along the line, m; negative beyond it.
     """
     memory.max_climb_scaler, memory.max_sink_scaler = 1.0, 1.0

@@ -122,7 +122,9 @@ def update_height_demand(estimated: Record, target: Record, parameters: Record, 
 
     estimated: a record of `flight.guidance.navigation_error.MOTION`.
     target: the leg's end, a record of `flight.guidance.lateral_reference_laws.WAYPOINT`.
-    parameters, memory: as for `flight.autopilots.arduplane.navigator.navigate_legs`.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record; updated.
+    dt: duration of a tick, s.
     """
     if target.is_rtl:
         altitude_target = _rtl_altitude(estimated, target, parameters, memory)
@@ -175,6 +177,11 @@ def _leg_altitude(estimated: Record, target: Record, parameters: Record, memory:
     loiter's center. The demand is the altitude of the leg's end in three cases: the altitude changes in a step or only
     a little; the aircraft is on a loiter; and, in 4.7, the aircraft climbs at a low height above home. Follows
     `Plane::set_target_altitude_proportion`.
+
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    target: end of the leg, a `WAYPOINT` record.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    memory: `ARDUPILOT_MEMORY` record with the start of the leg; the altitude of the start changes if the slope does.
     """
     end_altitude: float = target.up
     if memory.sloped_leg != memory.leg + 1:
@@ -222,6 +229,11 @@ def _terrain_following_altitude_demand(estimated: Record, target: Record, parame
     (`Plane::set_target_altitude_proportion_terrain`). If the terrain ahead rises faster than the aircraft climbs at
     half of its maximum climb rate, the excess height is added to the demand. A descent of the leg reduces this excess
     (`lookahead_adjustment` in ArduPlane/altitude.cpp).
+
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    target: end of the leg, a `WAYPOINT` record, with its height above ground.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    memory: `ARDUPILOT_MEMORY` record with the ground altitude at the aircraft and the terrain lookahead.
     """
     if memory.terrain_leg != memory.leg + 1:
         # The leg began in this update: `update_terrain_lookahead` has not yet looked up the ground at its start.
@@ -251,7 +263,11 @@ def update_terrain_lookahead(
     every TERRAIN_SPACING towards the waypoint, up to the waypoint or TERRAIN_LOOKAHD, and the climb rate is half of
     TECS_CLMB_MAX. Samples of unknown ground are ignored.
 
-    work: a record of `flight.simulation.tick.WORKSPACE`.
+    work: estimated position and ground altitude, a record of `flight.simulation.tick.WORKSPACE`.
+    heights: ground heights of the terrain by pixel, m.
+    waypoints: `WAYPOINT` records of the route, (w,).
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record; updated.
     """
     target = waypoints[memory.leg + 1]
     # Before the first update of the control law, the start of the first leg is not set.
@@ -299,6 +315,11 @@ def _rtl_altitude(estimated: Record, rtl: Record, parameters: Record, memory: Re
     demand never exceeds the altitude at which the RTL began (`Plane::set_offset_altitude_location`,
     `Plane::constrain_target_altitude_location`; seen in 20 flights). During the climb before the turn, the demand is
     above both the start and the target (`Plane::update_alt`).
+
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    rtl: loiter at the RTL's end, a `WAYPOINT` record.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    memory: `ARDUPILOT_MEMORY` record with the position at which the RTL began.
     """
     end_altitude: float = rtl.up
     if not memory.rtl_climb_complete:

@@ -346,6 +346,11 @@ def _update_loiter_angle(estimated: Record, loiter: Record, memory: Record, dt: 
     """Update the time on a loiter and the angle flown around it, both since the aircraft reached the circle.
 
     Also record whether the aircraft has reached the loiter's altitude. Follows `Plane::loiter_angle_update`.
+
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    loiter: waypoint on the loiter, a `WAYPOINT` record.
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record; updated.
+    dt: duration of a tick, s.
     """
     bearing = math.atan2(estimated.east - loiter.centre_east, estimated.north - loiter.centre_north)
     if memory.loiter_started:
@@ -392,7 +397,11 @@ def _is_heading_lined_up(
     waypoint. Follows `ModeLoiter::isHeadingLinedUp`, whose tangent touches the circle in the direction of the aircraft
     from the center.
 
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    next_waypoint: `WAYPOINT` record of the next leg's end.
+    loiter: `WAYPOINT` record on the circle; its exit bearing (rad) is 0 if it states none.
     radius: radius of the circle, m.
+    memory: `ARDUPILOT_MEMORY` record with the angle flown since the loiter was complete.
     """
     next_e, next_n = (
         (next_waypoint.centre_east, next_waypoint.centre_north)
@@ -427,6 +436,12 @@ def _navigate_rtl(estimated: Record, rtl: Record, parameters: Record, memory: Re
     The aircraft turns to the center of the RTL loiter at once. The loiter's radius grows with altitude as the square of
     the ratio of true to equivalent airspeed (`AP_L1_Control::loiter_radius`). During the initial climb, the bank is
     limited to LEVEL_ROLL_LIMIT. The altitude slope begins where that climb ends.
+
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    rtl: loiter at the RTL's end, a `WAYPOINT` record.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record; updated.
+    eas2tas: ratio of true to equivalent airspeed.
     """
     if not memory.is_in_rtl:
         memory.is_in_rtl, memory.reached_loiter_target = True, False
@@ -459,6 +474,11 @@ def _join_landing(estimated: Record, waypoints: Records, rtl: Record, memory: Re
     Without a landing sequence the aircraft stays on the loiter.
 
     Follows `ModeRTL::navigate` of ArduPlane 4.6 with RTL_AUTOLAND 1. The next leg begins at the aircraft's position.
+
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    waypoints: `WAYPOINT` records of the route, (w,); those after the RTL are the landing sequence.
+    rtl: waypoint on the RTL loiter.
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record; updated.
     """
     landing_index = memory.leg + 2
     while landing_index < waypoints.shape[0] and waypoints[landing_index].is_rtl:

@@ -331,7 +331,13 @@ def _lag_fractions(parameters: Record, dt: float) -> tuple[float, float, float]:
 
 @inner
 def _record_arrival(estimated: Record, time: float, engine_out: bool, result: Record) -> None:
-    """Record time and altitude of the first arrival at the loiter; after an engine failure, end the RTL there."""
+    """Record time and altitude of the first arrival at the loiter; after an engine failure, end the RTL there.
+
+    estimated: position over the ground, a `MOTION` record.
+    time: time since the start of the RTL, s.
+    engine_out: True after an engine failure.
+    result: `RETURN_RESULT` record; updated at the first arrival only.
+    """
     if math.isnan(result.arrival_time):
         result.arrival_time, result.arrival_altitude = time, estimated.up
         if engine_out:
@@ -444,6 +450,11 @@ def _load_stage(stages: Records, index: int, waypoints: Records, estimated: Reco
     The leg starts at the previous stage. It starts at the aircraft if there is no previous stage, or if the aircraft is
     already past the leg's end. Waypoints 1 and 2 both become a copy of the stage: once `navigate_legs` begins the leg
     to waypoint 2, the stage is reached.
+
+    stages: `WAYPOINT` records of the RTL's stages.
+    waypoints: three `WAYPOINT` records that the navigator follows; the last two are overwritten.
+    estimated: position and velocity over the ground, a `MOTION` record.
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record; updated.
     """
     stage, is_previous_reached = stages[index], memory.leg > 0
     for k in range(1, 3):
@@ -530,7 +541,7 @@ def _update_demands(
 ) -> None:
     """Update the demands for bank, altitude, throttle and pitch on the leg to ``waypoints[1]``.
 
-    excess_table: specific excess power, see `flight.autopilots.point_mass.PointMass`.
+    excess_table: specific excess power, m/s, `PointMass.excess`.
     eas2tas: ratio of true to equivalent airspeed.
     is_gliding: True while the aircraft flies its RTL without an engine.
     """

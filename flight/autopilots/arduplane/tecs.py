@@ -147,6 +147,12 @@ def _update_speed(state: Record, estimated: Record, parameters: Record, memory: 
     The fast changes come from the acceleration along the nose, the slow changes from the measured airspeed. With
     gravity removed, an accelerometer along the nose measures the change of the velocity over the ground, including its
     vertical component. At the start of a climb, this change is larger than the change of the airspeed.
+
+    state: attitude, airspeed and rates of the aircraft, a `STATE` record.
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    memory: `ARDUPILOT_MEMORY` record; its airspeeds (m/s, true) and airspeed rates (m/s^2) are updated.
+    dt: duration of a tick, s.
     """
     cos_pitch = math.cos(state.pitch)
     acceleration = (estimated.velocity_east - memory.last_velocity_east) * math.sin(state.yaw) * cos_pitch
@@ -173,12 +179,17 @@ def _update_speed(state: Record, estimated: Record, parameters: Record, memory: 
 def detect_underspeed(estimated: Record, parameters: Record, memory: Record, tas_min: float, dt: float) -> bool:
     """Update the underspeed flag, and return it: True while airspeed has priority over altitude.
 
-    Follows `AP_TECS::_detect_underspeed`.
-
-    tas_min: AIRSPEED_MIN as a true airspeed, m/s.
+    The flag is set below `_UNDERSPEED_RATIO` times the minimum airspeed at full throttle. It lasts until the aircraft is
+    at its altitude demand again, or has been fast enough for some time. Follows `AP_TECS::_detect_underspeed`.
 
     After an engine failure, underspeed lasts until the altitude demand has descended to the gliding aircraft. From then
     on the aircraft glides at AIRSPEED_MIN, which is above the underspeed threshold (seen in 14 flights).
+
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record; updated.
+    tas_min: AIRSPEED_MIN as a true airspeed, m/s.
+    dt: duration of a tick, s.
     """
     is_slow = memory.tas < _UNDERSPEED_RATIO * tas_min
     memory.time_above_underspeed_threshold = 0.0 if is_slow else memory.time_above_underspeed_threshold + dt

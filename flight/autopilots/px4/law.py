@@ -163,7 +163,12 @@ def control_as_px4(
     guidance: a record of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.
     parameters: a record of `flight.autopilots.px4.parameters.PX4_PARAMETERS`.
     memory: a record of `flight.autopilots.px4.law.PX4_MEMORY`.
-    Other arguments as for `flight.autopilots.planfly.law.guide`.
+    state: attitude, airspeed and rates of the aircraft, a `STATE` record.
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    pieces, nodes: course and altitude profile of the reference path, arrays of a `FlyByPath`.
+    waypoints: `WAYPOINT` records of the route, (w,).
+    gains: gains of the inner loops, a `GAINS` record.
+    commands: `COMMANDS` record to fill.
 
     PX4 does not use the path; the track is only measured against it.
     """

@@ -398,6 +398,11 @@ def begin_leg(estimated: Record, waypoints: Records, leg: int, memory: Record) -
     The line starts at the leg's first waypoint. After a loiter it starts at the loiter's center, or at the tangent
     point on the circle if the item states an exit on the tangent. After a loiter by turns, which PX4 refuses, it starts
     at the aircraft's position.
+
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    waypoints: `WAYPOINT` records of the route, (w,).
+    leg: index of the leg's first waypoint.
+    memory: memory of the control law between ticks, a `PX4_MEMORY` record; updated.
     """
     start, end = waypoints[leg], waypoints[leg + 1]
     memory.leg = leg

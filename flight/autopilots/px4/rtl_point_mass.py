@@ -72,7 +72,8 @@ def fly_returns(
     """Simulate the RTL from each of n starts to its target, at FW_AIRSPD_TRIM.
 
     starts: (n,) of `flight.autopilots.simulated_returns.RETURN_START`.
-    store_positions, abort_limits: as in `flight.autopilots.parts.FlyReturns`.
+    store_positions: True to store the flown positions.
+    abort_limits: heights above ground, (n,), and distances outside spheres, (n,), m, below which an RTL is aborted.
 
     >>> from aircraft.catalog import load_aircraft
     >>> from flight.autopilots.point_mass import make_point_mass
@@ -190,7 +191,15 @@ def _fill_stop(waypoint: Record, stop: LandingStart, parameters: Px4Parameters) 
 
 
 def _rtl_timeout(start: Record, target: ReturnTarget, parameters: Px4Parameters, aircraft: PointMass) -> float:
-    """Return the timeout of an RTL, s, from the distances and altitude changes between its waypoints."""
+    """Return the timeout of an RTL, s, from the distances and altitude changes between its waypoints.
+
+    Each leg is flown against the strongest wind, with one lap of the loiter at its end. Its climb or descent follows at
+    the setpoint of the climb or sink rate. The sum is multiplied by `TIMEOUT_RATIO`, and `TIMEOUT_BASE_S` is added.
+
+    start: position of the start, a `RETURN_START` record.
+    target: target of the RTL, with its landing sequence if it has one.
+    aircraft: point mass of the aircraft in the wind.
+    """
     min_ground_speed = max(5.0, aircraft.record.airspeed - aircraft.record.max_wind)
     climb_rate = min(parameters["FW_T_CLMB_R_SP"], parameters["FW_T_CLMB_MAX"])
     sink_rate = min(parameters["FW_T_SINK_R_SP"], parameters["FW_T_SINK_MAX"])
@@ -356,7 +365,11 @@ def _begin_sequence(
     After a climb the leg begins at the center of the loiter in which the aircraft climbed. Without a climb PX4 has no
     previous setpoint. The leg then begins at the aircraft's position, and at the altitude of the leg's end.
 
+    estimated: position and velocity over the ground, a `MOTION` record.
+    waypoints: `WAYPOINT` records (w,): the start of the RTL, then the stops of the sequence.
     transit_altitude: altitude to which the RTL climbs first, m AMSL.
+    parameters: PX4's parameters, a `PX4_PARAMETERS` record.
+    memory: memory of the control law between ticks, a `PX4_MEMORY` record; updated.
     """
     begin, first_stop = waypoints[0], waypoints[1]
     has_climbed = begin.up < transit_altitude - parameters.altitude_acceptance_radius

@@ -43,7 +43,13 @@ def update_altitude_reference(parameters: Record, memory: Record, dt: float) -> 
 def update_airspeed_filter(measured_tas: float, parameters: Record, memory: Record, dt: float) -> None:
     """Update the airspeed filter with a measured true airspeed, m/s (`TECSAirspeedFilter`).
 
-    The measured rate of change of the airspeed is 0, as in PX4.
+    The filter is a Kalman filter of airspeed and airspeed rate with constant gains. The measured rate of change of the
+    airspeed is 0, as in PX4.
+
+    measured_tas: m/s.
+    parameters: PX4's parameters, a `PX4_PARAMETERS` record.
+    memory: `PX4_MEMORY` record; its true airspeed (m/s) and airspeed rate (m/s^2) are updated.
+    dt: duration of a tick, s.
     """
     tas_error, tas_rate_error = measured_tas - memory.tas, -memory.tas_rate
     memory.tas += (
@@ -114,6 +120,12 @@ def _adapt_airspeed_setpoint(
 
     Follows `adapt_airspeed_setpoint`. The airspeed limits are not rate-limited. In a bank the minimum airspeed grows as
     the square root of the load factor.
+
+    airspeed_setpoint: equivalent airspeed, m/s.
+    parameters: PX4's parameters, a `PX4_PARAMETERS` record.
+    memory: `PX4_MEMORY` record; its true airspeed setpoint (m/s) is updated.
+    eas_to_tas: ratio of true to equivalent airspeed.
+    dt: duration of a tick, s.
     """
     min_airspeed = parameters.airspeed_min / math.sqrt(max(0.1, math.cos(memory.roll_setpoint)))
     tas_min, tas_max = min_airspeed * eas_to_tas, parameters.airspeed_max * eas_to_tas
@@ -205,7 +217,7 @@ def _calc_throttle_control(
     altitude_rate_setpoint: m/s.
     ske_rate_setpoint: rate of the kinetic energy, m^2/s^3.
     min_sink_rate: sink rate at idle throttle, m/s.
-    underspeed_ratio: see `detect_underspeed`.
+    underspeed_ratio: 0 in normal flight to 1 in full underspeed.
     eas_to_tas: ratio of true to equivalent airspeed.
     """
     ste_rate_max, ste_rate_min = GRAVITY * parameters.max_climb_rate, -GRAVITY * min_sink_rate
