@@ -120,7 +120,12 @@ def _piece_ends(decay: float, horizontal_length: float) -> Floats:
 
 @inner
 def _cut_piece(start: Floats, end: Floats, begin_fraction: float, end_fraction: float, piece: Record) -> None:
-    """Set the ends of a piece to the points at two fractions of a line."""
+    """Set the ends of a piece to the points at two fractions of a line.
+
+    start, end: (3,) ends of the line, m.
+    begin_fraction, end_fraction: 0 to 1.
+    piece: record whose ends are set.
+    """
     for axis in range(3):
         piece.begin[axis] = start[axis] + begin_fraction * (end[axis] - start[axis])
         piece.end[axis] = start[axis] + end_fraction * (end[axis] - start[axis])
@@ -128,7 +133,12 @@ def _cut_piece(start: Floats, end: Floats, begin_fraction: float, end_fraction: 
 
 @inner
 def _set_deviations(lag: Record, begin_fraction: float, end_fraction: float, piece: Record) -> None:
-    """Set the deviations of a piece below and above its leg, between two fractions of the leg."""
+    """Set the deviations of a piece below and above its leg, between two fractions of the leg.
+
+    lag: `HEIGHT_LAG` record of the leg.
+    begin_fraction, end_fraction: 0 to 1.
+    piece: record whose largest distances below and above the leg (m, not negative) are set.
+    """
     begin_lag, end_lag = lag_at(lag, begin_fraction), lag_at(lag, end_fraction)
     piece.below, piece.above = max(0.0, begin_lag, end_lag), max(0.0, -begin_lag, -end_lag)
 
@@ -186,7 +196,10 @@ def missile_distance(data: ProblemArrays, waypoints: Floats) -> float:
 def _segment_distance(threats: Records, start: Floats, end: Floats, min_distance: float) -> float:
     """Return the distance from a segment to the nearest missile sphere, m, if it is below `min_distance`.
 
-    Otherwise return `min_distance`.
+    Otherwise return `min_distance`. The distance is negative inside a sphere.
+
+    threats: records of the threats; those without a kill radius are ignored.
+    start, end: (3,) ends of the segment, m.
     """
     dx, dy, dz = end[0] - start[0], end[1] - start[1], end[2] - start[2]
     length2 = dx * dx + dy * dy + dz * dz

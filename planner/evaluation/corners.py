@@ -58,9 +58,15 @@ def measure_legs(path: Floats, legs: Records) -> None:
 
 @inner
 def measure_corners(data: ProblemArrays, wind: Wind, path: Floats, legs: Records, corners: Records) -> None:
-    """Measure the turns of a path (w, 3), and fill its `CORNER` records (w,).
+    """Measure the turns of a path, and fill its `CORNER` records.
 
-    legs: filled `LEG` records of the path.
+    wind: downwind unit vector.
+    path: (w, 3) m.
+    legs: filled `LEG` records (w - 1,) of the path.
+    corners: `CORNER` records (w,) to fill.
+
+    At the first and the last waypoint the turn is from or to the prescribed end course. There is no turn without one,
+    and none at a leg without length.
     """
     aircraft, tracking = data.aircraft, data.tracking
     leg_count: int = legs.shape[0]
@@ -199,9 +205,11 @@ def fly_by_vertices(
 ) -> Floats:
     """Return vertices (k, 3) of a path past `waypoint` that is nowhere higher than the flown path.
 
-    `blended_vertices` describes the vertices.
+    previous, waypoint, next_waypoint: (3,) m.
+    radius: radius of the fly-by arc, m.
 
-    The length of the blend is computed at the altitude of the waypoint.
+    The corner is flown as an arc with parabolas that blend the slopes of the two legs; `blended_vertices` describes the
+    vertices. The length of the blend is computed at the altitude of the waypoint.
     """
     return blended_vertices(half_blend_length(aircraft, waypoint[2]), previous, waypoint, next_waypoint, radius)
 
@@ -291,7 +299,12 @@ def leg_parts_at_corner(
 
 @inlined
 def _set_vertex(out: Floats, row: int, east: float, north: float, up: float) -> None:
-    """Set row `row` of vertices (k, 3) to a position, m."""
+    """Set a row of vertices to a position.
+
+    out: (k, 3) array of vertices, m.
+    row: index of the row.
+    east, north, up: m.
+    """
     out[row, 0] = east
     out[row, 1] = north
     out[row, 2] = up

@@ -157,7 +157,12 @@ def score_legs(
 def score_ground(
     data: ProblemArrays, limits: PrecomputedLimits, scratch: PathScratch, path: Floats, violations: Record
 ) -> None:
-    """Add the violations of the clearance above ground along the legs: the second part of `score_path`."""
+    """Add the violations of the clearance above ground along the legs: the second part of `score_path`.
+
+    scratch: legs and lags of the path from `score_legs`; its records of terrain samples are overwritten.
+    path: (w, 3) m.
+    violations: `VIOLATIONS` record, to whose terrain violation the deficits are added.
+    """
     legs, terrain_legs = scratch.legs, scratch.terrain_legs
     sample_terrain(
         data.heights,
@@ -249,7 +254,12 @@ def score_missiles(
 
 @inner
 def score_airspace(data: ProblemArrays, scratch: PathScratch, path: Floats, violations: Record) -> None:
-    """Add the violations of zones and of the maximum height above ground: the last part of `score_path`."""
+    """Add the violations of zones and of the maximum height above ground: the last part of `score_path`.
+
+    scratch: legs, corners and lags of the path from `score_legs`.
+    path: (w, 3) m.
+    violations: `VIOLATIONS` record to which the violations are added.
+    """
     if data.airspace.zones.required.shape[0] > 0 or data.airspace.max_height < math.inf:
         add_airspace_violations(data, path, scratch.legs, scratch.corners, scratch.flown, scratch.lags, violations)
 
@@ -271,7 +281,12 @@ def graded_scores(data: ProblemArrays, paths: Floats) -> tuple[Floats, Floats]:
 
 @compiled
 def _score_paths(data: ProblemArrays, paths: Floats, violations: Records, objectives: Records) -> None:
-    """Fill the `VIOLATIONS` and `OBJECTIVES` records (n,) of paths (n, w, 3)."""
+    """Score paths: add their violations, and fill their objectives.
+
+    paths: (n, w, 3) m.
+    violations: `VIOLATIONS` records (n,) of zeros, to which the violations are added.
+    objectives: `OBJECTIVES` records (n,) to fill.
+    """
     limits = precompute_limits(data)
     scratch = make_scratch(paths.shape[1])
     for n in range(paths.shape[0]):
@@ -378,9 +393,11 @@ def _clearance_deficit(
 
 @inner
 def _corner_exposure(missiles: MissileIndex, margin: float, vertices: Floats, below: float, above: float) -> float:
-    """Return the kill density times the length along a flown corner (k, 3).
+    """Return the kill density times the length along a flown corner.
 
-    below, above: vertical tracking error, m.
+    margin: distance that is added to the radii of the spheres, m.
+    vertices: (k, 3) points of the corner, m.
+    below, above: largest distance of the aircraft below and above the corner, from its tracking error, m.
     """
     total = 0.0
     for k in range(vertices.shape[0] - 1):

@@ -81,7 +81,11 @@ def copy_point(source: Record, target: Record, size: int) -> None:
 
 @inlined
 def subtract_points(end: Record, start: Record, size: int, out: Record) -> None:
-    """Fill `out` with the vector from one point to another, for each path of a block."""
+    """Fill `out` with the vector from one point to another, for each path of a block.
+
+    end, start, out: records with one entry per path for east, north and up, m, and for raster column and row.
+    size: number of paths in the block.
+    """
     for b in range(size):
         out.east[b] = end.east[b] - start.east[b]
         out.north[b] = end.north[b] - start.north[b]
@@ -92,7 +96,13 @@ def subtract_points(end: Record, start: Record, size: int, out: Record) -> None:
 
 @inlined
 def interpolate_legs(start: Record, step: Record, fraction: float, size: int, out: Record) -> None:
-    """Fill `out` with the point at a fraction of a leg, for each path of a block."""
+    """Fill `out` with the point at a fraction of a leg, for each path of a block.
+
+    start, step, out: records with one entry per path for east, north and up, m, and for raster column and row; `step`
+        is the vector from the start to the end of the leg.
+    fraction: 0 to 1.
+    size: number of paths in the block.
+    """
     for b in range(size):
         out.east[b] = start.east[b] + fraction * step.east[b]
         out.north[b] = start.north[b] + fraction * step.north[b]
@@ -374,7 +384,9 @@ def _add_turn_violations(
 ) -> None:
     """Add the turns that are too sharp, including the turns from and to prescribed end courses.
 
-    by_amount: True to add the excess, False to add 1.
+    legs: filled `LEG` records (w - 1,) of the path.
+    by_amount: True to add the excess over the turn limit, rad; False to add 1 for each turn.
+    violations: `VIOLATIONS` record, to whose turn violation they are added.
     """
     max_turn, leg_count = data.max_turn, legs.shape[0]
     for i in range(1, leg_count):
@@ -393,9 +405,15 @@ def _add_turn_violations(
 def _add_bounds_violations(
     data: ProblemArrays, path: Floats, corners: Records, by_amount: bool, violations: Record
 ) -> None:
-    """Add the waypoints that are off the map, below the floor or above the ceiling (eq. 7).
+    """Add the waypoints that are off the map, below the floor or above the ceiling.
 
-    The excursion of the flight at a corner reduces the distance to the map's edges.
+    The constraint is eq. 7 of Yang, Tang and Lozano 2014. The excursion of the flight at a corner reduces the distance
+    to the map's edges.
+
+    path: (w, 3) m.
+    corners: filled `CORNER` records (w,) of the path.
+    by_amount: True to add the excess, m; False to add 1 for each waypoint.
+    violations: `VIOLATIONS` record, to whose bounds violation they are added.
     """
     west = data.west
     east = data.east

@@ -403,7 +403,13 @@ def _certified_arrays(scenario: Scenario, limits: Limits, terrain: Terrain) -> P
 def _search_airspace(
     scenario: Scenario, certified: ProblemArrays, attempt: int, up: float, limits: Limits
 ) -> PlannerAirspace:
-    """Return the airspace of a scenario with the margins of a search."""
+    """Return the airspace of a scenario with the margins of a search, which exceed those of the certificate.
+
+    certified: problem with the certificate's margins.
+    attempt: number of the attempt, from 0; the margins grow with it.
+    up: additional buffer above ground, m.
+    limits: limits of the path, with the reserves for the tracking error.
+    """
     buffer = SEARCH_BUFFER_M + attempt * ATTEMPT_BUFFER_M + up
     margins = _zone_margins(scenario, SEARCH_ZONE_MARGIN_M, buffer + limits.reserve_threats, 1.0)
     return make_airspace(
@@ -478,6 +484,10 @@ def _end_buffer(terrain: Terrain, limits: Limits, point: Floats, buffer: float, 
     """Return the buffer (height required above the clearance) at a fixed end, m.
 
     It is the full buffer, or a fraction of the available height if the end is too low for the full buffer.
+
+    point: position of the end, (3,) m.
+    buffer: full buffer, m.
+    fraction: 0 to 1.
     """
     height_above_ground = float(point[2] - terrain.height(point[0], point[1]))
     available_height = height_above_ground - limits.min_clearance - 0.01

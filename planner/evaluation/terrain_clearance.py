@@ -338,7 +338,11 @@ def sample_terrain(
 
 @inlined
 def segment_pixels(to_pixel: PolyMapRecord, ax: float, ay: float, bx: float, by: float) -> Pixels:  # pragma: no cover
-    """Return the raster columns and rows of both ends of a segment."""
+    """Return the raster columns and rows of both ends of a segment: column and row of a, then of b.
+
+    to_pixel: map from east and north to column and row.
+    ax, ay, bx, by: east and north of the two ends, m.
+    """
     column_a, row_a = polymap(to_pixel, ax, ay)
     column_b, row_b = polymap(to_pixel, bx, by)
     return column_a, row_a, column_b, row_b

@@ -89,7 +89,13 @@ def make_threat_cells(position: Floats, radius: Floats, bounds: Floats) -> Threa
 
 @compiled
 def _fill_cells(first: Int32s, units: Int32s, min_altitudes: Int32s, max_altitudes: Int32s, cells: Records) -> None:
-    """Fill the records of the cells: their part of the list of units, and the altitude range of these units."""
+    """Fill the records of the cells: their part of the list of units, and the altitude range of these units.
+
+    first: (cells + 1,) first entry of each cell in the list.
+    units: units of one cell after another.
+    min_altitudes, max_altitudes: (u,) lowest and highest altitude that each unit reaches, m.
+    cells: `THREAT_CELL` records to fill.
+    """
     for k in range(cells.shape[0]):
         cell = cells[k]
         cell.first, cell.count = first[k], first[k + 1] - first[k]

@@ -237,6 +237,9 @@ class _FlightConditions(NamedTuple):
 def _interpolate_wind(winds: WindGrid, x: float, y: float, z: float) -> tuple[float, float]:
     """Return the wind of a grid at a place, m/s, east and north, by trilinear interpolation.
 
+    winds: velocities at the points of a regular grid.
+    x, y, z: east, north and altitude of the place, m.
+
     Beyond the grid the wind at its edge applies.
     """
     velocities = winds.velocities
@@ -257,7 +260,15 @@ def _interpolate_wind(winds: WindGrid, x: float, y: float, z: float) -> tuple[fl
 
 @inner
 def _conditions_at(travel: TravelCost, table: PerformanceTable, x: float, y: float, amsl: float) -> _FlightConditions:
-    """Return the airspeed, the wind and the power coefficients at a place (x, y on the map, m, and m AMSL)."""
+    """Return the airspeed, the wind and the power coefficients at a place.
+
+    travel: weights of the cost, with the wind of a forecast if there is one.
+    table: performance of the aircraft, with the mean wind.
+    x, y: east and north, m.
+    amsl: altitude, m.
+
+    Without a cost of energy the power coefficients are 0.
+    """
     airspeed = true_airspeed(table, amsl)
     if travel.winds.velocities.size == 0:
         (wx, wy), wind_speed = downwind_vector(table), wind_speed_at(table, amsl)
@@ -316,7 +327,14 @@ def _time_energy_cost(
 def leg_cost(
     travel: TravelCost, table: PerformanceTable, start: NDArray[np.float64], end: NDArray[np.float64]
 ) -> float:
-    """Return the cost of a leg; inf if the leg cannot be flown."""
+    """Return the cost of a leg; inf if the leg cannot be flown.
+
+    travel: weights of length, time and energy in the cost.
+    table: performance of the aircraft.
+    start, end: (3,) ends of the leg, m.
+
+    Time and energy are integrated along the leg by Simpson's rule with three points.
+    """
     dx, dy, dz = end[0] - start[0], end[1] - start[1], end[2] - start[2]
     total = travel.length * math.sqrt(dx * dx + dy * dy + dz * dz)
     if travel.time == 0.0 and travel.energy == 0.0:
@@ -356,13 +374,16 @@ class LegModel(NamedTuple):
 
 @inner
 def model_leg(travel: TravelCost, table: PerformanceTable, start: Floats, finish: Floats, model: LegModel) -> float:
-    """Return the cost of a leg, which is always finite.
+    """Return the cost of a leg, which is always finite, and model it to second order.
 
-    Fill its first and second derivatives by the leg's ends.
+    travel: weights of length, time and energy in the cost.
+    table: performance of the aircraft.
+    start, finish: (3,) ends of the leg, m.
+    model: derivatives (2, 3) and curvature (2, 3, 2, 3) of the cost by the two ends, which are filled.
 
     The curvature (second derivative) is the sum of the curvatures of the length, of the time at each
     height, and of the power, which are all convex. The coupling of height and course is omitted, so the matrix has no
-    negative eigenvalue.
+    negative eigenvalue. Time and energy are integrated along the leg by Simpson's rule with three points.
     """
     slopes, curvature = model.slopes, model.curvature
     slopes[:], curvature[:] = 0.0, 0.0

@@ -53,7 +53,13 @@ class Gaussian:
     """
 
     def __init__(self, mean: Floats, deviation: float, population: int, scale: Floats | None = None) -> None:
-        """Set the learning rates of CMA-ES for this population and number of variables."""
+        """Set the learning rates of CMA-ES for this population and number of variables.
+
+        mean: (d,) centre of the first samples.
+        deviation: standard deviation of the first samples.
+        population: number of samples per generation.
+        scale: (d,) factors on the deviation along each axis; None for 1.
+        """
         size = mean.size
         self.mean, self.deviation, self.population = mean.copy(), deviation, population
         weights = np.log(population / 2.0 + 0.5) - np.log(np.arange(1, population // 2 + 1))

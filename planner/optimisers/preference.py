@@ -241,8 +241,12 @@ def _dense_ranks(rows: Floats, begin: int, end: int) -> tuple[Ints, int]:
 def _add_dominator_counts_by_tree(rows: Floats, begin: int, end: int, order: Ints, candidate_ranks: Ints) -> None:
     """Add the number of dominators of each candidate of a group to `candidate_ranks`, in O(n log n).
 
-    The arguments are those of `_add_dominator_counts`, with two rows of scores. A Fenwick tree over the second row
-    counts the dominators; it is faster than a scan if there are many candidates.
+    rows: (2, n) scores of the candidates, sorted by the first row.
+    begin, end: range of the group in the sorted order.
+    order: (n,) number of the candidate at each position of the sorted order.
+    candidate_ranks: (n,) by number of the candidate; updated.
+
+    A Fenwick tree over the second row counts the dominators; it is faster than a scan if there are many candidates.
     """
     dense_ranks, rank_count = _dense_ranks(rows, begin, end)
     tree = np.zeros(rank_count + 1, dtype=np.int64)

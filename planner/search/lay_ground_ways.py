@@ -258,7 +258,16 @@ class _Site:
 
 
 def _make_site(plan: Plan, limits: Limits, home: Floats, terrain: Terrain) -> _Site:
-    """Make the problems that certify departures and approaches, and measure the size of turns in them."""
+    """Make the problems that certify departures and approaches, and measure the size of turns in them.
+
+    plan: plan of the part in the air.
+    limits: limits of the path, without those of the planning algorithm.
+    home: position of home, (3,) m.
+    terrain: ground heights.
+
+    A second problem certifies departures and approaches near the ground: it has neither a clearance nor inclusions with a
+    floor.
+    """
     scenario = plan.scenario
     algorithm = scenario.planner.algorithm if plan.algorithm == GIVEN_WAYPOINTS else plan.algorithm
     algorithm_limits = limits_for(find_algorithm(algorithm, scenario.name), limits)
@@ -619,7 +628,12 @@ def _find_finals(
     """Return the clear and flyable finals on a course, and the reason to state if there are none.
 
     Finals that PX4 accepts come first, then the shortest ones.
+
+    site: plan, limits and terrain around the strip.
+    strip: landing strip, which may prescribe the length (m) and the slope (rad) of the final.
+    course: landing course, rad.
     point: landing point, (3,) m.
+    final_model: airspeed and slope at which the autopilot flies a final.
     """
     field_altitude = float(point[2])
     tailwind = site.scenario.wind.components_on_course(course, field_altitude)[0]
@@ -761,6 +775,10 @@ def _approach_altitudes(
     """Return the altitudes of a path between two altitudes, (n,) m AMSL.
 
     The path climbs and descends at a fraction of its slope limits.
+
+    points: (n) east and north of the path, m.
+    slope_factor: fraction of the slope limits.
+    start_altitude, end_altitude: m AMSL.
     """
     top_altitude = max(start_altitude, end_altitude)
     climb, dive = (partial(_scale_slope, site, slope_factor, is_descent, top_altitude) for is_descent in (False, True))

@@ -395,7 +395,10 @@ def end_airspace_route(
 ) -> tuple[Floats, float]:
     """Trace the route that a search found; return its points and its cost.
 
-    The points are along, across and up, (stages + 1, 3). Without a route, the points are (0, 3) and the cost is inf.
+    grid: grid that was searched.
+    search: the search after its last stage.
+
+    The points are along, across and up, (stages + 1, 3) m. Without a route, the points are (0, 3) and the cost is inf.
     """
     stages = grid.stages
     step = frame.length / grid.stages
@@ -485,7 +488,7 @@ def airspace_routes(
     """Yield routes over grids, for a problem with zones or a maximum height.
 
     grids: for each grid, its number of stages (multiplied by `STAGE_FACTOR`) and its number of different routes.
-    pause: as in `cheapest_airspace_route`.
+    pause: called from time to time; an exception raised there stops the search.
     finer_only: True to skip a grid that is no finer than an earlier grid, because `MAX_CELLS` limits it.
 
     Grids are gentle (see `AirspaceGrid`), because their routes are easier to fly. Before that, the first grid is

@@ -239,6 +239,11 @@ def layers_per_step(data: ProblemArrays, frame: RotatedFrame, step: float, layer
     """Return the steepest climb and descent of a step, in layers: `STEP_LAYERS` records (sideways, layers).
 
     They depend on the course of the step and on the layer at its beginning.
+
+    frame: frame of the direct line.
+    step: length of a step along the line, m.
+    layers: altitudes of the layers, m.
+    ratio: spacing across as a fraction of a step.
     """
     layer_spacing = layers[1] - layers[0] if layers.size > 1 else 1.0
     step_layers = np.zeros((2 * MAX_SIDE + 1, layers.size), dtype=STEP_LAYERS)
@@ -646,7 +651,7 @@ def grid_route(
     earlier_routes: earlier routes; the cost is higher near them, so that the next route takes another side.
     expected_cost: upper limit on the cost with which the search is tried first, such as the cost on a coarser grid. If
         it fails, a search without a limit follows.
-    pause: as in `cheapest_route`.
+    pause: called from time to time; an exception raised there stops the search.
     """
     if grid.layers.size == 0:
         return None
@@ -685,8 +690,10 @@ def grid_routes(
 ) -> Iterator[GridRoute]:
     """Yield the routes of each grid, cheapest first.
 
+    frame: frame of the direct line.
+    span: smallest and largest offset of the cells across the line, m.
     grids: for each grid, its number of stages and its number of different routes.
-    pause: as in `cheapest_route`.
+    pause: called from time to time; an exception raised there stops the search.
     """
     expected_cost = EXPECTED_COST_RATIO * math.dist(data.start, data.destination)
     for stages, route_count in grids:

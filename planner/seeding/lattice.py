@@ -209,7 +209,12 @@ def begin_lattice_search(data: ProblemArrays, frame: RotatedFrame, lattice: Latt
 
 @compiled
 def _start_states(data: ProblemArrays, frame: RotatedFrame, lattice: Lattice, table: _StateTable) -> Codes:
-    """Mark the states at the start as reached, at the prescribed course or on all courses; return them, (k,)."""
+    """Mark the states at the start as reached, at the prescribed course or on all courses; return them, (k,).
+
+    frame: frame of the direct line.
+    lattice: points of the lattice; a state is a point, a layer and one of eight courses.
+    table: costs and parents of all states, in which the states at the start get the cost 0.
+    """
     first_state = ((lattice.behind * lattice.across + lattice.right) * lattice.layers + lattice.start_layer) * 8
     start_course = _nearest_course(frame, data.start_course)
     states = np.arange(first_state, first_state + 8) if start_course < 0 else np.array([first_state + start_course])

@@ -242,6 +242,8 @@ def _merit_of_scores(violations: Record, objectives: Record) -> tuple[float, boo
 def _begin_search(data: ProblemArrays, frames: WaypointFrames, start: Floats, steps: Floats) -> _State:
     """Return a new search that starts at a vector (d,).
 
+    frames: origin and rotation of the frame in which each waypoint moves.
+    start: (d,) along, across and altitude of each inner waypoint in its frame, m.
     steps: (k,) initial size of each move; the search changes this array.
     """
     limits, candidate = precompute_limits(data), _make_candidate(data, start.size // 3 + 2)

@@ -167,7 +167,13 @@ def _find_near_missiles(
 ) -> tuple[Ints, Floats]:
     """Return pairs of a leg and a missile near it, (p, 2), and the distance required in each pair, m, (p,).
 
-    Distances are measured from the centre of a sphere.
+    path: (w, 3) m.
+    corners: filled `CORNER` records (w,) of the path.
+    lags: filled `HEIGHT_LAG` records (w - 1,) of the path.
+    extra_margin: additional margin to spheres, m.
+
+    Distances are measured from the centre of a sphere. The required distance includes the excursion of the flight at a
+    near corner, and the altitude lag in the direction of the missile.
     """
     missiles = data.missiles.missiles
     pairs, distances = [(0, 0) for _ in range(0)], [0.0 for _ in range(0)]

@@ -297,7 +297,11 @@ def cheapest_passings(costs: GridCosts, grid: Grid, obstacles: Records, step: fl
 
 @compiled
 def route_through(costs: GridCosts, stage: int, layer: int, across: int) -> Records:
-    """Return `ROUTE_CELL` records (stages + 1,) of the cheapest route through a given cell."""
+    """Return `ROUTE_CELL` records (stages + 1,) of the cheapest route through a given cell.
+
+    costs: costs from the start and to the destination, with the neighbours on the cheapest routes.
+    stage, layer, across: the cell.
+    """
     last_stage, width = costs.successors.shape[0] - 1, costs.successors.shape[2]
     cells = np.zeros(last_stage + 1, dtype=ROUTE_CELL)
     previous_cells = trace_back(costs.parents[: stage + 1], layer, across)
@@ -351,7 +355,7 @@ def side_routes(
 
     bound: upper limit on the cost.
     max_routes: maximum number of routes.
-    pause: as in `grid_costs`.
+    pause: called from time to time; an exception raised there stops the search.
 
     Each route is the cheapest that passes one obstacle on one side; the first route is the cheapest of all. Among
     routes close to each other, only the cheapest is returned.

@@ -201,7 +201,9 @@ def fit_waypoints(
 def fit_points(data: ProblemArrays, frames: WaypointFrames, points: Floats, fit: WaypointFit = CLOSE_FIT) -> Floats:
     """Choose waypoints among candidate points, move them locally, and return them with both ends, (w, 3).
 
+    frames: origin and rotation of the frame in which each waypoint moves.
     points: (w - 2, k, 3) candidates of each inner waypoint, in the frame of the waypoint, m.
+    fit: heights by which the candidates are also lifted, m, and the pattern of the moves.
 
     The returned waypoints are world positions, m.
     """

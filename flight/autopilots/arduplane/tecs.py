@@ -179,8 +179,8 @@ def _update_speed(state: Record, estimated: Record, parameters: Record, memory: 
 def detect_underspeed(estimated: Record, parameters: Record, memory: Record, tas_min: float, dt: float) -> bool:
     """Update the underspeed flag, and return it: True while airspeed has priority over altitude.
 
-    The flag is set below `_UNDERSPEED_RATIO` times the minimum airspeed at full throttle. It lasts until the aircraft is
-    at its altitude demand again, or has been fast enough for some time. Follows `AP_TECS::_detect_underspeed`.
+    The flag is set below `_UNDERSPEED_RATIO` times the minimum airspeed at full throttle. It lasts until the aircraft
+    is at its altitude demand again, or has been fast enough for some time. Follows `AP_TECS::_detect_underspeed`.
 
     After an engine failure, underspeed lasts until the altitude demand has descended to the gliding aircraft. From then
     on the aircraft glides at AIRSPEED_MIN, which is above the underspeed threshold (seen in 14 flights).
