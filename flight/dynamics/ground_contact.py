@@ -133,9 +133,8 @@ def _contact_force(
     contact: `CONTACT` record; a wheel is compressed along its strut, any other contact along the normal of the ground.
     height_above_ground: height of the uncompressed contact, ft; negative.
     normal: normal of the ground, in axes fixed to the earth.
-    frictions: `FRICTION` records, of which the next one or two are filled.
+    frictions: `FRICTION` records, of which the next one or two are filled; `friction_count` are already filled.
     contact_index: index of the contact.
-    friction_count: number of records that are already filled.
     """
     upward = transform(matrix_of(frame.earth_to_body), normal)
     normal_z = transform(matrix_of(frame.earth_to_local), normal)[2]

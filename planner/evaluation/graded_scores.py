@@ -210,20 +210,9 @@ def score_missiles(
         x, y, z = path[i, 0], path[i, 1], path[i, 2]
         x2, y2, z2 = path[i + 1, 0], path[i + 1, 1], path[i + 1, 2]
         gap_distance = max(flown_corners[i].missile_distance, flown_corners[i + 1].missile_distance)
+        below, above = lags[i].max_below, -lags[i].min_below
         exposure, at_beginning, at_end = kill_density(
-            missiles,
-            margin,
-            gap_distance,
-            x,
-            y,
-            z,
-            x2,
-            y2,
-            z2,
-            extents[i],
-            extents[i + 1],
-            lags[i].max_below,
-            -lags[i].min_below,
+            missiles, margin, gap_distance, x, y, z, x2, y2, z2, extents[i], extents[i + 1], below, above
         )
         gaps[i].at_beginning, gaps[i].at_end = at_beginning, at_end
         kill_sum += exposure * legs[i].length

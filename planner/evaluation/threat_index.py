@@ -250,9 +250,9 @@ def kill_density(
 ) -> tuple[float, float, float]:
     """Return the mean kill density over the segment a-b, and the distances to spheres near its ends, m.
 
-    index: missiles of the map, sorted into grids of cells.
+    index: missiles in classes of similar radii, each with its own grid of cells.
     margin: distance that is added to the radii, m.
-    max_distance: a returned distance is exact if it is below this, m. Without a sphere so near, it may be inf.
+    max_distance: a returned distance is exact if it is below this, m; otherwise it may be inf.
     ax, ay, az, bx, by, bz: east, north and altitude of the two ends, m.
     length_a, length_b: lengths at a and at b on which the distances to the surfaces of spheres are measured, m.
     below, above: largest distance of the aircraft below and above the segment, from its tracking error, m.
@@ -262,7 +262,6 @@ def kill_density(
     inverse, inverse_dy = 1.0 / length2 if length2 > 0.0 else 0.0, 1.0 / dy if abs(dy) > 1e-9 else 0.0
     missiles, starts = index.missiles, index.first
     density, distance_a, distance_b = 0.0, math.inf, math.inf
-    # Missiles of similar radii form a class, which has its own grid of cells.
     for class_number in range(index.classes.shape[0]):
         missile_class = index.classes[class_number]
         per_metre, columns, rows = missile_class.cells_per_metre, missile_class.columns, missile_class.rows

@@ -376,14 +376,13 @@ class LegModel(NamedTuple):
 def model_leg(travel: TravelCost, table: PerformanceTable, start: Floats, finish: Floats, model: LegModel) -> float:
     """Return the cost of a leg, which is always finite, and model it to second order.
 
-    travel: weights of length, time and energy in the cost.
-    table: performance of the aircraft.
+    travel, table: weights of length, time and energy in the cost, and performance of the aircraft.
     start, finish: (3,) ends of the leg, m.
     model: derivatives (2, 3) and curvature (2, 3, 2, 3) of the cost by the two ends, which are filled.
 
-    The curvature (second derivative) is the sum of the curvatures of the length, of the time at each
-    height, and of the power, which are all convex. The coupling of height and course is omitted, so the matrix has no
-    negative eigenvalue. Time and energy are integrated along the leg by Simpson's rule with three points.
+    The curvature (second derivative) is the sum of the curvatures of the length, of the time at each height, and of the
+    power, which are all convex. The coupling of height and course is omitted, so the matrix has no negative eigenvalue.
+    Time and energy are integrated along the leg by Simpson's rule with three points.
     """
     slopes, curvature = model.slopes, model.curvature
     slopes[:], curvature[:] = 0.0, 0.0

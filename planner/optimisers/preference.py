@@ -241,10 +241,10 @@ def _dense_ranks(rows: Floats, begin: int, end: int) -> tuple[Ints, int]:
 def _add_dominator_counts_by_tree(rows: Floats, begin: int, end: int, order: Ints, candidate_ranks: Ints) -> None:
     """Add the number of dominators of each candidate of a group to `candidate_ranks`, in O(n log n).
 
-    rows: (2, n) scores of the candidates, sorted by the first row.
-    begin, end: range of the group in the sorted order.
-    order: (n,) number of the candidate at each position of the sorted order.
-    candidate_ranks: (n,) by number of the candidate; updated.
+    rows: (2, n) scores, one column per candidate.
+    begin, end: the group is the columns from begin to end - 1, which are sorted by the first score, then by the second.
+    order: (n,) number of the candidate in each column.
+    candidate_ranks: (n,) rank of each candidate by its number; updated.
 
     A Fenwick tree over the second row counts the dominators; it is faster than a scan if there are many candidates.
     """

@@ -265,8 +265,8 @@ def _make_site(plan: Plan, limits: Limits, home: Floats, terrain: Terrain) -> _S
     home: position of home, (3,) m.
     terrain: ground heights.
 
-    A second problem certifies departures and approaches near the ground: it has neither a clearance nor inclusions with a
-    floor.
+    A second problem certifies departures and approaches near the ground: it has neither a clearance nor inclusions with
+    a floor.
     """
     scenario = plan.scenario
     algorithm = scenario.planner.algorithm if plan.algorithm == GIVEN_WAYPOINTS else plan.algorithm

@@ -204,17 +204,10 @@ def _relax_airspace_stage(
 ) -> None:
     """Compute the costs of the cheapest routes to the cells of a stage, and store their parents.
 
-    stage: number of the stage, from 1.
     previous_columns, columns: `COLUMN` records (across,) of the previous stage and of this stage.
-    cost: (across, layers) costs of the routes to the cells of the previous stage.
-    cell_costs: (across, layers) cost per m of the steps to the cells of this stage; inf for a closed cell.
-    next_cost: updated, (across, layers): costs of the routes to the cells of this stage.
-    previous_parents: (across, layers) parents of the previous stage's cells.
-    parents: updated, (across, layers): cells of the previous stage from which the routes come, numbered as
-        across x layers + layer.
-
-    A step is not made through a zone, nor at a steeper slope than the limits allow.
-    A change of course is measured from the cheapest route to a cell only, so the result is not exactly the optimum.
+    cost, next_cost: (across, layers) costs of the routes to the cells of the previous stage and this stage (updated).
+    cell_costs: (across, layers) cost per m of the steps to this stage. A change of course from the parent also costs.
+    previous_parents, parents: (across, layers) parents in both stages, as across x layers + layer; the latter updated.
     """
     step, width, zones, spacing = frame.length / grid.stages, grid.across.size, data.airspace.zones, grid.layer_spacing
     lateral = 0.0 if stage in (1, grid.stages) else float(data.tracking.across)  # No tracking error at a fixed end.

@@ -500,8 +500,7 @@ def continue_route(
     """Continue a search by up to `max_stages` stages, or until no route can continue; return it.
 
     extra: (stages + 1, across) additional cost per m of path in each position.
-    bound: upper limit on the cost of the route; cells that only dearer routes can use are dropped.
-    search: state of the search; its arrays are overwritten.
+    bound, search: upper limit on the cost of the route, and state of the search, whose arrays are overwritten.
     """
     stages, width, layer_count = grid.stages, grid.across.size, grid.layers.size
     step = frame.length / stages

@@ -550,16 +550,8 @@ def _add_turns(
 ) -> float:
     """Add the turn margins and the lengths of legs between turns; return their contribution to the merit.
 
-    A turn margin is the angle below the turn limit, scaled to m by `TURN_SCALE_M_PER_RAD`. A length (m) is the part of
-    a leg that remains after its turns, the roll between them and settling; it is added only if legs must hold their
-    turns.
-
-    path: (w, 3) m.
-    multipliers: (c,) multipliers of all constraints.
-    values: (c,) values of all constraints; those added here are filled.
-    penalty: penalty factor, 1 / m.
-    model: gradient and Hessian of the augmented Lagrangian, to which the constraints are added.
-    first_number: number of the first of these constraints.
+    A turn margin is scaled to m. A length is the part of a leg that its turns, roll and settling leave over, m.
+    multipliers, values: (c,) multipliers and values of all constraints, of which these begin at `first_number`.
     """
     merit, slopes, count = 0.0, model.slopes, path.shape[0] - 1
     turn = np.zeros(count + 1)

@@ -196,11 +196,8 @@ def continue_grid_costs(
 ) -> SideSearch:
     """Continue a search by up to `max_stages` stages, or end it if no route can continue; return it.
 
-    The first half of the stages computes the costs from the start forwards, the second half those to the destination
-    backwards.
-
-    bound: upper limit on the cost of a route; cells that only dearer routes can use are dropped.
-    search: state of the search; its arrays are overwritten.
+    The first half of the stages computes costs from the start forwards, the second half costs to the destination.
+    bound, search: upper limit on the cost of a route, and state of the search, whose arrays are overwritten.
     """
     stages, width, layer_count = grid.stages, grid.across.size, grid.layers.size
     step, required = frame.length / stages, required_clearance(data)

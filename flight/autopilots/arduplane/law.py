@@ -428,21 +428,17 @@ def control_as_ardupilot(
     commands: Record,
     dt: float,
 ) -> None:
-    """Compute the commands for one tick, and update the memories.
+    """Compute the commands for one tick of ``dt`` s, and update the memories ``guidance`` and ``memory``.
 
     ArduPlane's navigation and TECS run every `NAVIGATION_TICK_S`, its attitude controllers in each tick. ArduPlane does
     not use the path: the track is only measured against it.
 
-    state: attitude, airspeed and rates of the aircraft, a `STATE` record.
-    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    state, estimated: true attitude, airspeed and rates, a `STATE` record, and estimated motion, a `MOTION` record.
     pieces, nodes: course and altitude profile of the reference path, arrays of a `FlyByPath`.
     waypoints: `WAYPOINT` records of the route, (w,).
-    gains: gains of the inner loops, a `GAINS` record.
-    guidance: memory of the inner loops and progress on the path, a `GUIDANCE_MEMORY` record; updated.
-    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
-    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record; updated.
+    gains, guidance: gains of the inner loops, and their memory with the progress on the path.
+    parameters, memory: ArduPlane's parameters, and the memory of its control law, an `ARDUPILOT_MEMORY` record.
     commands: `COMMANDS` record to fill.
-    dt: duration of a tick, s.
     """
     find_on_path(estimated, pieces, guidance)
     target = waypoints[memory.leg + 1]

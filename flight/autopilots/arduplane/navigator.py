@@ -299,10 +299,8 @@ def _update_loiter(
         grows with the square of the true airspeed.
     parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
     memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record; updated.
-    l1_distance: L1 distance, m.
-    ground_speed: m/s.
-    eas2tas: ratio of true to equivalent airspeed.
-    dt: duration of a tick, s.
+    l1_distance, ground_speed: L1 distance, m, and ground speed, m/s.
+    eas2tas, dt: ratio of true to equivalent airspeed, and duration of a tick, s.
     """
     eas2tas_ratio = eas2tas / eas_to_tas_ratio(loiter.up)
     radius = abs(loiter.loiter_radius) * eas2tas_ratio * eas2tas_ratio

@@ -484,17 +484,14 @@ def _update_pitch(
 ) -> None:
     """Set the pitch demand from the balance of potential and kinetic energy.
 
-    Follows `AP_TECS::_update_pitch`.
+    Follows `AP_TECS::_update_pitch`. SEB is the specific energy balance: potential minus kinetic energy, each weighted.
 
-    state: attitude, airspeed and rates of the aircraft, a `STATE` record.
-    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
-    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record; updated.
+    state: attitude and airspeed of the aircraft, a `STATE` record.
+    parameters, memory: ArduPlane's parameters, and the memory of its control law, which is updated.
     spe_error, ske_error: errors of the specific potential and kinetic energy, m^2/s^2.
     spe_rate, ske_rate: rates of the specific potential and kinetic energy, m^2/s^3.
     is_underspeed: True to use the pitch only to regain airspeed.
     dt: duration of a tick, s.
-
-    SEB is the specific energy balance: potential minus kinetic energy, each with its weight.
     """
     ske_weight = 1.0 if is_underspeed else min(1.0, parameters.tecs_speed_weight)
     spe_weight = 0.0 if is_underspeed else min(1.0, 2.0 - parameters.tecs_speed_weight)

@@ -61,6 +61,28 @@ _NOSE_LIMIT_RAD = math.radians(80.0)
 _BANK_PER_NOSE_ANGLE_RATIO = 4.0
 # Fraction of the lateral acceleration at maximum bank that an arc may require before the aircraft slows down for it.
 ARC_ACCELERATION_FRACTION = 0.95
+# Lowest ground speed with which the lateral law computes, m/s.
+_MIN_GROUND_SPEED_MPS = 5.0
+# Lowest airspeed with which the longitudinal law computes, m/s.
+_MIN_AIRSPEED_MPS = 8.0
+# Largest cross-track error at which its integrator changes, m.
+_MAX_INTEGRATED_CROSS_TRACK_M = 20.0
+# Limit of the integrator of the cross-track error to either side, m s.
+_MAX_CROSS_TRACK_INTEGRAL = 40.0
+# Limit of the integrator of the vector field's course error to either side, rad s.
+_MAX_COURSE_INTEGRAL = 1.0
+# Largest climb rate to correct an altitude error, up or down, m/s.
+_MAX_CLIMB_CORRECTION_MPS = 4.0
+# Largest upward acceleration that is demanded, m/s^2.
+_MAX_UPWARD_ACCELERATION_MPS2 = 8.0
+# Largest downward acceleration that is demanded, m/s^2.
+_MAX_DOWNWARD_ACCELERATION_MPS2 = 6.0
+# Largest altitude error at which its integrator changes, m.
+_MAX_INTEGRATED_HEIGHT_ERROR_M = 5.0
+# Limit of the integrator of the altitude error to either side, m s.
+_MAX_ALTITUDE_INTEGRAL = 5.0
+# Limit of the integrator of the airspeed error to either side, m.
+_MAX_SPEED_INTEGRAL_M = 60.0
 # Longest tick for which the full lead of a correction is used, s.
 FULL_LEAD_TICK_S = 1.0 / 60.0
 
@@ -168,15 +190,12 @@ def _cross_track_bank_command(
     The command is a feed-forward of the path's curvature plus a correction of the cross-track error. The sideslip
     setpoint and the maximum ground speed for the arcs ahead are set as well.
 
-    state: attitude, airspeed and rates of the aircraft, a `STATE` record.
-    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    state, estimated: true attitude, airspeed and rates, a `STATE` record, and estimated motion, a `MOTION` record.
     pieces: straight and circular pieces of the reference path.
-    gains: gains of the inner loops, a `GAINS` record.
-    memory: memory of the guidance between ticks, a `GUIDANCE_MEMORY` record; updated.
+    gains, memory: gains of the control law, and its `GUIDANCE_MEMORY` record, which is updated.
     course: course of the path at the aircraft, rad.
-    dt: duration of a tick, s.
     """
-    speed = max(5.0, math.hypot(estimated.velocity_east, estimated.velocity_north))
+    speed = max(_MIN_GROUND_SPEED_MPS, math.hypot(estimated.velocity_east, estimated.velocity_north))
     ground_course = math.atan2(estimated.velocity_east, estimated.velocity_north)
     course_error = wrap(ground_course - course)
     # The horizontal lift is perpendicular to the heading, but the demanded acceleration is perpendicular to the course.
@@ -210,8 +229,11 @@ def _cross_track_bank_command(
     missing_acceleration = lift_acceleration * (math.tan(bank_demand) - math.tan(bank))
     sideslip = missing_acceleration / max(1.0, gains.side_per_sideslip * _pressure_ratio(state, gains))
     memory.sideslip = -min(gains.sideslip_max, max(-gains.sideslip_max, sideslip))
-    if bank == bank_demand and abs(memory.cross_track) < 20.0:
-        memory.cross_track_integrator = min(40.0, max(-40.0, memory.cross_track_integrator + memory.cross_track * dt))
+    if bank == bank_demand and abs(memory.cross_track) < _MAX_INTEGRATED_CROSS_TRACK_M:
+        memory.cross_track_integrator = min(
+            _MAX_CROSS_TRACK_INTEGRAL,
+            max(-_MAX_CROSS_TRACK_INTEGRAL, memory.cross_track_integrator + memory.cross_track * dt),
+        )
     return bank
 
 
@@ -392,7 +414,9 @@ def _field_bank_command(
     )
     bank: float = min(memory.max_bank, max(-memory.max_bank, bank_demand))
     if bank == bank_demand:
-        memory.course_integrator = min(1.0, max(-1.0, memory.course_integrator + course_error * dt))
+        memory.course_integrator = min(
+            _MAX_COURSE_INTEGRAL, max(-_MAX_COURSE_INTEGRAL, memory.course_integrator + course_error * dt)
+        )
     return bank
 
 
@@ -418,7 +442,7 @@ def follow_altitude_profile(
     course: course of the path at the aircraft, rad.
     dt: duration of a tick, s.
     """
-    airspeed = max(8.0, state.airspeed)
+    airspeed = max(_MIN_AIRSPEED_MPS, state.airspeed)
     speed_along = max(1.0, estimated.velocity_east * math.sin(course) + estimated.velocity_north * math.cos(course))
     path_altitude, slope, _ = profile_at(nodes, memory.distance)
     _, slope_ahead, slope_rate = profile_at(nodes, memory.distance + speed_along * gains.slope_lead)
@@ -428,7 +452,10 @@ def follow_altitude_profile(
     frequency = gains.height_frequency
     rate_gain = 2.0 * gains.height_damping * frequency
     climb_rate_demand = slope * speed_along
-    climb_rate_correction = min(4.0, max(-4.0, -height_error * frequency * frequency / rate_gain))
+    climb_rate_correction = min(
+        _MAX_CLIMB_CORRECTION_MPS,
+        max(-_MAX_CLIMB_CORRECTION_MPS, -height_error * frequency * frequency / rate_gain),
+    )
     memory.slope_acceleration = slope_rate * speed_along * speed_along
     acceleration_demand = memory.slope_acceleration + rate_gain * (
         climb_rate_demand + climb_rate_correction - climb_rate
@@ -436,9 +463,14 @@ def follow_altitude_profile(
     acceleration_demand -= gains.height_integral * memory.altitude_integrator
     max_acceleration = _max_upward_acceleration(state, estimated, gains, memory, commands, airspeed, rate_gain, dt)
     is_limited = acceleration_demand > max_acceleration
-    acceleration_demand = min(8.0, max(-6.0, min(acceleration_demand, max_acceleration)))
-    if not is_limited and abs(height_error) < 5.0:
-        memory.altitude_integrator = min(5.0, max(-5.0, memory.altitude_integrator + height_error * dt))
+    acceleration_demand = min(
+        _MAX_UPWARD_ACCELERATION_MPS2,
+        max(-_MAX_DOWNWARD_ACCELERATION_MPS2, min(acceleration_demand, max_acceleration)),
+    )
+    if not is_limited and abs(height_error) < _MAX_INTEGRATED_HEIGHT_ERROR_M:
+        memory.altitude_integrator = min(
+            _MAX_ALTITUDE_INTEGRAL, max(-_MAX_ALTITUDE_INTEGRAL, memory.altitude_integrator + height_error * dt)
+        )
     steer_elevator(state, gains, memory, commands, climb_rate, acceleration_demand)
     _set_throttle(estimated, gains, memory, commands, airspeed, slope_ahead, speed_along, dt)
 
@@ -529,7 +561,9 @@ def _set_throttle(
     # Below the throttle at which thrust begins, which increases with airspeed, the integrator would wind up.
     idle_throttle = gains.throttle_idle * airspeed / gains.reference_airspeed
     if (throttle_demand < 1.0 or airspeed_error < 0.0) and (throttle_demand > idle_throttle or airspeed_error > 0.0):
-        memory.speed_integrator = min(60.0, max(-60.0, memory.speed_integrator + airspeed_error * dt))
+        memory.speed_integrator = min(
+            _MAX_SPEED_INTEGRAL_M, max(-_MAX_SPEED_INTEGRAL_M, memory.speed_integrator + airspeed_error * dt)
+        )
 
 
 @inner

@@ -250,15 +250,11 @@ def follow_leg(
 ) -> None:
     """Guide the aircraft onto the line from the leg's start to its end (`navigateWaypoints`).
 
-    An aircraft that is before the start, and further from it than the switch distance, flies straight to the start. An
-    aircraft that is past the end flies straight back to the end.
-
-    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    Before the start, and further from it than the switch distance, it flies straight to the start; past the end, to it.
+    estimated: position and velocity over the ground, a `MOTION` record.
     end_east, end_north: end of the leg, m. Its start is in the memory.
-    wind_east, wind_north: velocity of the air, m/s.
-    target_airspeed: m/s.
-    parameters: PX4's parameters, a `PX4_PARAMETERS` record.
-    memory: `PX4_MEMORY` record; its lateral acceleration is set.
+    wind_east, wind_north, target_airspeed: velocity of the air and airspeed to fly at, m/s.
+    parameters, memory: PX4's parameters, and the control law's memory, whose lateral acceleration is set.
     """
     leg_east, leg_north = end_east - memory.from_east, end_north - memory.from_north
     length = math.hypot(leg_east, leg_north)

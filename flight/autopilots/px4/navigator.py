@@ -22,7 +22,7 @@ import math
 
 from flight.autopilots.px4.lateral import follow_leg, follow_loiter, switch_distance
 from world.geometry import wrap
-from world.kernels import Record, Records, inner
+from world.kernels import Record, Records, inlined, inner
 
 # Delay from reaching a waypoint to the turn, s: the navigator's loop, its message to the position controller and the
 # controller's turn.  At 33 waypoints of the stored flights it was 0.13 s on average, 0.02 to 0.26.  PX4 1.17 and 1.18,
@@ -128,6 +128,17 @@ def _is_past_gate(estimated: Record, gate: Record, target: Record) -> bool:
     return distance_past >= 0.0
 
 
+@inlined
+def _update_time_since_reached(memory: Record, is_reached: bool, dt: float) -> None:
+    """Add a tick to the time since a target was reached, s; the time is 0 until the target is reached.
+
+    memory: `PX4_MEMORY` record with the time.
+    is_reached: True if the aircraft is at the target in this tick.
+    """
+    has_reached = memory.time_since_reached > 0.0 or is_reached
+    memory.time_since_reached = memory.time_since_reached + dt if has_reached else 0.0
+
+
 @inner
 def _navigate_waypoint(
     estimated: Record,
@@ -145,14 +156,10 @@ def _navigate_waypoint(
     If the aircraft is too high or too low at the waypoint, it loiters there first. At the last waypoint of a mission it
     loiters without end: about the waypoint, or up to 1.16 about the position at which it reached the waypoint.
 
-    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
-    waypoints: `WAYPOINT` records of the route, (w,).
-    target_index: index of the waypoint.
-    wind_east, wind_north: velocity of the air, m/s.
-    target_airspeed: m/s.
-    parameters: PX4's parameters, a `PX4_PARAMETERS` record.
-    memory: memory of the control law between ticks, a `PX4_MEMORY` record; updated.
-    dt: duration of a tick, s.
+    estimated: position and velocity over the ground, a `MOTION` record.
+    waypoints, target_index: `WAYPOINT` records of the route, (w,), and the index of the waypoint.
+    wind_east, wind_north, target_airspeed: velocity of the air and airspeed to fly at, m/s.
+    parameters, memory: PX4's parameters, and the control law's memory, which is updated.
     """
     target = waypoints[target_index]
     ground_speed = math.hypot(estimated.velocity_east, estimated.velocity_north)
@@ -183,11 +190,7 @@ def _navigate_waypoint(
     is_reached = distance <= acceptance_radius_at(ground_speed, parameters) or is_past_waypoint(
         estimated, target, memory
     )
-    memory.time_since_reached = (
-        memory.time_since_reached + dt
-        if memory.time_since_reached > 0.0 or (is_reached and is_accepted_altitude)
-        else 0.0
-    )
+    _update_time_since_reached(memory, is_reached and is_accepted_altitude, dt)
     if memory.time_since_reached <= SWITCH_DELAY_S:
         return
     if is_end:
@@ -214,14 +217,10 @@ def _navigate_loiter(
 
     A loiter to an altitude first keeps the altitude at the start of the leg until the aircraft is on the circle.
 
-    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
-    waypoints: `WAYPOINT` records of the route, (w,).
-    loiter: waypoint on the loiter.
-    wind_east, wind_north: velocity of the air, m/s.
-    target_airspeed: m/s.
-    parameters: PX4's parameters, a `PX4_PARAMETERS` record.
-    memory: memory of the control law between ticks, a `PX4_MEMORY` record; updated.
-    dt: duration of a tick, s.
+    estimated: position and velocity over the ground, a `MOTION` record.
+    waypoints, loiter: `WAYPOINT` records of the route, (w,), and the one on the loiter.
+    wind_east, wind_north, target_airspeed: velocity of the air and airspeed to fly at, m/s.
+    parameters, memory: PX4's parameters, and the control law's memory, which is updated.
     """
     ground_speed = math.hypot(estimated.velocity_east, estimated.velocity_north)
     distance = math.hypot(loiter.centre_east - estimated.east, loiter.centre_north - estimated.north)
@@ -245,9 +244,7 @@ def _navigate_loiter(
         return
     memory.altitude_setpoint = loiter.up
     is_at_altitude = abs(estimated.up - loiter.up) <= altitude_radius
-    memory.time_since_reached = (
-        memory.time_since_reached + dt if memory.time_since_reached > 0.0 or (is_on_rim and is_at_altitude) else 0.0
-    )
+    _update_time_since_reached(memory, is_on_rim and is_at_altitude, dt)
     exit_index = memory.leg + 2
     if math.isnan(loiter.loiter_time):
         # PX4 refuses loiters by turns; leave it at the same point as the route.
