@@ -236,7 +236,11 @@ def _induced_drag_factor(speeds: Floats, excess: Floats) -> float:
 
 @inner
 def angle_of_attack(state: Record, aircraft: Record) -> float:
-    """Return the angle of attack at the state's airspeed and bank, rad."""
+    """Return the angle of attack at the state's airspeed and bank, rad.
+
+    state: attitude, airspeed and rates of the aircraft, a `STATE` record.
+    aircraft: the point mass, a `POINT_MASS` record.
+    """
     load_factor = 1.0 / max(0.3, math.cos(state.roll))
     return aircraft.alpha + aircraft.alpha_lift * load_factor / (state.airspeed * state.airspeed)
 
@@ -282,6 +286,7 @@ def advance_point_mass(
     excess_table: specific excess power, m/s, `PointMass.excess`.
     power_table: electric power, W, `PointMass.power`.
     wind_field: packed wind field, as in `PointMass`; empty for none.
+    dt: duration of a tick, s.
     """
     thrust_power = excess_power(excess_table, throttle, state.airspeed, motion.up, aircraft)
     tan_bank = math.tan(min(_MAX_DRAG_BANK_RAD, abs(state.roll)))
@@ -360,6 +365,8 @@ def _interpolate(table: Floats, airspeed: float, amsl: float, aircraft: Record) 
     """Interpolate a table (v, h) bilinearly at an airspeed and an altitude.
 
     Outside the table the value at its nearest edge applies.
+
+    aircraft: the point mass, a `POINT_MASS` record.
     """
     row = min(table.shape[0] - 1.0, max(0.0, (airspeed - aircraft.first_airspeed) / aircraft.airspeed_step))
     column = min(table.shape[1] - 1.0, max(0.0, amsl / aircraft.altitude_step))

@@ -360,7 +360,11 @@ def _aerodynamic_forces(frame: Record) -> tuple[Vector, Vector]:
 
 @inlined
 def _external_forces(numbers: Floats, code: Code) -> tuple[Vector, Vector]:
-    """Return the sums of the external forces (lbf) and of the external moments (lbf ft), in body axes."""
+    """Return the sums of the external forces (lbf) and of the external moments (lbf ft), in body axes.
+
+    numbers: registers of the model.
+    code: header and sections of instructions; the section of forces names the registers of each force and its axes.
+    """
     force, moment = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for k in range(code[FORCES_START], code[READS_START], FORCE_NUMBERS):
         magnitude, first_axis = numbers[code[k]], int(code[k + 1])

@@ -290,6 +290,8 @@ def friction_accelerations(
 ) -> tuple[Vector, Vector]:
     """Return the linear (ft/s^2) and angular (rad/s^2) accelerations that friction causes, in body axes.
 
+    contacts: `CONTACT` records, in which the friction forces are stored.
+    frictions: `FRICTION` records; their rows of the system of equations are filled.
     count: number of friction records.
     acceleration, angular_acceleration: accelerations without friction, relative to the earth.
     """
@@ -334,7 +336,9 @@ def friction_accelerations(
 def _solve_frictions(contacts: Records, frictions: Records, count: int) -> None:
     """Solve for the friction force of each contact by the Gauss-Seidel method, within the limits of the force.
 
-    The forces are stored in the memory of the contacts.
+    contacts: `CONTACT` records, which hold the forces (lbf): the solution of the last step is the first guess.
+    frictions: `FRICTION` records with the rows of the normalised system and the limits of the force.
+    count: number of friction records.
     """
     for _ in range(_MAX_ITERATIONS):
         total_change = 0.0

@@ -268,6 +268,9 @@ def trim(
 ) -> Trim | None:
     """Return the steady flight at an altitude with two fixed quantities, or None if no trim is found.
 
+    simulator: JSBSim instance with the aircraft.
+    amsl: altitude, m.
+    fixed_values: the fixed quantities, by name.
     initial_trim: trim from which the iteration starts; None to start from the simulator's initial guess.
     """
     simulator.move_to(amsl)
@@ -287,10 +290,11 @@ def steady_flight(
 ) -> Trim | None:
     """Return the steady flight at an airspeed, altitude and climb angle, or None if no trim is found.
 
+    simulator: JSBSim instance with the aircraft.
     airspeed: m/s.
-
-    amsl: m.
+    amsl: altitude, m.
     climb: climb angle relative to the air, rad.
+    initial_trim: trim from which the iteration starts, or None.
 
     >>> from aircraft.catalog import load_aircraft
     >>> from flight.dynamics.fdm import Fdm
@@ -323,22 +327,33 @@ def full_throttle_climb(
 
 
 def idle_descent(simulator: Simulator, airspeed: float, amsl: float, initial_trim: Trim | None = None) -> Trim | None:
-    """Return the steady descent with closed throttle at an airspeed (m/s) and altitude (m).
+    """Return the steady descent with closed throttle, or None if no trim is found.
 
-    Return None if no trim is found.
-
-    initial_trim: trim from which the iteration starts, as in `trim`.
+    simulator: JSBSim instance with the aircraft.
+    airspeed: m/s.
+    amsl: altitude, m.
+    initial_trim: trim from which the iteration starts, or None.
     """
     return trim(simulator, amsl, {"airspeed": airspeed, "throttle": 0.0}, initial_trim)
 
 
 def fastest_level_flight(simulator: Simulator, amsl: float, initial_trim: Trim | None = None) -> Trim | None:
-    """Return level flight at full throttle at an altitude (m), or None if no trim is found."""
+    """Return level flight at full throttle, or None if no trim is found.
+
+    simulator: JSBSim instance with the aircraft.
+    amsl: altitude, m.
+    initial_trim: trim from which the iteration starts, or None.
+    """
     return trim(simulator, amsl, {"climb": 0.0, "throttle": 1.0}, initial_trim)
 
 
 def slowest_level_flight(simulator: Simulator, amsl: float, initial_trim: Trim | None = None) -> Trim | None:
-    """Return level flight with the elevator at its upper stop at an altitude (m), or None if no trim is found."""
+    """Return level flight with the elevator at its upper stop, or None if no trim is found.
+
+    simulator: JSBSim instance with the aircraft.
+    amsl: altitude, m.
+    initial_trim: trim from which the iteration starts, or None.
+    """
     return trim(simulator, amsl, {"climb": 0.0, "elevator": -simulator.surface_limits()[0]}, initial_trim)
 
 

@@ -367,8 +367,11 @@ def _clearance_deficit(
     extra_height: float,
     vertices: Floats,
 ) -> float:
-    """Return the missing clearance along the vertices (k, 3) of a flown turn, integrated, m x km.
+    """Return the missing clearance along the vertices (k, 3) of a flown turn, integrated, m·km.
 
+    heights, slope_bounds: ground heights by pixel, m, and steepest slopes of the ground.
+    to_pixel: map from east and north to column and row.
+    required: required clearance.
     extra_height: height that is required in addition to the clearance, m.
     """
     total = 0.0

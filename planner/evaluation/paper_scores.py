@@ -209,7 +209,12 @@ def _add_terrain(required: RequiredClearance, size: int, adds_height: bool, bloc
 
 @inlined
 def _find_nearby_units(threat_cells: ThreatCells, size: int, block: Record) -> None:
-    """Find the list of threats that may reach each point; store the first entry and the length of each list."""
+    """Find the list of threats that may reach each point; store the first entry and the length of each list.
+
+    threat_cells: lists of the threats by the cells of a grid that they reach.
+    size: number of paths in the block.
+    block: one point of each path of the block; the entries and lengths are stored in it.
+    """
     # A cell is not bounded in height; it stores the heights that its units reach.
     west, south, per_metre = threat_cells.west, threat_cells.south, 1.0 / threat_cells.side
     columns, rows, cells = threat_cells.columns, threat_cells.rows, threat_cells.cells

@@ -45,7 +45,10 @@ def lag_length(
 ) -> float:
     """Return the distance over the ground that the aircraft covers during its altitude lag, m.
 
+    tracking: tracking error of the autopilot, with the lag, s.
     east, north: unit course.
+    amsl: altitude, m.
+    wind: downwind unit vector.
     """
     (wx, wy), wind_speed, airspeed = wind, wind_speed_at(aircraft, amsl), true_airspeed(aircraft, amsl)
     speed_over_ground = ground_speed(
@@ -84,6 +87,9 @@ def compute_height_lags(
 
     There is no lag at the start of the path.
 
+    tracking: tracking error of the autopilot.
+    wind: downwind unit vector.
+    legs: filled `LEG` records (w - 1,) of the path.
     lags: `HEIGHT_LAG` records to fill, (w - 1,).
     """
     below = 0.0
@@ -149,8 +155,9 @@ def _take_sample(
 
     Return the height above the required clearance and the next step.
 
-    tiles, tile_side: bounds on the slope of the ground, as in `SlopeBounds`.
-    growth: slope of the required height, as in `RequiredClearance`.
+    heights: ground heights by pixel, m.
+    tiles, tile_side: upper bound on the ground's slope (m per m) within `tile_side` m of each tile of the raster.
+    growth: largest slope of the required height, m per m.
     column, row, up: raster position and altitude of the point.
     required_height: required clearance, m.
     max_further_height: largest height that is required in addition elsewhere on the line, m.
@@ -278,8 +285,8 @@ def sample_terrain(
 ) -> None:
     """Fill the `TERRAIN_LEG` record of each leg of a path (w, 3): its depth and its smallest heights.
 
-    extents: (w,) distance within which a point is near a waypoint, m.
-    unfinished: (w - 1,) scratch.
+    legs, lags: filled `LEG` and `HEIGHT_LAG` records (w - 1,) of the path.
+    extents, unfinished: (w,) distance within which a point is near a waypoint, m, and (w - 1,) scratch.
 
     Depths and heights are measured from the required clearance. The smallest heights are exact up to
     `NEAR_GROUND_HEIGHT_M`, and lower bounds above it. The legs are sampled in turn, because the next sample of a leg

@@ -148,6 +148,9 @@ def make_energy_cost(envelope: Envelope, table: PerformanceTable, winds: WindGri
     The power is that of `Envelope.power`: a parabola through idle at the steepest descent, level flight, and full
     throttle. At a height at which level flight is impossible, the power at the nearest height with level flight
     applies.
+
+    table: performance of the aircraft at the airspeed of the path.
+    winds: wind of a forecast; without it, only the mean wind is used.
     """
     rows = np.array([_power_parabola(envelope, true_airspeed(table, float(amsl)), float(amsl)) for amsl in table.amsl])
     is_known = np.isfinite(rows).all(axis=1)
@@ -165,6 +168,9 @@ def _power_parabola(envelope: Envelope, airspeed: float, amsl: float) -> tuple[f
 
     Return its coefficients and the limits of the sine: level, linear, square, min_sine and max_sine, as in
     `TravelCost`. All are NaN if the power is unknown.
+
+    airspeed: m/s.
+    amsl: altitude, m.
     """
     climb, descent = envelope.air_angles(airspeed, amsl)
     min_sine, max_sine = -math.sin(descent), math.sin(climb)
@@ -453,6 +459,9 @@ def _add_place_model(
     fraction: fraction of the leg at which the place lies.
     weight: weight of the place in the cost of the leg.
     timed_cost: cost of time and energy of the leg in the wind of the place.
+    model: derivatives and curvature of the leg's cost, to which the shares of both ends are added.
+
+    The derivatives are central differences over `HORIZONTAL_STEP_M` and `HEIGHT_STEP_M`.
     """
     x, y, amsl = start[0] + fraction * step[0], start[1] + fraction * step[1], start[2] + fraction * step[2]
     # A forecast changes wind on each axis, the mean profile only with altitude.

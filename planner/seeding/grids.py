@@ -390,9 +390,11 @@ def prune_cells(
 
     Fill the spans.
 
+    next_cost: (layers, across) costs of the routes to the cells; updated.
     spans: `SPAN` records (layers,) to fill with the remaining cells.
     goal_distances: (across,) horizontal distance to the destination, m.
     height_differences: (layers,) height differences to the destination, m.
+    first_across, last_across: range of cells across, both included.
     """
     for z in range(next_cost.shape[0]):
         spans[z].first, spans[z].last = next_cost.shape[1], -1

@@ -278,7 +278,12 @@ def _is_inside(data: ProblemArrays, point: Floats) -> bool:
 
 @compiled
 def trace_route(parents: Numbers, goal_state: int, lattice: Lattice) -> Records:
-    """Return `LATTICE_CELL` records of the route from the start to a given state."""
+    """Return `LATTICE_CELL` records of the route from the start to a given state.
+
+    parents: parent of each state plus 1, as the search stores them; -1 for a state at the start.
+    goal_state: number of the state at the end of the route.
+    lattice: points of the lattice.
+    """
     count, state = 0, goal_state
     while state >= 0:
         count, state = count + 1, parents[state] - 1

@@ -272,6 +272,9 @@ def _fill_trial(
     """Apply move k to a vector (d,), clip the result to the box, and fill `trial` (d,) with it.
 
     If k is one more than the last move, the displacement of the whole round is repeated instead.
+
+    moves, steps: moves, (n, d), and the size of each, (n,).
+    round_start: (d,) vector at the beginning of the round.
     """
     for d in range(vector.size):
         step = steps[k] * moves[k, d] if k < moves.shape[0] else vector[d] - round_start[d]
@@ -291,7 +294,9 @@ def _continue_search(
 ) -> _State:
     """Continue a search up to `pause_count` evaluations, or to its end at `max_evaluations`.
 
+    frames: origin and rotation of the frame in which each waypoint moves.
     moves, initial_steps: moves, (k, d), and their initial sizes, (k,).
+    state: state of the search; its vectors are overwritten.
     """
     best_vector, best_merit, feasible_vector, feasible_merit, round_start, steps, move, has_moved, evaluations, _ = (
         state

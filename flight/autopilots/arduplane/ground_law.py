@@ -356,6 +356,9 @@ def _is_leveled(parameters: Record, ground: Record) -> bool:
     """Return True once the aircraft has leveled off for TKOFF_PLIM_SEC at the end of a take-off.
 
     Follows `Plane::check_takeoff_timeout_level_off`.
+
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    ground: state of take-off and landing, a `GROUND_STATE` record.
     """
     return ground.leveling_height > 0.0 and ground.time - ground.leveling_start > parameters.takeoff_leveling
 
@@ -417,6 +420,10 @@ def _leveling_fraction(estimated: Record, parameters: Record, ground: Record) ->
 
     Follows `Plane::get_takeoff_pitch_min_cd`: the reduction begins once the climb would reach the end altitude within
     TKOFF_PLIM_SEC. Before that the factor is 1.
+
+    estimated: estimated position and velocity over the ground, a `MOTION` record.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    ground: state of take-off and landing, a `GROUND_STATE` record.
     """
     remaining_height = ground.takeoff_end_altitude - estimated.up
     if ground.leveling_height > 0.0:
@@ -660,6 +667,9 @@ def _set_landing_parameters(
     """Set the control parameters for the current stage of the landing in ``stage_parameters``.
 
     line_fraction: fraction of the line to the landing point that is already flown.
+    estimated: estimated position and velocity over the ground, a `MOTION` record.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    ground: state of take-off and landing, a `GROUND_STATE` record.
     """
     stage_parameters.tecs_time = parameters.landing_time
     stage_parameters.airspeed_min = parameters.airspeed_min

@@ -161,6 +161,7 @@ def _is_altitude_step(start_altitude: float, altitude_change: float, target: Rec
     start_altitude: altitude of the leg's start, m AMSL.
     altitude_change: height of the leg's end above the aircraft, m.
     target: the leg's end.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
     """
     if altitude_change < 0.0:
         return False

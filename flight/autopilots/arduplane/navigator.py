@@ -73,6 +73,7 @@ def is_past_finish_line(estimated: Record, from_east: float, from_north: float, 
 
     from_east, from_north: start of the leg, m.
     east, north: end of the leg, m.
+    estimated: estimated position and velocity over the ground, a `MOTION` record.
     """
     leg_e, leg_n = east - from_east, north - from_north
     remaining_e, remaining_n = east - estimated.east, north - estimated.north
@@ -123,6 +124,8 @@ def _leg_end(target: Record, memory: Record) -> tuple[float, float]:
     """Return east and north of the leg's end, m: the target, or a point beyond a target with a pass-by distance.
 
     Follows `Plane::verify_nav_wp`, which moves the waypoint along the leg by the pass-by distance.
+
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record.
     """
     leg_e, leg_n = target.east - memory.from_east, target.north - memory.from_north
     leg_length = math.hypot(leg_e, leg_n)
@@ -162,6 +165,9 @@ def _follow_line(
     l1_distance: L1 distance, m.
     ground_speed: m/s.
     dt: s.
+    estimated: estimated position and velocity over the ground, a `MOTION` record.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record.
     """
     from_e, from_n = (estimated.east, estimated.north) if without_crosstrack else (memory.from_east, memory.from_north)
     angle, aim_angle = l1_angles(estimated, from_e, from_n, end_e, end_n, l1_distance)
@@ -182,6 +188,8 @@ def keep_turn_side(estimated: Record, angle: float, target_e: float, target_n: f
 
     angle: angle from the direction to the L1 point to the ground velocity, rad (`-Nu`).
     target_e, target_n: position that the aircraft flies to, m.
+    estimated: estimated position and velocity over the ground, a `MOTION` record.
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record.
     """
     course = math.atan2(estimated.velocity_east, estimated.velocity_north)
     bearing = math.atan2(target_e - estimated.east, target_n - estimated.north)
@@ -201,6 +209,9 @@ def _turn_angle(waypoints: Records, target: Record, memory: Record) -> float:
 
     Follows `Plane::setup_turn_angle`. The course of a leg that begins or ends on a loiter is measured from or to the
     center of the loiter.
+
+    waypoints: `WAYPOINT` records of the route, (w,).
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record.
     """
     turn_angle: float = target.turn
     if memory.leg + 2 >= waypoints.shape[0]:
@@ -219,6 +230,10 @@ def _begin_leg(estimated: Record, waypoints: Records, leg: int, memory: Record) 
 
     The line to follow usually starts at the first waypoint of the leg. It starts at the aircraft's position if the
     aircraft leaves a loiter on a tangent, or if the aircraft is already past the leg's end.
+
+    estimated: estimated position and velocity over the ground, a `MOTION` record.
+    waypoints: `WAYPOINT` records of the route, (w,).
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record.
     """
     start, target = waypoints[leg], waypoints[leg + 1]
     memory.leg = leg
@@ -259,6 +274,9 @@ def _is_leg_over(
     turn_angle: turn of the route at the target, rad.
     l1_distance: L1 distance, m.
     eas2tas: ratio of true to equivalent airspeed.
+    estimated: estimated position and velocity over the ground, a `MOTION` record.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record.
     """
     is_past_end = is_past_finish_line(estimated, memory.from_east, memory.from_north, end_e, end_n)
     if (
@@ -370,6 +388,9 @@ def _is_loiter_done(estimated: Record, loiter: Record, memory: Record) -> bool:
 
     The altitude is treated as reached if three laps hardly change the aircraft's altitude. Follows
     `Plane::verify_loiter_turns`, `verify_loiter_time` and `verify_loiter_to_alt`.
+
+    estimated: estimated position and velocity over the ground, a `MOTION` record.
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record.
     """
     if not memory.loiter_started:
         return False
@@ -512,6 +533,9 @@ def _loiter_acceleration(
     radius: radius of the circle, m.
     l1_distance: L1 distance, m.
     ground_speed: m/s.
+    estimated: estimated position and velocity over the ground, a `MOTION` record.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record.
     """
     direction = math.copysign(1.0, loiter.loiter_radius)
     offset_e, offset_n = estimated.east - loiter.centre_east, estimated.north - loiter.centre_north

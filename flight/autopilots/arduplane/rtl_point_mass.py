@@ -263,10 +263,10 @@ def fly_stages(
 ) -> None:
     """Simulate the flight from stage to stage for up to ``timeout`` s; fill the `RETURN_RESULT` ``result``.
 
-    stages: successive targets, (n,) of `flight.guidance.lateral_reference_laws.WAYPOINT`; the last loiter is flown on.
+    start, stages: `RETURN_START` record, and successive targets, `WAYPOINT` records (n,); the last loiter is flown on.
     climb, climb_parameters: the climb at the start and its parameters. engine_out: True if the engine failed there.
     min_clearance, min_distance: height above ground and distance outside spheres, m, below which the flight is aborted.
-    positions: array (t, 3), m, to fill, one position a second. excesses, power, field: tables of a `PointMass`.
+    positions: array (t, 3), m, to fill, one per second. aircraft, excesses, power, field: tables of a `PointMass`.
     """
     spaced, progress_records = np.zeros(6, WAYPOINT), np.zeros(1, LOITER_PROGRESS)  # Spaced as in `waypoint_column`.
     waypoints, loiter = spaced[::2], progress_records[0]
@@ -321,7 +321,11 @@ def fly_stages(
 
 @inner
 def _lag_fractions(parameters: Record, dt: float) -> tuple[float, float, float]:
-    """Return the fractions by which roll, pitch and path angle approach their demands in one tick of ``dt`` s."""
+    """Return the fractions by which roll, pitch and path angle approach their demands in one tick of ``dt`` s.
+
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    dt: duration of a tick, s.
+    """
     return (
         1.0 - math.exp(-dt / (ROLL_LAG_RATIO * parameters.roll_time)),
         1.0 - math.exp(-dt / (PITCH_LAG_RATIO * parameters.pitch_time)),
@@ -367,6 +371,9 @@ def _is_stage_complete(
     is_before_reaction: True while the engine failure is not yet noticed and the aircraft flies straight on.
     time: time since the start, s.
     arrival_radius: distance from the center, m, within which the aircraft has arrived at the loiter.
+    estimated: position and velocity over the ground, a `MOTION` record.
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record.
+    dt: duration of a tick, s.
     """
     if is_before_reaction:
         return time >= ENGINE_FAILURE_REACTION_S
@@ -434,6 +441,8 @@ def _is_target_reached(
     loiter: progress around the last loiter, a record of `flight.autopilots.return_steps.LOITER_PROGRESS`.
     arrival_radius: distance from the center, m, within which the aircraft has arrived at the loiter.
     dt: s since the last call.
+    estimated: position and velocity over the ground, a `MOTION` record.
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record.
     """
     if target.loiter_radius == 0.0:
         return memory.leg > 0
@@ -544,6 +553,13 @@ def _update_demands(
     excess_table: specific excess power, m/s, `PointMass.excess`.
     eas2tas: ratio of true to equivalent airspeed.
     is_gliding: True while the aircraft flies its RTL without an engine.
+    state: attitude, airspeed and rates of the aircraft, a `STATE` record.
+    estimated: position and velocity over the ground, a `MOTION` record.
+    waypoints: `WAYPOINT` records, (w,).
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record.
+    aircraft: the point mass, a `POINT_MASS` record.
+    dt: duration of a tick, s.
     """
     target = waypoints[1]
     navigate_legs(estimated, waypoints[: 2 if target.loiter_radius != 0.0 else 3], parameters, memory, eas2tas, dt)

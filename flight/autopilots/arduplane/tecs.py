@@ -23,6 +23,7 @@ def nav_roll(lateral_acceleration: float, pitch: float, parameters: Record) -> f
     Follows `AP_L1_Control::nav_roll_cd`.
 
     pitch: rad.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
     """
     cos_pitch = math.cos(min(math.radians(60.0), max(-math.radians(60.0), pitch)))
     bank = math.atan(lateral_acceleration / (GRAVITY * cos_pitch))
@@ -36,6 +37,8 @@ def min_airspeed(bank: float, parameters: Record) -> float:
     The minimum is AIRSPEED_MIN times the square root of the turn's load factor. If AIRSPEED_STALL is stated, the
     minimum is AIRSPEED_STALL times this root, but at least AIRSPEED_MIN. Without stall prevention the minimum is
     AIRSPEED_MIN.
+
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
     """
     if parameters.stall_prevention <= 0.0:
         return parameters.airspeed_min
@@ -65,6 +68,7 @@ def limited_nav_roll(lateral_acceleration: float, pitch: float, airspeed: float,
 
     pitch: rad.
     airspeed: equivalent, m/s.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
     """
     bank = nav_roll(lateral_acceleration, pitch, parameters)
     if parameters.stall_prevention <= 0.0:
@@ -358,8 +362,9 @@ def _is_bad_descent(parameters: Record, memory: Record, ste_error: float, ste_ra
 
     Follows `AP_TECS::_detect_bad_descent`. A bad descent lasts until the STE error is no longer positive.
 
-    ste_error: m^2/s^2.
-    ste_rate: m^2/s^3.
+    ste_error, ste_rate: error (m^2/s^2) and rate (m^2/s^3) of the specific total energy.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record.
     """
     if memory.bad_descent and ste_error > 0.0:
         return True
@@ -383,9 +388,13 @@ def _update_throttle(
 
     Follows `AP_TECS::_update_throttle_with_airspeed`.
 
-    ste_error: m^2/s^2.
+    ste_error: error of the specific total energy (STE), m^2/s^2.
     ste_rate_demand, ste_rate: m^2/s^3.
     ste_rate_max, ste_rate_min: STE rates at full and at idle throttle, m^2/s^3.
+    state: attitude, airspeed and rates of the aircraft, a `STATE` record.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record.
+    dt: duration of a tick, s.
     """
     # There is no reverse thrust (`Plane::apply_throttle_limits`).
     throttle_min, throttle_max = max(0.0, parameters.throttle_min), parameters.throttle_max
@@ -423,6 +432,9 @@ def wind_up_ste_integrator(parameters: Record, memory: Record) -> None:
 
     `AP_TECS::_update_throttle_with_airspeed` does so at every update of a take-off and of an aborted landing. Therefore
     the throttle stays open for a while afterwards.
+
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record.
     """
     throttle_min, throttle_max = max(0.0, parameters.throttle_min), parameters.throttle_max
     integrator_limit = _STE_INTEGRATOR_FRACTION * (throttle_max - throttle_min)
@@ -450,6 +462,9 @@ def _update_pitch_integrators(
     seb_rate_demand_total: SEB rate demand without integrators, m^2/s^3.
     seb_change, ske_change: changes of the integrators in this update, m^2/s^3.
     pitch_min, pitch_max: rad.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record.
+    dt: duration of a tick, s.
     """
     seb_rate_per_pitch = memory.tas * GRAVITY
     seb_max = (pitch_max + _PITCH_OVERSHOOT_RAD) * seb_rate_per_pitch - seb_rate_demand_total

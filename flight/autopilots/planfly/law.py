@@ -162,6 +162,7 @@ def guide(
     gains: a `flight.guidance.gains.GAINS` record.
     memory: a `flight.guidance.inner_loops.GUIDANCE_MEMORY` record.
     commands: a `flight.dynamics.state.COMMANDS` record.
+    dt: duration of a tick, s.
     """
     course = find_on_path(estimated, pieces, memory)
     memory.speed_command = waypoints[memory.leg].airspeed
@@ -194,6 +195,7 @@ def _cross_track_bank_command(
     pieces: straight and circular pieces of the reference path.
     gains, memory: gains of the control law, and its `GUIDANCE_MEMORY` record, which is updated.
     course: course of the path at the aircraft, rad.
+    dt: duration of a tick, s.
     """
     speed = max(_MIN_GROUND_SPEED_MPS, math.hypot(estimated.velocity_east, estimated.velocity_north))
     ground_course = math.atan2(estimated.velocity_east, estimated.velocity_north)
@@ -266,6 +268,8 @@ def _roll_offset_correction(
     turn_acceleration: acceleration to the right for the path ahead, m/s^2.
     speed: ground speed, m/s.
     crab: cosine of the angle between heading and ground course.
+    gains: gains of the control law and of the aircraft, a `GAINS` record.
+    dt: duration of a tick, s.
     """
     memory.path_bank, memory.path_bank_rate, _ = step_roll_model(
         math.atan(turn_acceleration / (GRAVITY * crab)), memory.path_bank, memory.path_bank_rate, gains, dt
@@ -322,7 +326,11 @@ def _lateral_correction(
 
 @inner
 def _pressure_ratio(state: Record, gains: Record) -> float:
-    """Return the ratio of the dynamic pressure to the dynamic pressure at the reference airspeed."""
+    """Return the ratio of the dynamic pressure to the dynamic pressure at the reference airspeed.
+
+    state: attitude, airspeed and rates of the aircraft, a `STATE` record.
+    gains: gains of the control law and of the aircraft, a `GAINS` record.
+    """
     return (state.airspeed / gains.reference_airspeed) ** 2
 
 

@@ -160,9 +160,9 @@ def control_as_px4(
     """Compute the commands for one tick of ``dt`` seconds, and update ``guidance`` and ``memory``.
 
     wind_east, wind_north: velocity of the air, m/s.
-    guidance: a record of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.
-    parameters: a record of `flight.autopilots.px4.parameters.PX4_PARAMETERS`.
-    memory: a record of `flight.autopilots.px4.law.PX4_MEMORY`.
+    guidance: memory of the inner loops and progress on the path, a `GUIDANCE_MEMORY` record.
+    parameters: PX4's parameters, a `PX4_PARAMETERS` record.
+    memory: memory of the control law between ticks, a `PX4_MEMORY` record.
     state: attitude, airspeed and rates of the aircraft, a `STATE` record.
     estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
     pieces, nodes: course and altitude profile of the reference path, arrays of a `FlyByPath`.
@@ -202,6 +202,10 @@ def update_roll_setpoint(parameters: Record, memory: Record, dt: float) -> None:
     """Move the roll setpoint towards the bank for the lateral acceleration, at a limited rate.
 
     The limit is FW_PN_R_SLEW_MAX.
+
+    parameters: PX4's parameters, a `PX4_PARAMETERS` record.
+    memory: memory of the control law between ticks, a `PX4_MEMORY` record.
+    dt: duration of a tick, s.
     """
     max_roll_step = parameters.roll_slew_rate * dt
     limited_roll = roll_setpoint(memory.lateral_acceleration, parameters)

@@ -38,7 +38,10 @@ _MIN_EXIT_DISTANCE_RATIO = 1.05
 
 @inner
 def acceptance_radius_at(ground_speed: float, parameters: Record) -> float:
-    """Return the acceptance radius of a waypoint at a ground speed (m/s), m (`get_acceptance_radius`)."""
+    """Return the acceptance radius of a waypoint at a ground speed (m/s), m (`get_acceptance_radius`).
+
+    parameters: PX4's parameters, a `PX4_PARAMETERS` record.
+    """
     radius: float = parameters.acceptance_radius
     if parameters.uses_switch_distance:
         radius = max(radius, switch_distance(ground_speed, parameters))
@@ -51,6 +54,8 @@ def _altitude_acceptance_radius(target: Record, parameters: Record) -> float:
 
     The tolerance is infinite in a landing sequence (`setActiveMissionItems`), NAV_FW_ALTL_RAD before a landing, and
     otherwise NAV_FW_ALT_RAD. Follows `Navigator::get_altitude_acceptance_radius`.
+
+    parameters: PX4's parameters, a `PX4_PARAMETERS` record.
     """
     if target.ignores_altitude:
         return math.inf
@@ -64,6 +69,9 @@ def is_past_waypoint(estimated: Record, target: Record, memory: Record) -> bool:
 
     It is past the end if it has crossed the vertical plane through the end that is perpendicular to the leg. The result
     is False for a leg without length.
+
+    estimated: estimated position and velocity over the ground, a `MOTION` record.
+    memory: memory of the control law between ticks, a `PX4_MEMORY` record.
     """
     leg_east, leg_north = target.east - memory.from_east, target.north - memory.from_north
     distance_past = (estimated.east - target.east) * leg_east + (estimated.north - target.north) * leg_north
@@ -109,7 +117,11 @@ def navigate(
 
 @inner
 def find_target(waypoints: Records, memory: Record) -> int:
-    """Return the index of the target: the next waypoint that is not a gate."""
+    """Return the index of the target: the next waypoint that is not a gate.
+
+    waypoints: `WAYPOINT` records of the route, (w,).
+    memory: memory of the control law between ticks, a `PX4_MEMORY` record.
+    """
     target_index: int = memory.leg + 1
     while waypoints[target_index].is_gate:
         target_index += 1
@@ -122,6 +134,8 @@ def _is_past_gate(estimated: Record, gate: Record, target: Record) -> bool:
 
     It is past the gate if it has crossed the vertical plane through the gate that is perpendicular to the course from
     the gate to the target.
+
+    estimated: estimated position and velocity over the ground, a `MOTION` record.
     """
     normal_east, normal_north = target.east - gate.east, target.north - gate.north
     distance_past = (estimated.east - gate.east) * normal_east + (estimated.north - gate.north) * normal_north
@@ -134,6 +148,7 @@ def _update_time_since_reached(memory: Record, is_reached: bool, dt: float) -> N
 
     memory: `PX4_MEMORY` record with the time.
     is_reached: True if the aircraft is at the target in this tick.
+    dt: duration of a tick, s.
     """
     has_reached = memory.time_since_reached > 0.0 or is_reached
     memory.time_since_reached = memory.time_since_reached + dt if has_reached else 0.0
@@ -160,6 +175,7 @@ def _navigate_waypoint(
     waypoints, target_index: `WAYPOINT` records of the route, (w,), and the index of the waypoint.
     wind_east, wind_north, target_airspeed: velocity of the air and airspeed to fly at, m/s.
     parameters, memory: PX4's parameters, and the control law's memory, which is updated.
+    dt: duration of a tick, s.
     """
     target = waypoints[target_index]
     ground_speed = math.hypot(estimated.velocity_east, estimated.velocity_north)
@@ -221,6 +237,7 @@ def _navigate_loiter(
     waypoints, loiter: `WAYPOINT` records of the route, (w,), and the one on the loiter.
     wind_east, wind_north, target_airspeed: velocity of the air and airspeed to fly at, m/s.
     parameters, memory: PX4's parameters, and the control law's memory, which is updated.
+    dt: duration of a tick, s.
     """
     ground_speed = math.hypot(estimated.velocity_east, estimated.velocity_north)
     distance = math.hypot(loiter.centre_east - estimated.east, loiter.centre_north - estimated.north)
@@ -261,7 +278,11 @@ def _navigate_loiter(
 
 @inner
 def is_last_target(waypoints: Records, memory: Record) -> bool:
-    """Return True if the target is the last target of the route; waypoints on one loiter are one target."""
+    """Return True if the target is the last target of the route; waypoints on one loiter are one target.
+
+    waypoints: `WAYPOINT` records of the route, (w,).
+    memory: memory of the control law between ticks, a `PX4_MEMORY` record.
+    """
     target_index = find_target(waypoints, memory)
     target = waypoints[target_index]
     return target_index + 1 >= waypoints.shape[0] or (target.loiter_radius != 0.0 and waypoints[-1].stop == target.stop)
@@ -283,6 +304,8 @@ def _is_on_exit_course(estimated: Record, next_waypoint: Record, loiter: Record)
 
     The tolerance is `EXIT_COURSE_TOLERANCE_RAD`. The result is also True if the waypoint is so close to the loiter's
     center that the course never points to it.
+
+    estimated: estimated position and velocity over the ground, a `MOTION` record.
     """
     next_east, next_north = _setpoint_position(next_waypoint)
     if math.hypot(next_east - loiter.centre_east, next_north - loiter.centre_north) <= _MIN_EXIT_DISTANCE_RATIO * abs(
@@ -424,7 +447,10 @@ def begin_leg(estimated: Record, waypoints: Records, leg: int, memory: Record) -
 
 @inner
 def is_past_corner(estimated: Record, corner: Record) -> bool:
-    """Return True if an aircraft on a loiter has passed a corner of the loiter by less than 90 degrees."""
+    """Return True if an aircraft on a loiter has passed a corner of the loiter by less than 90 degrees.
+
+    estimated: estimated position and velocity over the ground, a `MOTION` record.
+    """
     corner_bearing = math.atan2(corner.east - corner.centre_east, corner.north - corner.centre_north)
     bearing = math.atan2(estimated.east - corner.centre_east, estimated.north - corner.centre_north)
     angle_past = wrap(bearing - corner_bearing) * math.copysign(1.0, corner.loiter_radius)
@@ -440,6 +466,7 @@ def foh_altitude(end_east: float, end_north: float, end_up: float, lead_distance
     end.
 
     end_east, end_north, end_up: end of the leg, m.
+    memory: memory of the control law between ticks, a `PX4_MEMORY` record.
     """
     leg_length = math.hypot(end_east - memory.from_east, end_north - memory.from_north)
     min_distance = min(memory.min_distance_to_end, leg_length)

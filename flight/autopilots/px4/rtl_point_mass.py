@@ -237,11 +237,11 @@ def fly_rtl(
 ) -> None:
     """Simulate an RTL for up to ``timeout`` s, and fill the `RETURN_RESULT` ``result``.
 
-    waypoints: the start, then the loiter at the RTL's end, or the stops of a landing sequence and the landing.
+    start, waypoints: `RETURN_START` record; `WAYPOINT` records of the start, then the loiter or the landing sequence.
     transit_altitude: altitude to which an RTL to a landing sequence climbs first, m AMSL.
     min_clearance, min_distance: height above ground and distance outside spheres, m, below which the RTL is aborted.
     positions: array (t, 3), m, to fill with one position per second until it is full.
-    excesses, power, field: tables of a `flight.autopilots.point_mass.PointMass`.
+    aircraft, excesses, power, field: record and tables of a `flight.autopilots.point_mass.PointMass`.
     """
     motions, states, memories = np.zeros(1, MOTION), np.zeros(1, STATE), np.zeros(1, PX4_MEMORY)
     progress_records = np.zeros(1, LOITER_PROGRESS)
@@ -296,6 +296,10 @@ def _update_arrival(
     lands: True for an RTL to a landing sequence.
     has_begun_sequence: True once the aircraft flies this sequence.
     time: time since the start, s.
+    estimated: position and velocity over the ground, a `MOTION` record.
+    waypoints: `WAYPOINT` records, (w,).
+    memory: memory of the control law between ticks, a `PX4_MEMORY` record.
+    result: `RETURN_RESULT` record, which is updated.
     """
     if lands:
         has_arrived = has_begun_sequence and memory.leg + 2 >= waypoints.shape[0]

@@ -24,6 +24,10 @@ def update_altitude_reference(parameters: Record, memory: Record, dt: float) -> 
 
     The reference climbs at most at FW_T_CLMB_R_SP and sinks at most at FW_T_SINK_R_SP.  It decelerates at
     FW_T_VERT_ACC, early enough not to overshoot the setpoint.
+
+    parameters: PX4's parameters, a `PX4_PARAMETERS` record.
+    memory: memory of the control law between ticks, a `PX4_MEMORY` record.
+    dt: duration of a tick, s.
     """
     altitude_error = memory.altitude_setpoint - memory.altitude_reference
     rate_towards_setpoint = min(
@@ -79,6 +83,9 @@ def update_tecs(
     estimated: a record of `flight.guidance.navigation_error.MOTION`.
     airspeed_setpoint: equivalent airspeed, m/s.
     eas_to_tas: ratio of true to equivalent airspeed.
+    parameters: PX4's parameters, a `PX4_PARAMETERS` record.
+    memory: memory of the control law between ticks, a `PX4_MEMORY` record.
+    dt: duration of a tick, s.
     """
     update_altitude_reference(parameters, memory, dt)
     update_airspeed_filter(state.airspeed, parameters, memory, dt)
@@ -141,6 +148,7 @@ def detect_underspeed(equivalent_airspeed: float, parameters: Record) -> float:
     The ratio is 0 above the underspeed threshold and rises to 1 below it.
 
     equivalent_airspeed: m/s.
+    parameters: PX4's parameters, a `PX4_PARAMETERS` record.
     """
     ramp_width = _UNDERSPEED_FRACTION * parameters.airspeed_trim
     start_airspeed = max(0.0, parameters.airspeed_min - ramp_width)
@@ -219,6 +227,11 @@ def _calc_throttle_control(
     min_sink_rate: sink rate at idle throttle, m/s.
     underspeed_ratio: 0 in normal flight to 1 in full underspeed.
     eas_to_tas: ratio of true to equivalent airspeed.
+    state: attitude, airspeed and rates of the aircraft, a `STATE` record.
+    estimated: estimated position and velocity over the ground, a `MOTION` record.
+    parameters: PX4's parameters, a `PX4_PARAMETERS` record.
+    memory: memory of the control law between ticks, a `PX4_MEMORY` record.
+    dt: duration of a tick, s.
     """
     ste_rate_max, ste_rate_min = GRAVITY * parameters.max_climb_rate, -GRAVITY * min_sink_rate
     load_factor_correction = parameters.load_factor_correction * (1.0 / max(0.1, math.cos(state.roll)) - 1.0)

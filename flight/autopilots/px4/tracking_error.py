@@ -26,8 +26,12 @@ from world.wind import W20, Turbulence
 _SETTLED_CROSS_TRACK_M = 2.0
 # ... for this time, s.
 _SETTLED_TIME_S = 8.0
-# Length of the legs before and after a turn, m; the simulations end there at the latest.
+# Length of the legs before and after a turn, m.
 _LEG_LENGTH_M = 4000.0
+# Fraction of the second leg after which a simulation ends at the latest.
+_MAX_DISTANCE_FRACTION = 0.75
+# Time after which a simulation ends at the latest, s.
+_TIMEOUT_S = 120.0
 # Distance before the earliest turn at which the simulations begin, m.
 _RUN_IN_M = 200.0
 # Time step of the simulations, s.
@@ -162,6 +166,9 @@ def _measure_corners(
     airspeed: equivalent airspeed, m/s.
     turn_angles: rad.
     ground_speeds: m/s.
+    parameters: PX4's parameters, a `PX4_PARAMETERS` record.
+    corners: `CORNER_TRACKING` records (turns, speeds) to fill.
+    waypoints: scratch, three `WAYPOINT` records.
     """
     for i in range(turn_angles.size):
         for j in range(ground_speeds.size):
@@ -204,7 +211,7 @@ def _fly_corner(
     excursion = 0.0
     settled_distance = 0.0
     distance_along = -1.0
-    while distance_along < 0.75 * _LEG_LENGTH_M and time < 120.0:
+    while distance_along < _MAX_DISTANCE_FRACTION * _LEG_LENGTH_M and time < _TIMEOUT_S:
         estimated.velocity_east, estimated.velocity_north = (
             ground_speed * math.sin(course),
             ground_speed * math.cos(course),
