@@ -241,6 +241,7 @@ def angle_of_attack(state: Record, aircraft: Record) -> float:
     state: attitude, airspeed and rates of the aircraft, a `STATE` record.
     aircraft: the point mass, a `POINT_MASS` record.
     """
+    # The cosine is limited, to keep the load factor finite at extreme banks.
     load_factor = 1.0 / max(0.3, math.cos(state.roll))
     return aircraft.alpha + aircraft.alpha_lift * load_factor / (state.airspeed * state.airspeed)
 

@@ -207,7 +207,13 @@ def step(frame: Record, numbers: Floats, code: Code, contacts: Records, friction
 
 @inner
 def _integrate(frame: Record) -> None:
-    """Integrate attitude and rates by Euler's method, velocity and position by the Adams-Bashforth method."""
+    """Integrate the motion over one time step, in inertial axes.
+
+    Attitude and rates are integrated by Euler's method, the velocity by the Adams-Bashforth method of second order, and
+    the position by that of third order.
+
+    frame: state and derivatives of the motion, a `FRAME` record; updated.
+    """
     dt = frame.dt
     real_part = frame.attitude_real + dt * frame.attitude_rate_real
     vector_part = add(vector_of(frame.attitude), scale(dt, vector_of(frame.attitude_rate)))
@@ -291,7 +297,12 @@ def _update_motion(frame: Record) -> None:
 
 @inner
 def _update_gravity(frame: Record) -> None:
-    """Compute the gravity of the oblate earth, ft/s^2, in axes fixed to the earth."""
+    """Compute the gravity of the oblate earth, ft/s^2, in axes fixed to the earth.
+
+    It is the central gravity with the correction of its second zonal harmonic J2.
+
+    frame: position and gravity, a `FRAME` record; updated.
+    """
     radius = frame.radius
     sin_lat = math.sin(frame.geocentric_latitude)
     ratio = SEMI_MAJOR / radius

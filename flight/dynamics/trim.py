@@ -141,7 +141,10 @@ _MAX_STALLED_STEPS = 10
 
 
 def first_guess(airspeed: float) -> Floats:
-    """Return a trim vector near level flight at an airspeed (m/s), (8,)."""
+    """Return a trim vector near level flight at an airspeed (m/s), (8,).
+
+    The angle of attack is 0.06 rad, the elevator -0.15 rad (up), the throttle 0.8, and all other elements are 0.
+    """
     return np.array([airspeed, 0.0, 0.06, 0.0, -0.15, 0.0, 0.0, 0.8])
 
 
@@ -209,7 +212,8 @@ def solve_trim(
     start: first guess, (8,); None for level flight at 25 m/s.
 
     The method is Newton's method with one-sided differences. Each step is limited to `_MAX_NEWTON_STEP`, and halved
-    while it does not reduce the residual.
+    while it does not reduce the residual. If the iteration ends without convergence, a residual of up to 10 times that
+    of a converged trim is accepted.
     """
     values = (first_guess(25.0) if start is None else start).copy()
     for quantity, value in fixed_values.items():
@@ -254,6 +258,8 @@ def solve_trim(
 
 def _trim_bounds(limits: tuple[float, float, float]) -> tuple[Floats, Floats]:
     """Return the lower and the upper bounds of a trim vector, each (8,).
+
+    The elements are airspeed (m/s), climb, angle of attack, bank, elevator, aileron, rudder (rad) and throttle.
 
     limits: elevator, aileron and rudder limits, rad.
     """
@@ -380,7 +386,7 @@ def linearise(simulator: Simulator, trim_point: Trim) -> tuple[Floats, Floats]:
     commands = np.array(trim_point.commands())
 
     def difference_quotient(index: int, vector: Floats, rate: Callable[[Floats], Floats]) -> Floats:
-        """Return the central difference quotient of a rate for one element of a vector."""
+        """Return the central difference quotient of a rate for one element of a vector, over +-1e-4 (SI units)."""
         lower, upper = vector.copy(), vector.copy()
         lower[index] -= 1e-4
         upper[index] += 1e-4

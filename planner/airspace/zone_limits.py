@@ -168,6 +168,7 @@ def make_airspace(scenario: Scenario, margins: ZoneMargins, buffer: float) -> Pl
     depths.setflags(write=False)
     buffers = [buffer, buffer]
     if max_height is not None and terrain is not None:
+        # 1 cm less, against rounding.
         headrooms = max_height - (ends[:, 2] - terrain.height(ends[:, 0], ends[:, 1])) - 0.01
         buffers = [
             buffer if headroom >= buffer else margins.end_fraction * max(0.0, float(headroom)) for headroom in headrooms

@@ -216,6 +216,10 @@ def _segment_distance(threats: Records, start: Floats, end: Floats, min_distance
     return min_distance
 
 
+# Distance of the added points from the ends of the path, m; only the courses to them matter.
+_END_POINT_DISTANCE_M = 1e4
+
+
 @compiled
 def with_end_course_points(data: ProblemArrays, path: Floats) -> Floats:
     """Add a point at each end of a path (w, 3), to measure the turns from and to the end courses.
@@ -236,8 +240,8 @@ def with_end_course_points(data: ProblemArrays, path: Floats) -> Floats:
             for axis in range(2):
                 out[added_row, axis] = 2.0 * path[end_row, axis] - path[neighbour_row, axis]
         else:
-            out[added_row, 0] += sign * 1e4 * math.sin(course)
-            out[added_row, 1] += sign * 1e4 * math.cos(course)
+            out[added_row, 0] += sign * _END_POINT_DISTANCE_M * math.sin(course)
+            out[added_row, 1] += sign * _END_POINT_DISTANCE_M * math.cos(course)
     return out
 
 

@@ -225,6 +225,7 @@ def score_missiles(
             vertical_drop + lateral_offset > CORNER_TOLERANCE_M
             or min(gaps[i - 1].at_end, gaps[i].at_beginning) < vertical_drop + lateral_offset
         )
+        # A deviation below 1 cm is ignored.
         if vertical_drop + lateral_offset < 0.01 or not (is_near_ground or is_near_missile):
             continue
         if data.tracking.has_error:

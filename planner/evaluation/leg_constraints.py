@@ -227,6 +227,7 @@ def _min_slope_limit(data: ProblemArrays, air_angles: Floats) -> float:
     speed, air_angle = data.aircraft.airspeed, math.inf
     for k in range(air_angles.size):
         air_angle = min(air_angle, air_angles[k])
+    # A headwind of about the airspeed leaves no ground speed, so that no slope is defined.
     if not air_angle > 0.0 or wind >= 0.99 * speed * math.cos(air_angle):
         return -1.0
     return math.atan2(speed * math.sin(air_angle), speed * math.cos(air_angle) + wind)

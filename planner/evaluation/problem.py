@@ -380,6 +380,8 @@ def _certified_arrays(scenario: Scenario, limits: Limits, terrain: Terrain) -> P
         clearance=float(limits.min_clearance),
         buffer=buffer,
         kill_margin=CERTIFIED_KILL_MARGIN_M + limits.reserve_threats,
+        # Less than half the spacing of the elevation data, so that no cell is skipped; limited for very fine or coarse
+        # data.
         sample_spacing=min(50.0, max(15.0, 0.4 * terrain.spacing)),
         start_course=_none_to_nan(scenario.start_course),
         destination_course=_none_to_nan(scenario.destination_course),
@@ -490,6 +492,7 @@ def _end_buffer(terrain: Terrain, limits: Limits, point: Floats, buffer: float, 
     fraction: 0 to 1.
     """
     height_above_ground = float(point[2] - terrain.height(point[0], point[1]))
+    # 1 cm less, against rounding.
     available_height = height_above_ground - limits.min_clearance - 0.01
     return buffer if available_height >= buffer else fraction * max(0.0, available_height)
 

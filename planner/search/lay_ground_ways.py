@@ -193,6 +193,7 @@ class _Site:
     def slopes(self, course: float, amsl: float) -> tuple[float, float]:
         """Return the climb and the dive slope (m per m) to plan with on a course (rad) at an altitude (m AMSL)."""
         certified_slopes = aircraft_slopes(self.problem.certified.aircraft, course, amsl)
+        # Slopes stay 1.1 times the angle margin below a limit: the margin of the certificate, and 10 % for rounding.
         stated_limits = (self.limits.max_climb, self.limits.max_dive)
         slopes = []
         for aircraft_slope, certified_slope, stated_limit in zip(
@@ -224,6 +225,7 @@ class _Site:
             ground than required.
         """
         data = self.problem.certified
+        # Near a low end, three quarters of the available height are required; 1 cm less, against rounding.
         start_buffer, end_buffer = (
             min(data.buffer, 0.75 * max(0.0, self.height_above_ground(point) - data.clearance - 0.01))
             for point in end_points

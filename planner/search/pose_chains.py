@@ -114,6 +114,7 @@ class TurnLengths(NamedTuple):
 
         For a turn beyond the end of the table, return about the lengths of the table's sharpest turn.
         """
+        # Just before the last entry, so that an entry follows.
         position = min(turn / TURN_STEP_RAD, len(self.before) - 1.001)
         index = int(position)
         fraction = position - index

@@ -183,6 +183,7 @@ def _add_kill_cost(
             for y in range(first_y, last_y + 1):
                 distance2 = plane_distance2 + (across[y] - obstacle.across) ** 2
                 if distance2 < radius * radius:
+                    # From KILL_COST at the surface to three times as much at the centre.
                     cell_costs[z, y] += KILL_COST * (3.0 - 2.0 * math.sqrt(distance2) / radius)
 
 

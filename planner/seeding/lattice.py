@@ -352,6 +352,7 @@ def turning_step(data: ProblemArrays) -> float:
     path = np.column_stack([square, np.full(4, data.start[2])])
     turns, rolls = turn_and_roll_lengths(data, path)
     turn_length = float(turns[1] + rolls[1])
+    # Settling depends on the length of the leg, which is about a tenth longer than the turns.
     return min(MAX_STEP_M, max(MIN_STEP_M, turn_length + settling_length(turn_length, 1.1 * turn_length)))
 
 
@@ -364,6 +365,7 @@ def make_lattice(data: ProblemArrays, frame: RotatedFrame, step: float) -> Latti
     corners = [(east, north, 0.0) for east in (data.west, data.east) for north in (data.south, data.north)]
     min_corner, max_corner = frame.to_frame(corners)[:, :2].min(axis=0), frame.to_frame(corners)[:, :2].max(axis=0)
     level_point = np.array([*data.destination[:2], data.start[2]])
+    # The lower of the climb and the descent limit on the direct course, but at least 0.01 rad.
     gentler_slope = math.tan(max(0.01, min(slope_limits(data, np.array(data.start), level_point))))
     min_altitude = max(data.floor, float(np.nanmin(data.heights)) + data.clearance)
     stages = max(1, math.ceil(frame.length / step))

@@ -294,9 +294,8 @@ def _continue_search(
 ) -> _State:
     """Continue a search up to `pause_count` evaluations, or to its end at `max_evaluations`.
 
-    frames: origin and rotation of the frame in which each waypoint moves.
     moves, initial_steps: moves, (k, d), and their initial sizes, (k,).
-    state: state of the search; its vectors are overwritten.
+    frames, state: frame in which each waypoint moves, and state of the search, whose vectors are overwritten.
     """
     best_vector, best_merit, feasible_vector, feasible_merit, round_start, steps, move, has_moved, evaluations, _ = (
         state
@@ -341,6 +340,7 @@ def _continue_search(
                     break
                 steps[k] = -steps[k]
             if k < moves.shape[0]:
+                # A successful move grows, an unsuccessful one shrinks.
                 steps[k] *= 1.5 if is_better else 0.5
                 has_moved = True
         move = 0

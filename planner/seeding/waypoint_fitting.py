@@ -80,6 +80,7 @@ def penalised_leg_cost(data: ProblemArrays, limits: PrecomputedLimits, a: Floats
         max(0.0, -depth_below),
     )
     if exposure > 0.0:
+        # At least a tenth of the full cost, so that even a slight exposure is avoided.
         total += KILL_COST * length * min(1.0, 0.1 + exposure)
     if total > max_cost:
         return total
@@ -192,6 +193,7 @@ def fit_waypoints(
     """
     edges = np.linspace(0.0, frame.length, waypoints - 1)
     interval = edges[1] - edges[0]
+    # Candidates keep a tenth of the interval from both of its ends, so that neighbours stay apart.
     fractions = np.linspace(0.1, 0.9, fit.candidates)
     along = edges[:-1, None] + fractions * interval
     points = np.stack([along, *(np.interp(along, route[:, 0], route[:, axis]) for axis in (1, 2))], axis=-1)

@@ -698,6 +698,7 @@ def read_loiter_radius(loiter: Loiter) -> float:
         return abs(loiter.radius)
     stated_radius = float(math.floor(abs(loiter.radius)))
     if not (loiter.endless or loiter.to_altitude) and stated_radius > _MAX_BYTE_RADIUS_M:
+        # ArduPlane stores a larger radius in steps of 10 m.
         stated_radius = 10.0 * min(_MAX_BYTE_RADIUS_M, math.floor(stated_radius / 10.0))
     return stated_radius if stated_radius > _MAX_IGNORED_RADIUS_M else 0.0
 

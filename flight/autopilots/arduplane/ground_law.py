@@ -145,6 +145,8 @@ _HEADING_GAIN = 4.4428
 _MIN_ROTATION_PITCH_RAD = math.radians(5.0)
 # A take-off levels off only above this height over home, m.
 _MIN_LEVELING_HEIGHT_M = 10.0
+# A take-off levels off only at more than this climb rate, m/s.
+_MIN_LEVELING_CLIMB_RATE_MPS = 0.1
 # The approach begins within this angle of the landing line, rad ...
 _LINE_UP_ANGLE_RAD = math.radians(10.0)
 # ... and within this cross-track distance, m.
@@ -432,7 +434,7 @@ def _leveling_fraction(estimated: Record, parameters: Record, ground: Record) ->
     if (
         is_near_end
         and remaining_height > 0.0
-        and estimated.velocity_up > 0.1
+        and estimated.velocity_up > _MIN_LEVELING_CLIMB_RATE_MPS
         and estimated.up - ground.home_up >= _MIN_LEVELING_HEIGHT_M
     ):
         ground.leveling_height, ground.leveling_start = remaining_height, ground.time

@@ -224,7 +224,15 @@ def waypoint_ahead(start: Record) -> Records:
 
 
 def rtl_timeout(start: Record, stages: Records, aircraft: PointMass) -> float:
-    """Return the timeout of an RTL, s, from the distances and altitude changes between its stages."""
+    """Return the timeout of an RTL, s, from the distances and altitude changes between its stages.
+
+    Each leg is flown against the strongest wind, but at 5 m/s or more over the ground, with a lap of the loiter at its
+    end. The altitude changes by 2 m/s. The sum is multiplied by `TIMEOUT_RATIO`, and `TIMEOUT_BASE_S` is added.
+
+    start: position of the start, a `RETURN_START` record.
+    stages: `WAYPOINT` records of the RTL's stages, (n,).
+    aircraft: point mass of the aircraft in the wind.
+    """
     min_ground_speed = max(5.0, aircraft.record.airspeed - aircraft.record.max_wind)
     east = start["east"]
     north = start["north"]

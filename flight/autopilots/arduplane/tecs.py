@@ -25,6 +25,7 @@ def nav_roll(lateral_acceleration: float, pitch: float, parameters: Record) -> f
     pitch: rad.
     parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
     """
+    # ArduPlane limits the pitch to 60 degrees here.
     cos_pitch = math.cos(min(math.radians(60.0), max(-math.radians(60.0), pitch)))
     bank = math.atan(lateral_acceleration / (GRAVITY * cos_pitch))
     return min(parameters.roll_limit, max(-parameters.roll_limit, bank))
@@ -42,6 +43,7 @@ def min_airspeed(bank: float, parameters: Record) -> float:
     """
     if parameters.stall_prevention <= 0.0:
         return parameters.airspeed_min
+    # The bank is limited to 85 degrees, to keep the load factor finite.
     load_factor_root = 1.0 / math.sqrt(math.cos(min(math.radians(85.0), abs(bank))))
     if parameters.airspeed_stall > 0.0:
         return max(parameters.airspeed_min, parameters.airspeed_stall * load_factor_root)

@@ -118,6 +118,7 @@ def altitude_miss_probability(
     """
     if turbulence != "moderate":
         return 0.0
+    # Near the ground the deviation of vertical gusts is a tenth of the wind at 20 ft (MIL-F-8785C).
     gust_sigma, drift_rate = 0.1 * W20[turbulence], acceptance / _GUST_DURATION_S
     return (
         2.0 * _exceedance_probability(acceptance / _ALTITUDE_SIGMA_MODERATE_M)
