@@ -1,7 +1,7 @@
 """Measure zones and the maximum height above ground: violations for the search, margins for the certificate.
 
 A search adds to a path's scores the depth of its legs in zones (bounds) and their excess over the maximum height above
-ground (terrain), both in m x km; the paper's scores count pieces of legs instead. Each leg is first tested as a
+ground (terrain), both in m·km; the paper's scores count pieces of legs instead. Each leg is first tested as a
 whole with the largest lateral deviation of the flight, corners included, and cut into parts only where that test fails.
 A certificate measures the distance from each zone and the maximum height above ground of every piece of the path.
 """
@@ -153,7 +153,7 @@ def add_airspace_violations(
     lags: Records,
     violations: Record,
 ) -> None:
-    """Add a path's violations of zones and of the maximum height to a `VIOLATIONS` record, m x km.
+    """Add a path's violations of zones and of the maximum height to a `VIOLATIONS` record, m·km.
 
     path: (w, 3) m.
     legs, lags: `LEG` and `HEIGHT_LAG` records of the legs.
@@ -207,8 +207,9 @@ def add_airspace_violations(
 def airspace_excess(
     data: ProblemArrays, start: Floats, end: Floats, below: float, above: float, max_excess: float
 ) -> float:
-    """Return the zone penetration plus the excess height of a leg, integrated along the leg, m x km.
+    """Return the zone penetration plus the excess height of a leg, integrated along the leg, m·km.
 
+    start, end: (3,) ends of the leg, m.
     below, above: vertical tracking error, m.
     max_excess: value beyond which the integration stops.
     """
@@ -224,8 +225,9 @@ def airspace_excess(
 def _leg_zone_penetration(
     data: ProblemArrays, start: Floats, end: Floats, lateral: float, below: float, above: float
 ) -> float:
-    """Return the depth of a leg in zones enlarged by the tracking error, integrated along the leg, m x km.
+    """Return the depth of a leg in zones enlarged by the tracking error, integrated along the leg, m·km.
 
+    start, end: (3,) ends of the leg, m.
     lateral, below, above: tracking error, m.
     """
     zones = data.airspace.zones
@@ -276,11 +278,13 @@ def _swath_excess_height(
     above: float,
     max_excess: float,
 ) -> float:
-    """Return the excess of a line over the maximum height, integrated along it, m x km.
+    """Return the excess of a line over the maximum height, integrated along it, m·km.
 
     The excess is the largest of three lines: the line itself, and one line at the distance `lateral` (m) on each side.
 
     required: the maximum height, expressed as a clearance by `required_headroom`.
+    start, end: (3,) ends of the line, m.
+    above: largest height of the aircraft above the line, m.
     max_excess: value beyond which the computation stops; the result is then a lower bound above it. inf never stops.
     """
     horizontal_length = max(1e-9, math.hypot(end[0] - start[0], end[1] - start[1]))

@@ -153,6 +153,9 @@ def turn_length(fly_over: bool, corners: Records, i: int) -> float:
     """Return the length of leg i that its two turns take up, m.
 
     A fly-over turn takes up only the leg after it, where its track returns to the leg.
+
+    fly_over: True for fly-over waypoints.
+    corners: filled `CORNER` records (w,) of the path.
     """
     if not fly_over:
         return corners[i].after + corners[i + 1].before
@@ -218,8 +221,8 @@ def fly_by_vertices(
 def blended_vertices(blend: float, previous: Floats, waypoint: Floats, next_waypoint: Floats, radius: float) -> Floats:
     """Return vertices (k, 3) of a path past `waypoint` that is nowhere higher than the flown path.
 
-    blend: half length of a blend (`half_blend_length`).
-    radius: radius of the fly-by arc, m; 0 for none.
+    blend: half length of a blend (`half_blend_length`), m per unit of the slope's change.
+    previous, waypoint, next_waypoint: (3,) m. radius: radius of the fly-by arc, m; 0 for none.
 
     The vertices are the point on the leg where the blend of slopes begins, points along the arc between its tangent
     points, and the point on the next leg where the blend ends. The height changes linearly along the arc. Where the
@@ -283,6 +286,7 @@ def leg_parts_at_corner(
 ) -> Floats:
     """Return the parts of both legs next to `waypoint` as three vertices, (3, 3) m.
 
+    previous, waypoint, next_waypoint: (3,) m.
     length_before, length_after: lengths of the two parts, m, at most the length of the leg.
 
     The waypoint is the second vertex.

@@ -289,6 +289,9 @@ def _arc_radius(legs_hold_turns: bool, legs: Records, corners: Records, i: int) 
 
     The radius is 0 at the ends. It is also 0 if turns are limited only by a maximum angle and a leg is too short for
     its two turns. `planner.evaluation.corners.fly_by_radii` gives the radii of a whole path.
+
+    legs_hold_turns: True if legs must hold their turns, so that none is too short.
+    legs, corners: filled `LEG` records (w - 1,) and `CORNER` records (w,) of the path.
     """
     radius: float = corners[i].radius
     if math.isinf(corners[i].tangent):
@@ -317,6 +320,13 @@ def _measure_arcs(
 
     The flight deviates from the legs downwards by the blend of slopes, and sideways by at most R(1/cos(theta/2) - 1)
     plus the sagitta of a chord. It does so within the tangent and half the arc, or within the blend.
+
+    legs_hold_turns: True if legs must hold their turns.
+    fly_over: True for fly-over waypoints, which have no arc before them.
+    path: (w, 3) m.
+    legs, corners: filled `LEG` records (w - 1,) and `CORNER` records (w,) of the path.
+    flown: `FLOWN_CORNER` records (w,) to fill.
+    extents: (w,) array to fill: distance from each waypoint within which the flight leaves the legs, m.
     """
     start, second = path[0], path[1]
     slope_out = (second[2] - start[2]) / max(legs[0].run, 1e-6)

@@ -128,7 +128,7 @@ TERRAIN_LEG = np.dtype(
         ("next_fraction", np.float64),
         ("beginning", np.float64),
         ("ending", np.float64),
-        # Sum of depths below the required clearance, m x km; and smallest heights above it near both ends, m.
+        # Sum of depths below the required clearance, m·km; and smallest heights above it near both ends, m.
         ("depth", np.float64),
         ("height_at_beginning", np.float64),
         ("height_at_end", np.float64),

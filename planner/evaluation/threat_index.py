@@ -352,7 +352,9 @@ def _closest2(
     """Return the squared distance from a point to the part of a segment between two fractions, m^2.
 
     closest_fraction: fraction of the infinite line that is closest to the point.
-    dot, start2, length2: products of the segment and the vector from the point, as in `window_exposure`.
+    begin_fraction, end_fraction: limits of the part, 0 to 1.
+    dot, start2, length2: scalar products of the segment's vector d and the vector s from the point to the segment's
+        start: d.s, s.s and d.d, m^2.
     """
     fraction = closest_fraction if closest_fraction < end_fraction else end_fraction
     fraction = fraction if fraction > begin_fraction else begin_fraction

@@ -126,6 +126,9 @@ def make_travel_cost(
     The cost is the path's length, or its time or energy divided by the time or energy of a metre of level flight.
     Returns None for the objective energy if the aircraft's power is unknown.
 
+    table: performance of the aircraft at the airspeed of the path.
+    winds: wind of a forecast; without it, only the mean wind is used.
+
     >>> from planfly.workflow.uav import load_uav
     >>> from world.scenario import load_scenario
     >>> limits = load_uav(load_scenario("tight")).limits
@@ -314,6 +317,8 @@ def _time_energy_cost(
 ) -> tuple[float, bool]:
     """Return the cost of a leg's time and energy in the wind of one place, and True if the leg can be flown.
 
+    travel: weights of time and energy in the cost.
+    table: performance of the aircraft.
     leg: vector of the leg, m.
     x, y, amsl: place at which the wind is taken, m.
     """

@@ -330,7 +330,12 @@ def _join_altitudes(points: Sequence[MapPoint], altitudes: Floats) -> Floats:
 
 
 def _ground_profile(terrain: Terrain, start: MapPoint, course: float, length: float) -> tuple[Floats, Floats]:
-    """Return distances along a course, m, and the terrain altitude at each of them, m AMSL; NaN if unknown."""
+    """Return distances along a course, m, and the terrain altitude at each of them, m AMSL; NaN if unknown.
+
+    start: east and north of the first point, m.
+    course: rad.
+    length: length of the profile, m.
+    """
     distances = np.arange(0.0, length + _GROUND_SPACING_M, _GROUND_SPACING_M)
     east, north = start[0] + distances * math.sin(course), start[1] + distances * math.cos(course)
     return distances, terrain.height(east, north)
@@ -362,7 +367,13 @@ class _BestRejected:
 
 
 def _find_departure(site: _Site, launch: Launch) -> tuple[ClimbOut | None, str]:
-    """Return the shortest accepted departure, or None and the reason why no departure is accepted."""
+    """Return the shortest accepted departure, or None and the reason why no departure is accepted.
+
+    A departure may circle before it leads to the plan's first waypoint; the smallest number of laps is tried first.
+
+    site: plan, limits and terrain around home.
+    launch: launch of the scenario, which may prescribe a course.
+    """
     data, first_waypoint = site.problem.certified, site.plan.waypoints[0]
     home_altitude, start_altitude = float(site.home[2]), float(first_waypoint[2])
     takeoff_height = max(_MIN_TAKEOFF_HEIGHT_M, data.clearance + data.buffer + _CLEARANCE_EXCESS_M)
@@ -401,6 +412,9 @@ def _make_departure(
 ) -> ClimbOut | Certificate | None:
     """Make the departure over some points of the map; return it, or its certificate if it is rejected.
 
+    site: plan, limits and terrain around home.
+    course: launch course, rad.
+    points: east and north of the departure from home to the first waypoint, m.
     takeoff_altitude: altitude at the end of the take-off, m AMSL.
 
     Return None if the aircraft cannot climb to the first waypoint on this path.
@@ -575,7 +589,14 @@ class _Final(NamedTuple):
 
 
 def _find_approach(site: _Site, strip: LandingStrip, final_model: FinalModel) -> tuple[Descent | None, str]:
-    """Return the first accepted approach, or None and the reason why no approach is accepted."""
+    """Return the first accepted approach, or None and the reason why no approach is accepted.
+
+    The finals on all landing courses of the strip are tried in turn. An approach is accepted if a path leads from the
+    plan's last waypoint to the final, and if a go-around clears the ground.
+
+    site: plan, limits and terrain around the strip.
+    final_model: airspeed and slope at which the autopilot flies a final.
+    """
     field_altitude = float(site.terrain.height(strip.east, strip.north))
     point = np.array([strip.east, strip.north, field_altitude])
     landing_course = strip.landing_course(site.scenario.wind, field_altitude)

@@ -100,7 +100,9 @@ def _fill_column(
 def _closed_heights(zones: ZonesWithMargins, line: MapSegment, lateral: float, ground: float) -> _ClosedHeights:
     """Return the range of altitudes at which zones block a horizontal step, m AMSL.
 
+    line: horizontal line of the step.
     lateral: tracking error to add to the zones' margins, m.
+    ground: altitude of the ground at the start of the step, m, from which a zone's heights above ground are measured.
     """
     low, high = math.inf, -math.inf
     for z in range(zones.inclusions):
@@ -157,6 +159,8 @@ def _set_layer_costs(
 ) -> None:
     """Fill the cost per m of path in the cells of a stage; inf for a cell that no path may enter.
 
+    columns: `COLUMN` records (across,) of the stage, with the range of allowed altitudes.
+    obstacles: `OBSTACLE` records: kill spheres in the rotated frame.
     along: position of the stage, m.
     extra: (across,) additional cost per m.
     first_across, last_across: range of cells across, both included.

@@ -92,6 +92,8 @@ def _min_height(
 ) -> float:
     """Return the lowest allowed altitude in a cell, m: the highest of some ground samples plus the clearance.
 
+    required: required clearance.
+    along, across: position of the cell in the rotated frame, m.
     steps: steps between the 3 x 3 samples; with a step of 0 along the frame only the middle sample is taken.
 
     The result is inf outside the map or without data.
@@ -202,6 +204,9 @@ def set_cell_costs(
 ) -> None:
     """Fill the costs per m of cells of a stage.
 
+    required: required clearance.
+    stage: number of the stage.
+    obstacles: `OBSTACLE` records: kill spheres in the rotated frame.
     extra: (stages + 1, across) additional cost per m.
     first_across, last_across: range of the cells across, both included.
     cell_costs: (layers, across) array to fill.

@@ -31,7 +31,7 @@ from world.kernels import Record, Records, compiled, copy_into, inner
 TURN_PRICE = 2.0
 # Price of a slope violation, length ratio per unit of slope.
 SLOPE_PRICE = 20.0
-# Price of a terrain violation, length ratio per m x km.
+# Price of a terrain violation, length ratio per m·km.
 TERRAIN_PRICE = 0.5
 # Price of a bounds violation, length ratio per m.
 BOUNDS_PRICE = 1.0

@@ -270,6 +270,9 @@ def cheapest_passings(costs: GridCosts, grid: Grid, obstacles: Records, step: fl
 
     The sides are those of `passing_side`. A route passes an obstacle at the stage that is nearest to the obstacle's
     centre. An obstacle beyond the ends of the grid is not passed, and has the cost inf.
+
+    costs: costs of the cheapest routes from the start to each cell, and from there to the destination.
+    step: length of a step along the line, m.
     """
     passings = np.zeros((obstacles.shape[0], 4), dtype=PASSING)
     for k in range(obstacles.shape[0]):

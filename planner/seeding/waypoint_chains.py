@@ -194,7 +194,7 @@ def _extend_paths(
     step: 1 for paths from the start, -1 for paths from the destination.
     cost, link: (w, k) cost and neighbouring candidate of each partial path.
     max_cost: upper limit on the cost of a partial path.
-    open_ends: candidates of the previous waypoint with partial paths.
+    legs, open_ends: costs of legs (-x: x is a lower bound), and candidates of the previous waypoint with partial paths.
     """
     previous, evaluated_count, point = i - step, 0, candidates[i, k]
     if not max_cost > 0.0 or open_ends.size == 0:

@@ -21,7 +21,7 @@ from planner.seeding.grids import KILL_COST
 from world.arrays import Floats, Ints
 from world.kernels import compiled, inner
 
-# Cost of depth, in m of path per m x km.
+# Cost of depth, in m of path per m·km.
 DEPTH_COST = 2e4
 # Cost of slope excess, in m of path per unit of slope.
 SLOPE_COST = 1e6
