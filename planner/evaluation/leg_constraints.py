@@ -73,7 +73,11 @@ def clear_sums(sums: Record) -> None:
 
 @inlined
 def copy_point(source: Record, target: Record, size: int) -> None:
-    """Copy a point of each path of a block into another record."""
+    """Copy a point of each path of a block into another record.
+
+    source, target: records with one entry per path for east, north and up, m, and for raster column and row.
+    size: number of paths in the block.
+    """
     for b in range(size):
         target.east[b], target.north[b], target.up[b] = source.east[b], source.north[b], source.up[b]
         target.column[b], target.row[b] = source.column[b], source.row[b]
@@ -277,6 +281,8 @@ def _course_slope_limits(
 @compiled
 def slope_limits(data: ProblemArrays, start: Floats, end: Floats) -> tuple[float, float]:
     """Return the climb and dive limits of a leg, rad.
+
+    start, end: (3,) ends of the leg, m. A leg without horizontal length is taken to lead north.
 
     Each limit is the smallest limit at three altitudes of the leg, minus the margin `angle_margin`.
     """

@@ -135,7 +135,12 @@ def _score_block(
 
 @inlined
 def _find_ground(heights: Heights, size: int, block: Record) -> None:
-    """Interpolate the ground height at one point of each path of a block, as `pixel_height` does."""
+    """Interpolate the ground height at one point of each path of a block, as `pixel_height` does.
+
+    heights: ground heights by pixel, m.
+    size: number of paths in the block.
+    block: one point of each path of the block; the ground heights are stored in it, NaN off the raster.
+    """
     rows, columns = heights.shape
     flat = heights.reshape(heights.size)
     last_column, last_row = columns - 2.0, rows - 2.0

@@ -241,6 +241,9 @@ def _make_required_clearance(
 def clearance_at(required: RequiredClearance, east: float, north: float) -> float:
     """Return the required height above ground at a position, m.
 
+    required: clearance, and buffers at both ends and between them, m.
+    east, north: m.
+
     If an end has less than the full buffer, the buffer grows with the distance from this end.
     """
     # Without branches, so that loops over many points become vector instructions: an end with the full buffer never

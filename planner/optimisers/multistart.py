@@ -190,7 +190,14 @@ class Multistart(BoxSearch):
         *,
         initial: Floats | None = None,
     ) -> None:
-        """Start the first search if there are no first samples; the class documents the arguments."""
+        """Start the first search if there are no first samples.
+
+        lower, upper: (d,) box.
+        rank: function of scores (n, c) that returns their ranks (n,); smaller is better.
+        population: size of the largest generation.
+        rng: generator of random numbers.
+        initial: (n, d) first samples, which are evaluated before the first search; None for none.
+        """
         super().__init__(lower, upper, rank, population, rng, initial=initial)
         self._population = population
         self._centre, self._scale = np.full(lower.size, 0.5), None

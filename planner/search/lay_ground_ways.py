@@ -535,6 +535,8 @@ def _list_departures(
 ) -> Iterator[tuple[float, float, list[MapPoint]]]:
     """Yield the cost (m), launch course and points of departures from home to the plan's first waypoint.
 
+    site: plan, limits and terrain around home.
+    launches: the launches to try, with their courses.
     laps: number of laps in which the aircraft gains height.
     """
     first_waypoint, start_course = site.plan.waypoints[0], site.scenario.start_course
@@ -809,7 +811,13 @@ def _approach_altitudes(
 
 
 def _scale_slope(site: _Site, factor: float, is_descent: bool, altitude: float, course: float) -> float:
-    """Return `factor` times the climb slope, or the dive slope if `is_descent`, on a course (rad)."""
+    """Return a part of the climb slope, or of the dive slope, on a course, m per m.
+
+    factor: fraction of the slope.
+    is_descent: True for the dive slope.
+    altitude: m AMSL.
+    course: rad.
+    """
     return factor * site.slopes(course, altitude)[is_descent]
 
 
@@ -857,6 +865,7 @@ def _min_height_to_line_up(site: _Site, turn_point: Floats, line_up: Floats) -> 
     """Return the minimum height above ground between the end of a go-around's climb and the line-up, m.
 
     turn_point: end of the go-around's climb, (3,) m.
+    line_up: point at which the final begins, (3,) m.
 
     Returns -inf if the ground is unknown.
     """

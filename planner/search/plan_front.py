@@ -552,7 +552,11 @@ def _certify_distinct(
 
 
 def _drop_dominated(plans: list[FrontPlan], fourth: str, amounts: Floats) -> list[FrontPlan]:
-    """Return the plans that no other plan dominates and that differ noticeably from each other."""
+    """Return the plans that no other plan dominates and that differ noticeably from each other.
+
+    fourth: fourth objective, after length, exposure and clearance: "time" or "energy".
+    amounts: noticeable difference in each objective.
+    """
     objectives = np.array([_objective_row(plan, fourth) for plan in plans])
     indices = np.arange(len(objectives))
     # Keep the first of several equal plans.

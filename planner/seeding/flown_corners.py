@@ -211,8 +211,10 @@ def corner_point(
 ) -> None:
     """Compute the position of a sample of the flown corner at `waypoint`, and fill `out` (3,) with it.
 
+    previous_waypoint, waypoint, next_waypoint: (3,) m.
     radius: radius of the turn, m.
-    sample: number of the sample.
+    sample: number of the sample, from 0 to `SAMPLES_PER_CORNER` - 1.
+    out: (3,) m.
 
     A sample has the height of the leg, or of the arc between its tangent points.
     """

@@ -269,7 +269,8 @@ def _move_waypoints(
 def _pick_candidates(data: ProblemArrays, frames: WaypointFrames, candidates: Floats) -> tuple[Floats, int]:
     """Return the best candidate of each waypoint in the waypoint's frame, (w, 3), and the number of legs evaluated.
 
-    The ends are fixed.
+    frames: origin and rotation of the frame in which each waypoint moves.
+    candidates: (w, k, 3) candidates in these frames, m; the ends are overwritten with the fixed ends.
     """
     inner_count = len(candidates) - 2
     # An end has the frame of the waypoint next to it.

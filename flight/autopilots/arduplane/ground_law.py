@@ -502,6 +502,10 @@ def _begin_first_leg(
 def _tick_landing(work: Record, arduplane: Record, landing_point: Record) -> None:
     """Set the commands for one tick of the landing.
 
+    Navigation and TECS run every `NAVIGATION_TICK_S`, the attitude controllers in each tick.
+
+    work: state, commands and settings of the flight, a `WORKSPACE` record; updated.
+    arduplane: parameters and memories of the control law and of take-off and landing; updated.
     landing_point: record of `flight.guidance.lateral_reference_laws.WAYPOINT` for the landing point.
     """
     state = work.state

@@ -375,8 +375,11 @@ def _is_stage_complete(
 
     A stage is the flight straight ahead before the engine failure is noticed, the climb, or the leg to the target.
 
+    target: end of the leg, a `WAYPOINT` record.
     loiter: progress around the loiter, a record of `flight.autopilots.return_steps.LOITER_PROGRESS`.
+    climb: the climb at the start, a `CLIMB` record.
     is_before_reaction: True while the engine failure is not yet noticed and the aircraft flies straight on.
+    is_first_stage, is_last_stage: True for the first stage and for the last one.
     time: time since the start, s.
     arrival_radius: distance from the center, m, within which the aircraft has arrived at the loiter.
     estimated: position and velocity over the ground, a `MOTION` record.
