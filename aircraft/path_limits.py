@@ -205,7 +205,11 @@ def derate(
     airspeeds = np.array([true_airspeed(table, float(amsl)) for amsl in table.amsl])
 
     def reduce_angles(angles: Floats, fraction: float, unused_rate: float) -> Floats:
-        """Return the reduced angles (h,) of the climb table or the descent table."""
+        """Reduce the steepest climb or descent angles, rad, (h,); negative angles are unchanged.
+
+        fraction: fraction (0 to 1) of the angle that may be used.
+        unused_rate: vertical speed that stays in reserve, m/s; 0 for none.
+        """
         reduced = np.where(angles > 0.0, fraction * angles, angles)
         if unused_rate <= 0.0:
             return _read_only(reduced)

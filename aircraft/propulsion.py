@@ -129,13 +129,21 @@ class ElectricMotor:
     avionics: float = 0.0
 
     def speed(self, throttle: float, airspeed: float, rho: float) -> float:
-        """Return the propeller speed, rad/s."""
+        """Return the propeller speed, rad/s, at which the torques of motor and propeller are equal.
+
+        A propeller that the airflow turns faster takes only the idle torque: the motor then neither drives nor brakes.
+
+        throttle: 0 to 1.
+        airspeed: m/s.
+        rho: air density, kg/m^3.
+        """
         square, linear, constant = self.propeller.torque_parabola(airspeed, rho)
         k, r = self.emf, self.resistance
         driven_speed = larger_root(
             square, linear + k * k / r, constant + k * self.idle_current - k * self.volts * throttle / r
         )
-        return max(0.0, driven_speed, larger_root(square, linear, constant + k * self.idle_current))
+        windmilling_speed = larger_root(square, linear, constant + k * self.idle_current)
+        return max(0.0, driven_speed, windmilling_speed)
 
     def thrust(self, throttle: float, airspeed: float, rho: float) -> float:
         """Return the thrust, N."""
@@ -217,7 +225,12 @@ class FuelEngine:
     position: Vector3 = (0.0, 0.0, 0.0)
 
     def speed(self, throttle: float, airspeed: float, rho: float) -> float:
-        """Return the propeller speed, rad/s."""
+        """Return the propeller speed, rad/s, at which the torques of engine and propeller are equal.
+
+        throttle: 0 to 1.
+        airspeed: m/s.
+        rho: air density, kg/m^3.
+        """
         square, linear, constant = self.propeller.torque_parabola(airspeed, rho)
         engine_torque = throttle * self.torque * rho / _SEA_LEVEL_DENSITY
         return max(0.0, larger_root(square, linear, constant + self.friction - engine_torque))

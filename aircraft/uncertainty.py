@@ -268,7 +268,11 @@ def draws_text(draws: Draws) -> str:
 
 
 def read_draws(path: Path, error: type[PlanflyError] = FlightError) -> Draws:
-    """Read a ``draws.csv``. Raises ``error``, with the line number, if the file cannot be read or used."""
+    """Read random samples of an aircraft's properties from a ``draws.csv``, for a Monte Carlo campaign.
+
+    The first line names the properties; each further line holds one value for each of them.
+    Raises ``error``, with the line number, if the file cannot be read or used.
+    """
     text = utf8_text(read_small_file(path, MAX_BYTES, "draws", error), path, error)
     reader = csv.reader(io.StringIO(text))
     try:

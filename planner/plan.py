@@ -463,7 +463,13 @@ def _reject_constant(name: str) -> float:
 
 
 def _check_names(source: str, field: str, found_names: dict[str, Any], expected_names: Sequence[str]) -> None:
-    """Raise MissionError if a JSON object does not have exactly the expected keys."""
+    """Raise MissionError if a JSON object does not have exactly the expected keys.
+
+    source: name of the file.
+    field: name of the object in the file.
+    found_names: the object.
+    expected_names: the expected keys.
+    """
     if sorted(found_names) != sorted(expected_names):
         raise MissionError.at(source, field, sorted(found_names), f"expected keys {sorted(expected_names)}")
 

@@ -131,7 +131,9 @@ def wrap(angle: float) -> float:
 
 @inlined
 def turning_angle(ax: float, ay: float, bx: float, by: float, cx: float, cy: float) -> float:
-    """Return the course change at b on the path a, b, c, rad in [0, pi] (paper eq. 1, by atan2).
+    """Return the course change at b on the path a, b, c, rad in [0, pi].
+
+    It is the angle of Yang, Tang and Lozano 2014, eq. 1, computed by atan2; 0 at a leg without length.
 
     ax, ay, bx, by, cx, cy: east and north of the three points, m.
     """
@@ -139,7 +141,7 @@ def turning_angle(ax: float, ay: float, bx: float, by: float, cx: float, cy: flo
     uy = by - ay
     vx = cx - bx
     vy = cy - by
-    # + 0.0 for a leg without length: see `signed_turns`.
+    # + 0.0 turns -0.0 into 0.0, so that a leg without length gives 0 and not pi.
     return math.atan2(abs(ux * vy - uy * vx), ux * vx + uy * vy + 0.0)
 
 

@@ -274,10 +274,10 @@ kind = "dem"
 
 
 def _area_and_ends_text(draft: Draft) -> str:
-    """Return the tables of area, start and destination of a scenario file."""
+    """Return the [area], [start] and [destination] tables of a scenario file, with comments."""
     (east0, east1), (north0, north1) = (tuple(f"{value:.0f}" for value in span) for span in draft.box)
     ends = []
-    for key, place, course in (
+    for key, place, course_comment in (
         ("start", draft.start, "on which the aircraft begins"),
         ("destination", draft.destination, "on which it arrives"),
     ):
@@ -286,7 +286,7 @@ def _area_and_ends_text(draft: Draft) -> str:
 lat_deg = {_number_text(place.lat)}
 lon_deg = {_number_text(place.lon)}
 {_entry_line("height_m", _number_text(draft.height), "above ground; amsl_m is above mean sea level")}
-{_entry_line("# course_deg", "0", course)}
+{_entry_line("# course_deg", "0", course_comment)}
 """)
     return f"""\
 [area]                        # where a path may lead, m from [origin]

@@ -20,6 +20,8 @@ _LOW_RATE_DURATION_S = 60.0
 def gust_deviation(turbulence: Turbulence) -> float:
     """Return the standard deviation of vertical gusts near the ground, m/s (MIL-F-8785C).
 
+    It is a tenth of the wind speed at 20 ft that defines the turbulence.
+
     >>> round(gust_deviation("moderate"), 2)
     1.54
     """

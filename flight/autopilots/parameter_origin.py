@@ -199,6 +199,11 @@ def _vehicle_by_majority(
     """Return the vehicle to which most parameter names of a file belong; "" for an aeroplane.
 
     In a tie the vehicle is an aeroplane. A header that states the vehicle counts as much as `_HEADER_WEIGHT` names.
+
+    text: text of the file.
+    entries: parameters of the file by name.
+    plane_names: names that only an aeroplane has.
+    other_vehicles: names that only another vehicle has, by vehicle.
     """
     header_kind = _header_vehicle(text)
     votes = {"": len(_select_names(entries, plane_names.fullmatch))}

@@ -237,8 +237,8 @@ class ParameterSet:
         return cls.table.read(entries)[0]
 
     @classmethod
-    def _is_set_on_purpose(cls, definition: Definition, value: float) -> bool:
-        """Return True if a value of a file was set on purpose.
+    def _is_relevant(cls, definition: Definition, value: float) -> bool:
+        """Return True if a value of a file says more than the default value does.
 
         A subclass may return False for a value that equals the default.
         """
@@ -264,15 +264,15 @@ class ParameterSet:
             name
             for origin, values in known_sources
             for name, value in values.items()
-            if origin == "file" and not cls._is_set_on_purpose(cls.table.by_name[name], value)
+            if origin == "file" and not cls._is_relevant(cls.table.by_name[name], value)
         ]
         unused = (*unused, *unknown_names, *unset_names)
 
         def find_value(definition: Definition) -> ParameterValue:
-            """Return the value from the first source that states it on purpose, or the default."""
+            """Return the value from the first source that states a relevant one, or the default."""
             for origin, values in known_sources:
                 value = values.get(definition.name)
-                if value is not None and cls._is_set_on_purpose(definition, value):
+                if value is not None and cls._is_relevant(definition, value):
                     return ParameterValue(definition.name, value, origin)
             return ParameterValue(definition.name, definition.default, "default")
 

@@ -587,8 +587,8 @@ class MissionChecks:
     resets_jump_counters: True if the autopilot resets a jump's counter when it is exhausted: a later pass over the jump
         item jumps again.
     follows_terrain: True if the autopilot follows the ground along a leg to a height above terrain.
-    unites_inclusions: True if a position inside any inclusion of the mission's fence is inside the fence; False if a
-        position must be inside all of them.
+    any_inclusion_suffices: True if a position inside any inclusion of the mission's fence is inside the fence; False if
+        a position must be inside all of them.
     battery_failsafes: failsafes that leave the mission at a state of the battery.
     return_time_failsafe: failsafe that returns when the battery lasts only for the return; None without it.
     describe_unsimulated_settings: function that returns a sentence, without a full stop, for each setting that changes
@@ -600,7 +600,7 @@ class MissionChecks:
     feasibility: FeasibilityLimits = PX4_DEFAULT_LIMITS
     resets_jump_counters: bool = False
     follows_terrain: bool = True
-    unites_inclusions: bool = False
+    any_inclusion_suffices: bool = False
     battery_failsafes: tuple[BatteryFailsafe, ...] = ()
     return_time_failsafe: ReturnTimeFailsafe | None = None
     describe_unsimulated_settings: Callable[[MissionParts], list[str]] = _no_unsimulated_settings

@@ -33,6 +33,11 @@ _ALTITUDES_M = (0.0, 2000.0, 4000.0)
 # Height above the start of a mission up to which the strongest wind of a forecast counts, m.
 _MAX_WIND_HEIGHT_M = 2000.0
 
+# Bank beyond which the induced drag of a point mass does not increase further, rad.
+_MAX_DRAG_BANK_RAD = 1.2
+# Lowest airspeed of a point mass, m/s.
+_MIN_AIRSPEED_MPS = 3.0
+
 # The aircraft as a point mass, for compiled code.  Its tables have a row for each airspeed and a column for each
 # altitude of the grid.
 POINT_MASS = record_dtype(
@@ -231,7 +236,12 @@ def _induced_drag_factor(speeds: Floats, excess: Floats) -> float:
 
 @inner
 def angle_of_attack(state: Record, aircraft: Record) -> float:
-    """Return the angle of attack at the state's airspeed and bank, rad."""
+    """Return the angle of attack at the state's airspeed and bank, rad.
+
+    state: attitude, airspeed and rates of the aircraft, a `STATE` record.
+    aircraft: the point mass, a `POINT_MASS` record.
+    """
+    # The cosine is limited, to keep the load factor finite at extreme banks.
     load_factor = 1.0 / max(0.3, math.cos(state.roll))
     return aircraft.alpha + aircraft.alpha_lift * load_factor / (state.airspeed * state.airspeed)
 
@@ -256,44 +266,46 @@ def wind_at(position: Record, seconds: float, aircraft: Record, field: Floats) -
 
 @inner
 def advance_point_mass(
-    estimated: Record,
+    motion: Record,
     state: Record,
     path_angle: float,
     throttle: float,
     aircraft: Record,
     excess_table: Floats,
-    power: Floats,
-    field: Floats,
+    power_table: Floats,
+    wind_field: Floats,
     dt: float,
 ) -> float:
     """Move a point mass by ``dt`` s, and return the electric power that it uses, W.
 
-    estimated: position and velocity over the ground, a record of `flight.guidance.navigation_error.MOTION`.
-    state: airspeed, attitude, time and wind, a record of `flight.dynamics.state.STATE`.
+    motion: position and velocity over the ground, a record of `flight.guidance.navigation_error.MOTION`; updated.
+    state: airspeed, attitude, time and wind, a record of `flight.dynamics.state.STATE`. Airspeed, yaw and time are
+        updated, and the wind is set for the new time and position.
     path_angle: climb angle relative to the air, rad.
+    throttle: 0 to 1.
     aircraft: a record of `POINT_MASS`.
-    excess_table, power: tables of a `PointMass`.
-    field: packed wind field, as in `PointMass`; empty for none.
-
-    The wind in the state is updated to the new time and position.
+    excess_table: specific excess power, m/s, `PointMass.excess`.
+    power_table: electric power, W, `PointMass.power`.
+    wind_field: packed wind field, as in `PointMass`; empty for none.
+    dt: duration of a tick, s.
     """
-    thrust_power = excess_power(excess_table, throttle, state.airspeed, estimated.up, aircraft)
-    tan_bank = math.tan(min(1.2, abs(state.roll)))
+    thrust_power = excess_power(excess_table, throttle, state.airspeed, motion.up, aircraft)
+    tan_bank = math.tan(min(_MAX_DRAG_BANK_RAD, abs(state.roll)))
     net_power = thrust_power - aircraft.induced / state.airspeed * tan_bank * tan_bank
-    electric_power = _electric_power(thrust_power, excess_table, power, state.airspeed, estimated.up, aircraft)
+    electric_power = _electric_power(thrust_power, excess_table, power_table, state.airspeed, motion.up, aircraft)
     state.yaw += GRAVITY * math.tan(state.roll) / state.airspeed * dt
     state.airspeed = max(
-        3.0, state.airspeed + (GRAVITY * net_power / state.airspeed - GRAVITY * math.sin(path_angle)) * dt
+        _MIN_AIRSPEED_MPS, state.airspeed + (GRAVITY * net_power / state.airspeed - GRAVITY * math.sin(path_angle)) * dt
     )
     horizontal_airspeed = state.airspeed * math.cos(path_angle)
-    estimated.velocity_east = horizontal_airspeed * math.sin(state.yaw) + state.wind_east
-    estimated.velocity_north = horizontal_airspeed * math.cos(state.yaw) + state.wind_north
-    estimated.velocity_up = state.airspeed * math.sin(path_angle)
-    estimated.east += estimated.velocity_east * dt
-    estimated.north += estimated.velocity_north * dt
-    estimated.up += estimated.velocity_up * dt
+    motion.velocity_east = horizontal_airspeed * math.sin(state.yaw) + state.wind_east
+    motion.velocity_north = horizontal_airspeed * math.cos(state.yaw) + state.wind_north
+    motion.velocity_up = state.airspeed * math.sin(path_angle)
+    motion.east += motion.velocity_east * dt
+    motion.north += motion.velocity_north * dt
+    motion.up += motion.velocity_up * dt
     state.time += dt
-    state.wind_east, state.wind_north = wind_at(estimated, state.time, aircraft, field)
+    state.wind_east, state.wind_north = wind_at(motion, state.time, aircraft, wind_field)
     return electric_power
 
 
@@ -301,14 +313,18 @@ def advance_point_mass(
 def _electric_power(
     thrust_power: float, excess_table: Floats, power: Floats, airspeed: float, amsl: float, aircraft: Record
 ) -> float:
-    """Return the electric power (W) for a specific excess power (m/s), by the parabola of `Envelope.power`.
+    """Return the electric power (W) for a specific excess power (m/s).
 
-    The power is constant below the excess power at idle, and above the excess power at full throttle.
+    The power is a parabola through the points at idle, in level flight and at full throttle, as in `Envelope.power`. It
+    is constant below the excess power at idle, and above the excess power at full throttle. It is 0 for an aircraft
+    without known power.
 
-    excess_table: specific excess power, see `PointMass`.
-    power: electric power, see `PointMass`.
+    thrust_power: specific excess power in straight flight, m/s.
+    excess_table: specific excess power, m/s, `PointMass.excess`.
+    power: electric power, W, `PointMass.power`.
     airspeed: m/s.
     amsl: altitude, m.
+    aircraft: a record of `POINT_MASS`.
     """
     if not aircraft.has_power:
         return 0.0
@@ -332,9 +348,11 @@ def _electric_power(
 def excess_power(excess_table: Floats, throttle: float, airspeed: float, amsl: float, aircraft: Record) -> float:
     """Return the specific excess power in straight flight at a throttle, airspeed and altitude, m/s.
 
+    excess_table: specific excess power, m/s, `PointMass.excess`.
     throttle: 0..1.
     airspeed: m/s.
     amsl: altitude, m.
+    aircraft: a record of `POINT_MASS`.
     """
     grid_position = min(1.0, max(0.0, throttle)) * (excess_table.shape[0] - 1)
     row = min(excess_table.shape[0] - 2, int(grid_position))
@@ -348,6 +366,8 @@ def _interpolate(table: Floats, airspeed: float, amsl: float, aircraft: Record) 
     """Interpolate a table (v, h) bilinearly at an airspeed and an altitude.
 
     Outside the table the value at its nearest edge applies.
+
+    aircraft: the point mass, a `POINT_MASS` record.
     """
     row = min(table.shape[0] - 1.0, max(0.0, (airspeed - aircraft.first_airspeed) / aircraft.airspeed_step))
     column = min(table.shape[1] - 1.0, max(0.0, amsl / aircraft.altitude_step))

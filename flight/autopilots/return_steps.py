@@ -54,7 +54,11 @@ def simulate_each(
 
 @inner
 def initialise_outcome(start: Record, estimated: Record, has_terrain: bool, result: Record) -> None:  # pragma: no cover
-    """Set the motion ``estimated`` to the start of an RTL, and ``result`` to the outcome before the first tick."""
+    """Set the motion ``estimated`` to the start of an RTL, and ``result`` to the outcome before the first tick.
+
+    estimated: position and velocity over the ground, a `MOTION` record.
+    result: `RETURN_RESULT` record, which is updated.
+    """
     estimated.east, estimated.north, estimated.up = start.east, start.north, start.up
     estimated.velocity_east, estimated.velocity_north = start.velocity_east, start.velocity_north
     estimated.velocity_up = start.velocity_up
@@ -72,7 +76,10 @@ def initialise_outcome(start: Record, estimated: Record, has_terrain: bool, resu
 def initialise_state(start: Record, aircraft: Record, field: Floats, state: Record) -> None:
     """Set the point mass's time, wind, airspeed and attitude from the ground velocity at the start.
 
-    field: as in `flight.autopilots.point_mass.PointMass`.
+    start: position, velocity, bank and time of the start, a `RETURN_START` record.
+    aircraft: a record of `POINT_MASS`.
+    field: packed wind field of a `PointMass`; empty for none.
+    state: `STATE` record to fill.
     """
     state.time = start.time
     state.wind_east, state.wind_north = wind_at(start, start.time, aircraft, field)
@@ -88,7 +95,10 @@ def initialise_state(start: Record, aircraft: Record, field: Floats, state: Reco
 def steady_throttle(start: Record, state: Record, aircraft: Record, excess_table: Floats) -> float:
     """Return the throttle (0..1) at which the aircraft holds the climb rate of an RTL's start, in steps of 0.01.
 
-    excess_table: specific excess power, see `flight.autopilots.point_mass.PointMass`.
+    start: position and velocity of the start, a `RETURN_START` record.
+    state: `STATE` record with the airspeed.
+    aircraft: a record of `POINT_MASS`.
+    excess_table: specific excess power, m/s, `PointMass.excess`.
     """
     throttle = 1.0
     while (
@@ -100,7 +110,11 @@ def steady_throttle(start: Record, state: Record, aircraft: Record, excess_table
 
 @inner
 def store_position(estimated: Record, positions: Floats, result: Record) -> None:
-    """Append the present position to the stored positions, unless the array is full."""
+    """Append the present position to the stored positions, unless the array is full.
+
+    estimated: position and velocity over the ground, a `MOTION` record.
+    result: `RETURN_RESULT` record, which is updated.
+    """
     row = result.position_count
     if row < positions.shape[0]:
         positions[row, 0], positions[row, 1], positions[row, 2] = estimated.east, estimated.north, estimated.up
@@ -117,6 +131,7 @@ def advance_loiter(estimated: Record, target: Record, loiter: Record, arrival_ra
     loiter: progress around the loiter, a record of `LOITER_PROGRESS`.
     arrival_radius: distance from the center, m, within which the aircraft has arrived at the loiter.
     dt: s since the last call.
+    estimated: position and velocity over the ground, a `MOTION` record.
     """
     offset_e, offset_n = estimated.east - target.centre_east, estimated.north - target.centre_north
     bearing = math.atan2(offset_e, offset_n)
@@ -148,8 +163,11 @@ def update_clearances(
     aircraft is `MAX_IMPACT_DEPTH_M` below the ground.
 
     time: time since the start, s.
-    heights, to_pixel, spheres, radii: see `flight.autopilots.simulated_returns.ReturnEnvironment`.
+    heights, to_pixel: ground heights, m, and the map from east and north to column and row.
+    spheres, radii: centres (m, 3) and radii (m,) of the kill spheres, m; a radius of 0 stands for none.
     has_terrain: True if the terrain is known.
+    estimated: position and velocity over the ground, a `MOTION` record.
+    result: `RETURN_RESULT` record, which is updated.
     """
     result.end_time = time
     for m in range(spheres.shape[0]):

@@ -106,6 +106,7 @@ def trim_table(aircraft: Aircraft, count: int = 7) -> tuple[TrimRow, ...]:
             continue
         fdm.apply_trim(trim.vector())
         power = float(fdm.read().power)
+        # s, with 80 % of the battery's energy.
         rows.append(TrimRow(trim, power, 0.8 * aircraft.battery_energy / power if power > 0.0 else math.nan))
     return tuple(rows)
 

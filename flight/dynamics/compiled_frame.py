@@ -207,7 +207,13 @@ def step(frame: Record, numbers: Floats, code: Code, contacts: Records, friction
 
 @inner
 def _integrate(frame: Record) -> None:
-    """Integrate attitude and rates by Euler's method, velocity and position by the Adams-Bashforth method."""
+    """Integrate the motion over one time step, in inertial axes.
+
+    Attitude and rates are integrated by Euler's method, the velocity by the Adams-Bashforth method of second order, and
+    the position by that of third order.
+
+    frame: state and derivatives of the motion, a `FRAME` record; updated.
+    """
     dt = frame.dt
     real_part = frame.attitude_real + dt * frame.attitude_rate_real
     vector_part = add(vector_of(frame.attitude), scale(dt, vector_of(frame.attitude_rate)))
@@ -255,6 +261,8 @@ def _local_axes(sin_lat: float, cos_lat: float, sin_lon: float, cos_lon: float) 
     """Return the matrix that transforms vectors from axes fixed to the earth to local axes.
 
     Local axes point north, east and down.
+
+    sin_lat, cos_lat, sin_lon, cos_lon: sines and cosines of latitude and longitude.
     """
     return (
         (-cos_lon * sin_lat, -sin_lon * sin_lat, cos_lat),
@@ -289,7 +297,12 @@ def _update_motion(frame: Record) -> None:
 
 @inner
 def _update_gravity(frame: Record) -> None:
-    """Compute the gravity of the oblate earth, ft/s^2, in axes fixed to the earth."""
+    """Compute the gravity of the oblate earth, ft/s^2, in axes fixed to the earth.
+
+    It is the central gravity with the correction of its second zonal harmonic J2.
+
+    frame: position and gravity, a `FRAME` record; updated.
+    """
     radius = frame.radius
     sin_lat = math.sin(frame.geocentric_latitude)
     ratio = SEMI_MAJOR / radius
@@ -358,7 +371,11 @@ def _aerodynamic_forces(frame: Record) -> tuple[Vector, Vector]:
 
 @inlined
 def _external_forces(numbers: Floats, code: Code) -> tuple[Vector, Vector]:
-    """Return the sums of the external forces (lbf) and of the external moments (lbf ft), in body axes."""
+    """Return the sums of the external forces (lbf) and of the external moments (lbf ft), in body axes.
+
+    numbers: registers of the model.
+    code: header and sections of instructions; the section of forces names the registers of each force and its axes.
+    """
     force, moment = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for k in range(code[FORCES_START], code[READS_START], FORCE_NUMBERS):
         magnitude, first_axis = numbers[code[k]], int(code[k + 1])
@@ -432,7 +449,9 @@ def step_repeatedly(
     """Advance the model by ``count`` time steps.
 
     frames: one record of `FRAME`, (1,), which shares the memory of the first registers.
-    Other arguments as for `step`.
+    numbers: registers of the model.
+    code: header and sections of instructions.
+    contacts, frictions: `CONTACT` and `FRICTION` records of the landing gear, possibly none.
     """
     for _ in range(count):
         step(frames[0], numbers, code, contacts, frictions)

@@ -126,7 +126,7 @@ class CompiledModel:
         for round_number in range(PROOF_STEPS // _PROOF_STRIDE):
             if differing:
                 break
-            self._move_inputs(initial_numbers, round_number)
+            self._perturb_inputs(initial_numbers, round_number)
             self._fdm.step(_PROOF_STRIDE)
             step_repeatedly(*self.arrays, _PROOF_STRIDE)
             differing = self.differing_properties()
@@ -208,16 +208,22 @@ class CompiledModel:
         arms = np.linalg.norm(self.contacts["arm"], axis=1)
         frame.contact_reach = float(np.max(arms, initial=0.0)) + _REACH_MARGIN_FT
 
-    def _move_inputs(self, initial_numbers: Floats, round_number: int) -> None:
-        """Set commands and gusts in both engines, in a new combination in each round."""
-        moves = [_PROOF_SURFACE_RAD] * 3 + [_PROOF_THROTTLE] + [_PROOF_GUST_FPS] * 3
+    def _perturb_inputs(self, initial_registers: Floats, round_number: int) -> None:
+        """Perturb commands and gusts equally in JSBSim and in the compiled model, with new signs in each round.
+
+        From round `_PROOF_GROUND_ROUND` on, the ground touches the contacts of a model that has any.
+
+        initial_registers: values of the compiled model's registers before the first round.
+        """
+        perturbations = [_PROOF_SURFACE_RAD] * 3 + [_PROOF_THROTTLE] + [_PROOF_GUST_FPS] * 3
         scales = [command.above for command in self._fdm.aircraft.model.commands] + [1.0] * 3
         names = [*(command.name for command in self._fdm.aircraft.model.commands), *GUST]
-        for k, (name, move, scale) in enumerate(zip(names, moves, scales, strict=True)):
-            # A Gray code gives the signs: few inputs move at a time, and all combinations occur.
+        for k, (name, perturbation, scale) in enumerate(zip(names, perturbations, scales, strict=True)):
+            # A Gray code of five bits gives the signs: from one round to the next only one bit changes. The last two
+            # of the seven inputs (two gusts) share the bits of the first two.
             sign = 1.0 if (round_number ^ (round_number >> 1)) >> k % 5 & 1 else -1.0
             register = self.properties[name]
-            self.numbers[register] = initial_numbers[register] + sign * move * scale
+            self.numbers[register] = initial_registers[register] + sign * perturbation * scale
             self._fdm.properties.set(name, self.numbers[register])
         if len(self.contacts) and round_number >= _PROOF_GROUND_ROUND:
             # The ground is raised until the lowest point of the aircraft touches it.
@@ -279,9 +285,13 @@ def _arm_about_center(position: Sequence[float], centre: Sequence[float]) -> lis
 
 
 def _inertia_matrices(xx: float, yy: float, zz: float, xy: float, xz: float, yz: float) -> tuple[Floats, Floats]:
-    """Return the inertia matrix and the inverse of this matrix, from JSBSim's inertia properties.
+    """Return the inertia matrix and its inverse, (3, 3) each, from JSBSim's inertia properties.
 
-    As in FGMassBalance, the sign convention of xz differs from that of the other products of inertia.
+    xx, yy, zz: moments of inertia about the body axes, slug ft^2.
+    xy, xz, yz: products of inertia, slug ft^2.
+
+    As in FGMassBalance, the sign convention of xz differs from that of the other products of inertia. The inverse has
+    the elements k1 to k6, which are cofactors divided by the determinant.
     """
     ixz = -xz
     k1, k2, k3 = yy * zz - yz * yz, yz * ixz + xy * zz, xy * yz + yy * ixz

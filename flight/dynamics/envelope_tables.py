@@ -81,8 +81,11 @@ def load_envelope(aircraft: Aircraft, *, motor_braking: bool = False) -> Envelop
 def _limit_to_stall_speed(tables: Mapping[str, Floats], stall_speed: float) -> Floats:
     """Scale the lowest level-flight airspeeds so that sea level has at least the stated stall speed.
 
-    A model made from a data sheet can fly a few per cent slower than the stall speed (m/s) of the sheet. The scaled
-    airspeeds are in m/s, one per altitude.
+    A model made from a data sheet can fly a few per cent slower than the stall speed of the sheet. The scaled airspeeds
+    are in m/s, one per altitude, and at most the highest airspeed of level flight.
+
+    tables: tables of the envelope by name, with the lowest and highest airspeed of level flight at each altitude, m/s.
+    stall_speed: m/s.
     """
     model_speeds = tables["level_speed_min"]
     factor = max(1.0, stall_speed / float(model_speeds[0])) if model_speeds[0] > 0.0 else 1.0
@@ -161,6 +164,7 @@ def _check_commands(fdm: Fdm) -> None:
 def _level_speed_range(fdm: Fdm, amsl: float, level_trims: Sequence[Trim]) -> tuple[float, float]:
     """Return the lowest and the highest airspeed of level flight at an altitude, m/s; NaN if not found.
 
+    amsl: altitude, m.
     level_trims: level flights at the airspeeds of the grid, fastest first.
 
     A search that fails, or that ends at an airspeed below the fastest level flight of the grid, is repeated from the
@@ -186,7 +190,7 @@ def _power(fdm: Fdm, trim: Trim) -> float:
 def _grid_airspeeds(aircraft: Aircraft) -> Floats:
     """Return the airspeeds of the grid, m/s, (v,).
 
-    They extend from the stall to 5 m/s above the maximum airspeed of the guidance.
+    They extend from the stall speed to 5 m/s above the maximum commanded airspeed; both speeds are rounded up.
     """
     return np.linspace(math.ceil(aircraft.stall_speed), math.ceil(aircraft.airspeed_max) + 5.0, _AIRSPEED_COUNT)
 
@@ -236,7 +240,11 @@ def read_tables(file: Path, key: dict[str, Any], shapes: Mapping[str, tuple[int,
 
 
 def write_tables(file: Path, key: dict[str, Any], tables: Mapping[str, Floats]) -> None:
-    """Write a cache file completely or not at all; do nothing if disk space or permission is missing."""
+    """Write a cache file completely or not at all; do nothing if disk space or permission is missing.
+
+    key: entries that must agree when the file is read, such as versions.
+    tables: tables by name; NaN is written as null.
+    """
     values: dict[str, object] = {}
     for name, table in tables.items():
         entries = table.astype(object)

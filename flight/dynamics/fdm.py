@@ -436,7 +436,7 @@ class Fdm:
         return model if self._gear is None else with_contacts(model, self.aircraft, self._gear)
 
     def attitudes(self) -> Floats:
-        """Return roll, pitch and yaw of all n evaluations of initial conditions in order, rad, (n, 3)."""
+        """Return roll, pitch and yaw of the n initial conditions evaluated so far, in call order, rad, (n, 3)."""
         return np.array(self._attitudes).reshape(-1, 3)
 
     def specific_force(self) -> tuple[float, float, float]:
@@ -538,7 +538,13 @@ def _apply_variation(properties: PropertyAccess, aircraft: Aircraft, variation: 
 def _new_instance(
     aircraft: Aircraft, dt: float, flat_earth: bool, is_tested: bool, gear: Gear | None
 ) -> jsbsim.FGFDMExec:
-    """Return a JSBSim instance with an aircraft's model; arguments as for `Fdm`."""
+    """Return a JSBSim instance with an aircraft's model.
+
+    dt: time step, s.
+    flat_earth: True for a plane without rotation.
+    is_tested: True if a user's model is known not to abort JSBSim; otherwise the model is tested first.
+    gear: gear to add for ground contact, or None.
+    """
     with silence() as read_output, temporary_folder("planfly-model-") as folder:
         instance = jsbsim.FGFDMExec(str(folder))
         load_model(instance, folder, aircraft, dt, read_output, flat_earth=flat_earth, is_tested=is_tested, gear=gear)

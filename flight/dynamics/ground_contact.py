@@ -126,10 +126,15 @@ def _contact_force(
 ) -> tuple[Vector, Vector, int]:
     """Return the force (lbf) and moment (lbf ft) of a contact below the ground, and the number of friction records.
 
-    Force and moment are in body axes, and exclude friction. The compression and its rate are stored in `contact`.
+    Force and moment are in body axes, and exclude friction. The compression and its rate are stored in `contact`. The
+    rate is limited to one that compresses the strut from nothing within a time step.
 
+    frame: attitude and motion of the aircraft, a `FRAME` record.
+    contact: `CONTACT` record; a wheel is compressed along its strut, any other contact along the normal of the ground.
     height_above_ground: height of the uncompressed contact, ft; negative.
     normal: normal of the ground, in axes fixed to the earth.
+    frictions: `FRICTION` records, of which the next one or two are filled; `friction_count` are already filled.
+    contact_index: index of the contact.
     """
     upward = transform(matrix_of(frame.earth_to_body), normal)
     normal_z = transform(matrix_of(frame.earth_to_local), normal)[2]
@@ -200,10 +205,16 @@ def _add_frictions(
     """Append the friction records of a contact; return the new number of friction records.
 
     A sliding contact that is not a wheel has friction against its motion. Any other contact has friction in the
-    longitudinal and in the lateral direction.
+    longitudinal and in the lateral direction; the lateral friction of a wheel depends on its slip angle.
 
+    contact: `CONTACT` record; the slip angle of a sliding wheel is stored in it.
     axes: longitudinal, lateral and upward axis of the ground, as columns in body axes.
     ground_velocity: velocity of the contact along these axes, ft/s.
+    normal_force: force of the ground on the contact, lbf.
+    arm: position of the contact from the center of gravity, in body axes, ft.
+    frictions: `FRICTION` records, of which the next one or two are filled.
+    contact_index: index of the contact.
+    friction_count: number of records that are already filled.
     """
     ground_speed = math.sqrt(ground_velocity[0] * ground_velocity[0] + ground_velocity[1] * ground_velocity[1])
     is_sliding = ground_speed > _MIN_SLIDING_SPEED
@@ -279,6 +290,8 @@ def friction_accelerations(
 ) -> tuple[Vector, Vector]:
     """Return the linear (ft/s^2) and angular (rad/s^2) accelerations that friction causes, in body axes.
 
+    contacts: `CONTACT` records, in which the friction forces are stored.
+    frictions: `FRICTION` records; their rows of the system of equations are filled.
     count: number of friction records.
     acceleration, angular_acceleration: accelerations without friction, relative to the earth.
     """
@@ -323,7 +336,9 @@ def friction_accelerations(
 def _solve_frictions(contacts: Records, frictions: Records, count: int) -> None:
     """Solve for the friction force of each contact by the Gauss-Seidel method, within the limits of the force.
 
-    The forces are stored in the memory of the contacts.
+    contacts: `CONTACT` records, which hold the forces (lbf): the solution of the last step is the first guess.
+    frictions: `FRICTION` records with the rows of the normalised system and the limits of the force.
+    count: number of friction records.
     """
     for _ in range(_MAX_ITERATIONS):
         total_change = 0.0

@@ -131,7 +131,10 @@ def _clip(value: float, lower: float, upper: float) -> float:
 def _interpolate_table(numbers: Floats, first_register: int, row_count: int, key: float) -> float:
     """Interpolate a table linearly at a key; beyond an end of the table return the value at this end.
 
+    numbers: registers of the model.
     first_register: first register of the table; a row of the table is a key and a value.
+    row_count: number of rows.
+    key: value at which to interpolate.
     """
     last_row = first_register + 2 * (row_count - 1)
     if key <= numbers[first_register]:

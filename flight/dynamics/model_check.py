@@ -184,7 +184,12 @@ def shipped_model(aircraft: Aircraft) -> dict[str, bytes]:
 
 
 def _read_model(file: Path, *, main: bool, remove_channels: bool) -> _Reader:
-    """Return the reader of a file after it has read the file; an unchanged file is read only once."""
+    """Return the reader of a file after it has read the file; an unchanged file is read only once.
+
+    main: True for the model's main file.
+    main: True for the model itself, False for a file that it includes.
+    remove_channels: True to note input and output channels for removal instead of refusing them.
+    """
     status = file.stat() if file.is_file() else None
     stamp = None if status is None else (status.st_mtime_ns, status.st_size, status.st_ino)
     return _read_stamped_model(file, stamp, main, remove_channels)
@@ -209,7 +214,11 @@ def _find_file(name: str, folders: Sequence[Path]) -> Path | None:
 
 
 def _check_property_names(readers: Sequence[_Reader], provided: Callable[[str], bool]) -> None:
-    """Raise FlightError if a model reads a property that neither JSBSim nor the model creates."""
+    """Raise FlightError if a model reads a property that neither JSBSim nor the model creates.
+
+    readers: readers of the model's files.
+    provided: function that returns True for the name of a property that JSBSim creates.
+    """
     created_names = set().union(*(reader.created_names for reader in readers))
     has_parts = any(reader.has_parts for reader in readers)
     for reader in readers:

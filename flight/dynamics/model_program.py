@@ -252,7 +252,12 @@ class _Translator:
         return self._constants[key]
 
     def _emit(self, operation: Operation, operands: Sequence[int], target: int | None = None) -> int:
-        """Append an instruction, and return its target register; None for ``target`` means a new register."""
+        """Append an instruction, and return its target register.
+
+        operation: code of the operation.
+        operands: registers of the numbers that the operation takes.
+        target: register for the result; None for a new register.
+        """
         target = self._append_registers(0.0) if target is None else target
         self._code += [operation, target, len(operands), *operands]
         return target
@@ -434,7 +439,13 @@ _REQUIRED_CONTACT_VALUES = {"max_steer": "0", "brake_group": "NONE", "retractabl
 
 
 def _parse_contact(element: Element, contact_index: int) -> ContactData:
-    """Return the properties of a contact except its position, which is read from JSBSim."""
+    """Return the properties of a contact except its position, which is read from JSBSim.
+
+    element: <contact> of <ground_reactions>.
+    contact_index: number of the contact in this element.
+
+    Raises UnsupportedModel for a contact with properties that the compiled model lacks.
+    """
     kind = element.get("type", "")
     if element.tag != "contact" or kind not in ("BOGEY", "STRUCTURE"):
         raise UnsupportedModel(f"<{element.tag} type={kind!r}> in <ground_reactions>")
@@ -462,7 +473,10 @@ _VALUES = {"p", "property", "v", "value", "table", "description", *_OPERATIONS}
 
 
 def _check_element(element: Element, *, attributes: Iterable[str] = (), children: Iterable[str] = ()) -> None:
-    """Raise UnsupportedModel if an element has an attribute or a child other than the given ones."""
+    """Raise UnsupportedModel if an element has an attribute or a child that is not allowed.
+
+    attributes, children: allowed names.
+    """
     for name in element.attrib:
         if name not in attributes:
             raise UnsupportedModel(f"<{element.tag} {name}=...>")

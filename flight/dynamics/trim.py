@@ -141,7 +141,10 @@ _MAX_STALLED_STEPS = 10
 
 
 def first_guess(airspeed: float) -> Floats:
-    """Return a trim vector near level flight at an airspeed (m/s), (8,)."""
+    """Return a trim vector near level flight at an airspeed (m/s), (8,).
+
+    The angle of attack is 0.06 rad, the elevator -0.15 rad (up), the throttle 0.8, and all other elements are 0.
+    """
     return np.array([airspeed, 0.0, 0.06, 0.0, -0.15, 0.0, 0.0, 0.8])
 
 
@@ -209,7 +212,8 @@ def solve_trim(
     start: first guess, (8,); None for level flight at 25 m/s.
 
     The method is Newton's method with one-sided differences. Each step is limited to `_MAX_NEWTON_STEP`, and halved
-    while it does not reduce the residual.
+    while it does not reduce the residual. If the iteration ends without convergence, a residual of up to 10 times that
+    of a converged trim is accepted.
     """
     values = (first_guess(25.0) if start is None else start).copy()
     for quantity, value in fixed_values.items():
@@ -255,6 +259,8 @@ def solve_trim(
 def _trim_bounds(limits: tuple[float, float, float]) -> tuple[Floats, Floats]:
     """Return the lower and the upper bounds of a trim vector, each (8,).
 
+    The elements are airspeed (m/s), climb, angle of attack, bank, elevator, aileron, rudder (rad) and throttle.
+
     limits: elevator, aileron and rudder limits, rad.
     """
     elevator, aileron, rudder = limits
@@ -268,6 +274,9 @@ def trim(
 ) -> Trim | None:
     """Return the steady flight at an altitude with two fixed quantities, or None if no trim is found.
 
+    simulator: JSBSim instance with the aircraft.
+    amsl: altitude, m.
+    fixed_values: the fixed quantities, by name.
     initial_trim: trim from which the iteration starts; None to start from the simulator's initial guess.
     """
     simulator.move_to(amsl)
@@ -287,10 +296,11 @@ def steady_flight(
 ) -> Trim | None:
     """Return the steady flight at an airspeed, altitude and climb angle, or None if no trim is found.
 
+    simulator: JSBSim instance with the aircraft.
     airspeed: m/s.
-
-    amsl: m.
+    amsl: altitude, m.
     climb: climb angle relative to the air, rad.
+    initial_trim: trim from which the iteration starts, or None.
 
     >>> from aircraft.catalog import load_aircraft
     >>> from flight.dynamics.fdm import Fdm
@@ -312,27 +322,44 @@ def steady_flight(
 def full_throttle_climb(
     simulator: Simulator, airspeed: float, amsl: float, initial_trim: Trim | None = None
 ) -> Trim | None:
-    """Return the steady climb at full throttle at an airspeed (m/s) and altitude (m), or None."""
+    """Return the steady climb at full throttle, or None if there is none.
+
+    simulator: JSBSim instance with the aircraft.
+    airspeed: m/s.
+    amsl: altitude, m.
+    initial_trim: trim from which the iteration starts, or None.
+    """
     return trim(simulator, amsl, {"airspeed": airspeed, "throttle": 1.0}, initial_trim)
 
 
 def idle_descent(simulator: Simulator, airspeed: float, amsl: float, initial_trim: Trim | None = None) -> Trim | None:
-    """Return the steady descent with closed throttle at an airspeed (m/s) and altitude (m).
+    """Return the steady descent with closed throttle, or None if no trim is found.
 
-    Return None if no trim is found.
-
-    initial_trim: trim from which the iteration starts, as in `trim`.
+    simulator: JSBSim instance with the aircraft.
+    airspeed: m/s.
+    amsl: altitude, m.
+    initial_trim: trim from which the iteration starts, or None.
     """
     return trim(simulator, amsl, {"airspeed": airspeed, "throttle": 0.0}, initial_trim)
 
 
 def fastest_level_flight(simulator: Simulator, amsl: float, initial_trim: Trim | None = None) -> Trim | None:
-    """Return level flight at full throttle at an altitude (m), or None if no trim is found."""
+    """Return level flight at full throttle, or None if no trim is found.
+
+    simulator: JSBSim instance with the aircraft.
+    amsl: altitude, m.
+    initial_trim: trim from which the iteration starts, or None.
+    """
     return trim(simulator, amsl, {"climb": 0.0, "throttle": 1.0}, initial_trim)
 
 
 def slowest_level_flight(simulator: Simulator, amsl: float, initial_trim: Trim | None = None) -> Trim | None:
-    """Return level flight with the elevator at its upper stop at an altitude (m), or None if no trim is found."""
+    """Return level flight with the elevator at its upper stop, or None if no trim is found.
+
+    simulator: JSBSim instance with the aircraft.
+    amsl: altitude, m.
+    initial_trim: trim from which the iteration starts, or None.
+    """
     return trim(simulator, amsl, {"climb": 0.0, "elevator": -simulator.surface_limits()[0]}, initial_trim)
 
 
@@ -359,7 +386,7 @@ def linearise(simulator: Simulator, trim_point: Trim) -> tuple[Floats, Floats]:
     commands = np.array(trim_point.commands())
 
     def difference_quotient(index: int, vector: Floats, rate: Callable[[Floats], Floats]) -> Floats:
-        """Return the central difference quotient of a rate for one element of a vector."""
+        """Return the central difference quotient of a rate for one element of a vector, over +-1e-4 (SI units)."""
         lower, upper = vector.copy(), vector.copy()
         lower[index] -= 1e-4
         upper[index] += 1e-4

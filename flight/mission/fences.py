@@ -140,7 +140,12 @@ def fence_shapes(fences: tuple[MissionItem, ...], source: str = "fence") -> list
 
 
 def fence_problem(
-    fences: tuple[MissionItem, ...], origin: GeoOrigin, east: float, north: float, *, unites_inclusions: bool = False
+    fences: tuple[MissionItem, ...],
+    origin: GeoOrigin,
+    east: float,
+    north: float,
+    *,
+    any_inclusion_suffices: bool = False,
 ) -> tuple[str, int] | None:
     """Return the first fence that a position violates, or None.
 
@@ -148,7 +153,7 @@ def fence_problem(
 
     fences: fence items (5001..5004), in which the corners of a polygon follow each other.
     east, north: m on the map about ``origin``.
-    unites_inclusions: True if a position must be inside at least one inclusion; False if it must be inside every
+    any_inclusion_suffices: True if a position must be inside at least one inclusion; False if it must be inside every
         inclusion.
 
     Raises MissionError if a polygon has fewer corners than stated.
@@ -177,7 +182,7 @@ def fence_problem(
             is_in_inclusion |= is_inside
             continue
         problem = f"{'outside an inclusion' if not is_inside else 'inside an exclusion'} {name}", item.seq
-        if is_inside or not unites_inclusions:
+        if is_inside or not any_inclusion_suffices:
             return problem
         first_violation = first_violation or problem
     return None if is_in_inclusion else first_violation

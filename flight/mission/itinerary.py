@@ -636,7 +636,9 @@ class _ItineraryBuilder:
             self._note_unsimulated_command(item, as_px4=True)
 
     def _note_unsimulated_command(self, item: MissionItem, *, as_px4: bool) -> None:
-        """Record a command that is not simulated: as an open item if it may change the path, otherwise as a note.
+        """Record a command that is not simulated: as an unresolved point, or only as a note.
+
+        A command that may change the path leaves the judgement of the mission unresolved (see `add_open_item`).
 
         as_px4: True for PX4's treatment of the command, False for ArduPlane's.
         """
@@ -646,7 +648,8 @@ class _ItineraryBuilder:
         if treatment == Treatment.OPEN:
             self.add_open_item(f"{name}: not flown; {support.reason}", item.seq, arduplane=not as_px4, px4=as_px4)
         elif item.command in MARKS or item.command in CAMERA_SWITCHES:
-            # A mark needs no note, because it does nothing by itself. The survey rule judges camera switches.
+            # A marker command (such as DO_LAND_START or JUMP_TAG) needs no note, because it does nothing by itself. The
+            # survey rule judges camera switches.
             return
         elif support.reason == CAMERA_REASON:
             notes.add(f"{name}: {CAMERA_REASON}", item.seq)
@@ -902,7 +905,10 @@ class _ItineraryBuilder:
 
 
 def _first_position(mission: Mission) -> Home:
-    """Return the position of the first item with a position as a home with unknown altitude."""
+    """Return the position of the first item that has one, as a home of unknown altitude (NaN).
+
+    Raises MissionError if no item has a position.
+    """
     for item in mission.items:
         if item.command in PLACES | TAKEOFFS | LANDINGS and item.has_position:
             return Home(item.lat_deg, item.lon_deg, math.nan)

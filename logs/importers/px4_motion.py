@@ -256,9 +256,13 @@ def _read_controls(topics: Topics, parameters: Mapping[str, float]) -> tuple[Sam
 
 
 def _find_forward_motors(topics: Topics, airframe: int, parameters: Mapping[str, float], motors: Samples) -> list[int]:
-    """Return the indices of the motors that push forward.
+    """Return the indices of the forward-thrust motors.
 
-    Raises LogError for a VTOL without such a motor.
+    A VTOL's forward motors are the rotors whose axis is more forward than up. Any other aircraft has only forward
+    motors: those that CA_ROTOR_COUNT counts or, if it is absent or 0, those with a recorded output.
+
+    Raises LogError for a VTOL without a forward motor. The error names CA_ROTOR_COUNT, because no single rotor's axis
+    is at fault.
     """
     count = int(np.clip(parameters.get("CA_ROTOR_COUNT", 0.0), 0.0, _MOTORS))
     if airframe == _STANDARD_VTOL:

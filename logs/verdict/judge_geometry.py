@@ -30,13 +30,15 @@ def judge_geometry(setup: FlightSetup, requirements: RouteRequirements | None = 
     >>> from flight.simulation.setup import make_limits
     >>> from world.scenario import load_scenario
     >>> scenario, envelope = load_scenario("tight"), load_envelope(find_aircraft("aerosonde"))
-    >>> way = [MissionItem(k, 16, 0, (0.0,) * 4, 46.0, 8.0 + 0.001 * k, 60.0 + 20.0 * k) for k in range(2)]
-    >>> mission, limits = Mission(None, tuple(way)), make_limits(scenario, envelope, 25.0, 0.5)
+    >>> items = [MissionItem(k, 16, 0, (0.0,) * 4, 46.0, 8.0 + 0.001 * k, 60.0 + 20.0 * k) for k in range(2)]
+    >>> mission, limits = Mission(None, tuple(items)), make_limits(scenario, envelope, 25.0, 0.5)
     >>> route = make_route(mission, scenario.origin, scenario.terrain, 25.0, False, limits)
-    >>> verdict = judge_geometry(FlightSetup(scenario, mission, route, limits, "aerosonde", 888.0, seed=1))
+    >>> setup = FlightSetup(scenario, mission, route, limits, "aerosonde", battery=888.0, seed=1)
+    >>> verdict = judge_geometry(setup)
     >>> verdict.headline
     'not flyable: slope on leg 0, to item 1 (14.5° > 14.2°)'
-    >>> [[change.what for change in one] for finding in verdict.findings for one in finding.suggestions]
+    >>> suggestions = [suggestion for finding in verdict.findings for suggestion in finding.suggestions]
+    >>> [[change.what for change in suggestion] for suggestion in suggestions]
     [['airspeed'], ['rise'], ['length']]
     """
     requirements = requirements or route_requirements(setup)

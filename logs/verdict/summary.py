@@ -225,12 +225,13 @@ def _near_miss_notes(findings: Sequence[Finding]) -> list[str]:
 
 
 def _altitude_notes(findings: Sequence[Finding]) -> list[str]:
-    """Return notes on the worst altitude errors at waypoints and on legs that follow the ground."""
+    """Return notes on the worst altitude errors among the passed checks of waypoints and of ground-following legs."""
     waypoint_errors = _passing_errors(findings, "waypoint", "height error")
+    # The slope rule judges how well a leg follows the ground, because its slope is the slope of the ground.
     leg_errors = _passing_errors(findings, "slope", GROUND_FOLLOWING_ERROR)
     return [
         *_worst_error_notes(waypoint_errors, "passed", "its altitude"),
-        *_worst_error_notes(leg_errors, "flown up to", "its height over the ground"),
+        *_worst_error_notes(leg_errors, "flown up to", "its height above ground"),
     ]
 
 

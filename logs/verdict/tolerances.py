@@ -257,7 +257,7 @@ MAX_PHOTO_COURSE_ERROR_RAD = math.radians(30.0)
 PHOTO_STEP_M = 1.0
 # Fraction of a photo.  Photos may overlap by this much less than required. If one line is off by a quarter of the
 # spacing (`PHOTO_OFFSET_FRACTION`) and its neighbour is not, a side overlap of 60 % falls to 50 %.
-PHOTO_OVERLAP_FRACTION = 0.1
+PHOTO_OVERLAP_TOLERANCE = 0.1
 # Radii of the bank limit's arc.  A turn-around too tight to be flown as drawn may lead this far beyond its waypoints: a
 # turn back onto the next line takes 1 + sqrt(3) radii, and rolling takes the rest.
 TURN_AROUND_RADII = 3.25

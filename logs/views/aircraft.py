@@ -288,10 +288,11 @@ def _step_title(step: StepResponse) -> str:
     if step.control == "throttle":
         size_text = f"{100.0 * step.size:+.0f} %"
     else:
+        # Directions of a positive and of a negative step.
         direction_names = {
             "elevator": ("down", "up"),
             "aileron": ("to roll right", "to roll left"),
-            "rudder": ("to yaw left", ""),
+            "rudder": ("to yaw left", "to yaw right"),
         }
         size_text = f"{abs(math.degrees(step.size)):.1f}° {direction_names[step.control][step.size < 0.0]}"
     return f"{name} {size_text}" + (f", {step.hold_time:.0f} s" if math.isfinite(step.hold_time) else ", held")

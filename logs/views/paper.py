@@ -18,6 +18,7 @@ from logs.views.labels import LabelPlacer
 from logs.views.threats_and_zones import threat_circles
 from world.arrays import Floats
 from world.scenario import Scenario
+from world.wording import count_text
 
 # Margin left of the map, inches.
 _LEFT = 0.72
@@ -38,7 +39,7 @@ _DASHES: tuple[Any, ...] = (
     (0, (7, 2)),
     (0, (2.5, 1.5)),
 )
-_LOOKS: tuple[dict[str, Any], ...] = tuple(
+_STYLES: tuple[dict[str, Any], ...] = tuple(
     {"color": shade, "linestyle": dashes} for shade, dashes in zip(theme.SERIES, _DASHES, strict=True)
 )
 _MARKERS = ("o", "s", "^", "D", "v", "P")
@@ -61,29 +62,30 @@ class PaperPath:
 def draw_paths(scenario: Scenario, algorithm: str, paths: Sequence[PaperPath]) -> Figure:
     """Draw the paths of one algorithm over contours, missile and radar circles.
 
+    The legend states the path length ratio (PLR): length relative to the straight line from start to destination.
     As in Yang, Tang and Lozano 2014, Figs. 5-8.
 
     >>> from logs.recording.example_log import example_log
     >>> setup = example_log().setup
     >>> figure = draw_paths(setup.scenario, "umda", [PaperPath(setup.route.positions, 1.01, safe=True)])
     >>> figure.axes[0].get_title(loc="left")
-    'example: 1 runs of umda, 1 safe'
+    'example: 1 run of umda, 1 safe'
     """
     safe_count = sum(path.safe for path in paths)
-    title = f"{scenario.name}: {len(paths)} runs of {algorithm}, {safe_count} safe"
+    title = f"{scenario.name}: {count_text(len(paths), 'run')} of {algorithm}, {safe_count} safe"
     with clean_style():
         figure, axes, ground_handles = _draw_ground_and_threats(scenario, title, _LEGEND)
         handles: list[Any] = []
-        for is_safe, look, label in ((True, _LOOKS[0], "safe"), (False, _LOOKS[1], "not safe")):
+        for is_safe, style, label in ((True, _STYLES[0], "safe"), (False, _STYLES[1], "not safe")):
             matching_paths = [path for path in paths if path.safe == is_safe]
             for path in matching_paths:
-                axes.plot(*path.waypoints[:, :2].T, linewidth=1.3, alpha=0.85, zorder=5, **look)
-                axes.plot(*path.waypoints[1:-1, :2].T, ".", color=look["color"], markersize=3.0, zorder=5.1)
+                axes.plot(*path.waypoints[:, :2].T, linewidth=1.3, alpha=0.85, zorder=5, **style)
+                axes.plot(*path.waypoints[1:-1, :2].T, ".", color=style["color"], markersize=3.0, zorder=5.1)
             if matching_paths:
                 ratios = [path.length_ratio for path in matching_paths]
                 ratio_text = f"{min(ratios):.3f}" + (f" to {max(ratios):.3f}" if len(ratios) > 1 else "")
                 text = f"{len(matching_paths)} path{'s' if len(matching_paths) > 1 else ''} {label}\nPLR {ratio_text}"
-                handles.append(Line2D([], [], linewidth=1.6, label=text, **look))
+                handles.append(Line2D([], [], linewidth=1.6, label=text, **style))
         handles += _draw_ends(axes, scenario, [path.waypoints for path in paths])
         draw_legend(figure, handles + ground_handles, _LEFT, (_LEGEND - 0.02) / figure.get_figheight())
     return figure
@@ -105,12 +107,12 @@ def draw_encodings(scenario: Scenario, path_by_encoding: Mapping[str, PaperPath]
         title = f"{scenario.name}: one path of each encoding, seed {seed}"
         figure, axes, ground_handles = _draw_ground_and_threats(scenario, title, _TALL_LEGEND)
         handles = []
-        for (name, path), look, marker in zip(path_by_encoding.items(), _LOOKS, _MARKERS, strict=False):
+        for (name, path), style, marker in zip(path_by_encoding.items(), _STYLES, _MARKERS, strict=False):
             axes.plot(
-                *path.waypoints[:, :2].T, linewidth=1.8, marker=marker, markersize=3.5, zorder=5, clip_on=True, **look
+                *path.waypoints[:, :2].T, linewidth=1.8, marker=marker, markersize=3.5, zorder=5, clip_on=True, **style
             )
             text = f"{name}\n{'safe' if path.safe else 'not safe'}, PLR {path.length_ratio:.3f}"
-            handles.append(Line2D([], [], linewidth=1.8, marker=marker, markersize=3.5, label=text, **look))
+            handles.append(Line2D([], [], linewidth=1.8, marker=marker, markersize=3.5, label=text, **style))
         handles += _draw_ends(axes, scenario, [path.waypoints for path in path_by_encoding.values()])
         draw_legend(figure, handles + ground_handles, _LEFT, (_TALL_LEGEND - 0.02) / figure.get_figheight())
     return figure
@@ -170,8 +172,8 @@ def draw_convergence(histories: Mapping[int, Mapping[str, Sequence[Floats]]]) ->
         for column, (threats, searches_by_algorithm) in enumerate(histories.items()):
             upper = figure.add_subplot(grid[0, column])
             lower = figure.add_subplot(grid[1, column], sharex=upper)
-            for (name, searches), look in zip(searches_by_algorithm.items(), _LOOKS, strict=False):
-                _draw_progress(upper, lower, searches, look)
+            for (name, searches), style in zip(searches_by_algorithm.items(), _STYLES, strict=False):
+                _draw_progress(upper, lower, searches, style)
                 names = names if name in names else [*names, name]
             max_count = max(len(searches) for searches in searches_by_algorithm.values())
             upper.set(ylim=(-0.04 * max_count, 1.06 * max_count), title=f"{threats} threats")
@@ -196,14 +198,14 @@ def draw_convergence(histories: Mapping[int, Mapping[str, Sequence[Floats]]]) ->
                 lower.set_ylabel("length ratio of safe paths")
         figure.text(0.012, 0.965, "Convergence over generations", fontsize=11, fontweight="bold")
         handles: list[Any] = [
-            Line2D([], [], linewidth=1.8, label=name, **look) for name, look in zip(names, _LOOKS, strict=False)
+            Line2D([], [], linewidth=1.8, label=name, **style) for name, style in zip(names, _STYLES, strict=False)
         ]
         handles.append(Patch(facecolor=theme.colour("rule"), label="below: line = median, band = shortest to longest"))
         figure.legend(handles=handles, loc="lower left", bbox_to_anchor=(0.065, 0.005), ncols=4)
     return figure
 
 
-def _draw_progress(upper: Any, lower: Any, histories: Sequence[Floats], look: Mapping[str, Any]) -> None:
+def _draw_progress(upper: Any, lower: Any, histories: Sequence[Floats], style: Mapping[str, Any]) -> None:
     """Draw how many searches of one algorithm have a safe path, and the length ratios of these paths.
 
     A search that ended early keeps its last value.
@@ -217,7 +219,7 @@ def _draw_progress(upper: Any, lower: Any, histories: Sequence[Floats], look: Ma
     length_ratio, kill, violations = np.moveaxis(padded_histories, -1, 0)
     is_safe = (violations == 0.0) & (kill == 0.0)
     generation = np.arange(length)
-    upper.plot(generation, is_safe.sum(axis=0), linewidth=1.6, **look)
+    upper.plot(generation, is_safe.sum(axis=0), linewidth=1.6, **style)
     ratios = np.where(is_safe, length_ratio, np.nan)
     is_known = is_safe.any(axis=0)
     if not is_known.any():
@@ -227,8 +229,8 @@ def _draw_progress(upper: Any, lower: Any, histories: Sequence[Floats], look: Ma
         generation[is_known],
         np.nanmin(known_ratios, axis=0),
         np.nanmax(known_ratios, axis=0),
-        color=look["color"],
+        color=style["color"],
         alpha=0.13,
         linewidth=0,
     )
-    lower.plot(generation[is_known], np.nanmedian(known_ratios, axis=0), linewidth=1.6, **look)
+    lower.plot(generation[is_known], np.nanmedian(known_ratios, axis=0), linewidth=1.6, **style)

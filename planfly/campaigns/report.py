@@ -123,7 +123,7 @@ def _draw_pictures(base: CampaignBase, summary: CampaignSummary, store: Store) -
         for entry in summary.by_rule
         for place, count in entry.places
     ]
-    caption = "Share of flyable flights against the mean wind's speed"
+    caption = "Share of flyable flights against mean wind speed"
     if summary.estimate.tally.undecided:
         caption += f", without the {summary.estimate.tally.undecided} that are not judged in full"
     figures = [(draw_probability(bins, summary.goal.target), caption)] if bins else []

@@ -130,7 +130,8 @@ def _add_shared_options(parser: CommandParser) -> None:
     parser.add_argument("--resume", action="store_true", help="continue the campaign in --out")
     add_result_options(
         parser,
-        "folder for the files (default: runs/<name>-<command>; an existing folder is not replaced; see --resume and --overwrite)",
+        "folder for the files (default: runs/<name>-<command>); an existing one is continued with --resume, and "
+        "replaced only with --overwrite",
         junit=True,
     )
 

@@ -71,10 +71,12 @@ def fly_return(world: ReturnWorld, start: Record) -> tuple[float, float] | None:
 
 
 def return_setup(world: ReturnWorld, start: Record, landing: LandingStart | None = None) -> tuple[FlightSetup, Uav]:
-    """Make setup and UAV of a return, with a lead-in, flown by the simulated autopilot.
+    """Make the setup and the UAV for simulating a return to launch, with a lead-in before it.
 
-    The flight is in the mean wind, without turbulence and navigation error.
+    The flight has the mean wind, but neither turbulence nor navigation errors. The times of a forecast are shifted, so
+    that the return begins in the same wind as in the flight.
 
+    start: position, velocity and time at which the return begins.
     landing: the landing sequence that ends the return, or None.
     Raises MissionError for a return without a valid route, and the ScenarioError or ParameterError of `load_uav`.
     """
@@ -86,7 +88,8 @@ def return_setup(world: ReturnWorld, start: Record, landing: LandingStart | None
         wind = replace(wind, field=replace(wind.field, times=times))
     scenario = replace(world.scenario, wind=wind)
     uav = replace(load_uav(scenario), autopilot=world.autopilot)
-    return replace(make_setup(scenario, uav, _return_mission(world, start, landing), 1), nav="perfect"), uav
+    setup = make_setup(scenario, uav, _return_mission(world, start, landing), seed=1)
+    return replace(setup, nav="perfect"), uav
 
 
 def positions_from_start(track: Track, start: Record) -> Floats | None:

@@ -81,6 +81,7 @@ def run_campaign_task(payload: tuple[EditContext, Mission], advance: Advance) ->
     Wind, aircraft, terrain error and start position vary.
 
     payload: editing context, and mission.
+    advance: function that reports the progress: flights done, flights in all, and a remark.
     """
     require_extra("campaigns")
     from planfly.campaigns.statistics.decision import Estimator, Goal, Tally
@@ -94,7 +95,7 @@ def run_campaign_task(payload: tuple[EditContext, Mission], advance: Advance) ->
         undecided += row.outcome == "undecided"
         failure_counts.update({rule for rule, _ in row.failures})
     tally = Tally(flyable, FLIGHT_COUNT - flyable - undecided, undecided=undecided)
-    lower, upper = Estimator(Goal(None, False, FLIGHT_COUNT)).estimate(tally).interval
+    lower, upper = Estimator(Goal(target=None, stops=False, flights=FLIGHT_COUNT)).estimate(tally).interval
     headline = f"{flyable} of {FLIGHT_COUNT} flights are flyable"
     headline += f", {undecided} not judged in full" if undecided else ""
     failure_texts = [f"{rule_word(rule)} fails in {count}" for rule, count in failure_counts.most_common(5)]

@@ -19,7 +19,7 @@ from logs.verdict.findings import GROUND_PATH, Finding
 from logs.verdict.measures.photo_lines import OverlapMeasure, measure_overlap
 from logs.verdict.measures.route_requirements import judged_surveys, route_requirements
 from logs.verdict.rule_words import FRONT_OVERLAP, RULE_WORDS, SIDE_OVERLAP
-from logs.verdict.tolerances import PHOTO_OVERLAP_FRACTION
+from logs.verdict.tolerances import PHOTO_OVERLAP_TOLERANCE
 from logs.verdict.trials import least_change
 from logs.verdict.verdict import Verdict
 from planfly.workflow.open_flight import make_setup
@@ -632,7 +632,7 @@ class _Trials:
         for measure in self._overlaps:
             if measure.is_camera_limited and measure.front is not None and measure.camera.front is not None:
                 ground_speed = measure.photo_spacing / measure.camera.interval
-                overlap = measure.camera.front - PHOTO_OVERLAP_FRACTION
+                overlap = measure.camera.front - PHOTO_OVERLAP_TOLERANCE
                 needed_speed = (1.0 - overlap) * measure.camera.along * measure.height / measure.camera.interval
                 change = _GROUND_SPEED_RATIO * needed_speed - ground_speed
                 speeds.append(self._uav.airspeed + change / autopilot.speeds.true_airspeed_factor(altitude))
@@ -649,7 +649,7 @@ def missing_height(measure: OverlapMeasure) -> float:
         (measure.front, camera.front, measure.photo_spacing, camera.along, measure.height),
         (measure.side, camera.side, measure.line_spacing, camera.across, measure.side_height),
     ):
-        if overlap is not None and required is not None and overlap < required - PHOTO_OVERLAP_FRACTION:
+        if overlap is not None and required is not None and overlap < required - PHOTO_OVERLAP_TOLERANCE:
             missing = max(missing, distance / (width * (1.0 - required)) - height)
     return missing
 

@@ -7,7 +7,7 @@ from flight.mission.surveys import Survey
 from logs.verdict.measures.photo_lines import LineMeasure, OverlapMeasure
 from logs.verdict.rule_words import FRONT_OVERLAP, SIDE_OVERLAP
 from logs.verdict.rules.survey_rule import overlap_text, unusable_parts_text
-from logs.verdict.tolerances import PHOTO_OVERLAP_FRACTION
+from logs.verdict.tolerances import PHOTO_OVERLAP_TOLERANCE
 from planfly.surveys.survey_remedies import NearMiss, SurveyRemedy, ordinal_text
 from world.wording import count_text
 
@@ -137,9 +137,9 @@ def overlap_faults(measure: OverlapMeasure | None) -> dict[str, str]:
         (SIDE_OVERLAP, measure.side, measure.camera.side),
     )
     return {
-        check: f"{check} {100.0 * fraction:.1f} % < {100.0 * (required - PHOTO_OVERLAP_FRACTION):.0f} %"
+        check: f"{check} {100.0 * fraction:.1f} % < {100.0 * (required - PHOTO_OVERLAP_TOLERANCE):.0f} %"
         for check, fraction, required in overlaps
-        if fraction is not None and required is not None and fraction < required - PHOTO_OVERLAP_FRACTION
+        if fraction is not None and required is not None and fraction < required - PHOTO_OVERLAP_TOLERANCE
     }
 
 

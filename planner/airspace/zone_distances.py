@@ -53,7 +53,7 @@ def zone_penetration(
     error_below: float,
     error_above: float,
 ) -> float:
-    """Return the depth of the leg a-b inside zones with their margins, integrated along the leg, m x km.
+    """Return the depth of the leg a-b inside zones with their margins, integrated along the leg, m·km.
 
     heights, to_pixel: ground heights, m, and the map from positions to their pixels.
     sample_spacing: spacing of the ground samples for zone levels that are stated above ground, m.
@@ -128,7 +128,7 @@ def penetration_depth(
 
 @inner
 def _inclusion_excess(records: ZoneRecords, z: int, line: MapSegment, required_distance: float) -> float:
-    """Return how much a line is outside inclusion z or too close to its edge, integrated, m x km.
+    """Return how much a line is outside inclusion z or too close to its edge, integrated, m·km.
 
     required_distance: required distance from the edge, on the inside, m.
     """
@@ -176,7 +176,9 @@ def _sampled_altitude_band(
 
     heights, to_pixel: ground heights, m, and the map from positions to their pixels.
     sample_spacing: spacing of the ground samples, m.
+    a, b: (3,) ends of the line, m.
     first_fraction, last_fraction: limits of the part, as fractions of the line.
+    error_below, error_above: vertical tracking error, m, by which the ranges are extended.
 
     The heights above ground are measured at samples. If the ground is unknown at a sample, they are not limited.
     """
@@ -245,6 +247,7 @@ def measure_zone_margin(
     """Fill the `ZONE_MARGIN` record for a straight piece a-b of a path.
 
     heights, depths, to_pixel: ground heights, m, the same with the opposite sign, and the map from positions to pixels.
+    a, b: (3,) ends of the piece, m.
     lateral_error: (2,) lateral tracking error at a and b, m.
     error_below, error_above: vertical tracking error, m.
     """
@@ -293,7 +296,14 @@ def measure_zone_margin(
 
 @inner
 def _update_margin(zone: Record, required: Record, z: int, horizontal: float, vertical: float, margin: Record) -> None:
-    """Update a `ZONE_MARGIN` record with the distances between a piece of the path and zone z."""
+    """Update a `ZONE_MARGIN` record with the distances between a piece of the path and zone z.
+
+    zone: shape and altitude limits of the zone.
+    required: required horizontal and vertical distances, m.
+    horizontal: distance outside an exclusion or inside an inclusion, m.
+    vertical: distance below the zone's floor or above its ceiling, m.
+    margin: the record to update.
+    """
     excess = max(horizontal - required.horizontal, vertical - required.vertical)
     if not zone.exclusion:
         excess = min(horizontal - required.horizontal, -vertical - required.vertical)
@@ -350,7 +360,9 @@ def _exact_altitude_band(
     """Return the range of altitudes of the line a-b, and the exact range of its heights above ground.
 
     heights, depths, to_pixel: ground heights, m, the same with the opposite sign, and the map from positions to pixels.
+    a, b: (3,) ends of the line, m.
     lateral_error: (2,) width of the ground strip on each side of the line that is included, at a and at b, m.
+    error_below, error_above: vertical tracking error, m, by which the ranges are extended.
     """
     band = altitude_band(a[2], b[2], error_below, error_above)
     horizontal_length = max(1e-9, math.hypot(b[0] - a[0], b[1] - a[1]))

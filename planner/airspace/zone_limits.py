@@ -168,6 +168,7 @@ def make_airspace(scenario: Scenario, margins: ZoneMargins, buffer: float) -> Pl
     depths.setflags(write=False)
     buffers = [buffer, buffer]
     if max_height is not None and terrain is not None:
+        # 1 cm less, against rounding.
         headrooms = max_height - (ends[:, 2] - terrain.height(ends[:, 0], ends[:, 1])) - 0.01
         buffers = [
             buffer if headroom >= buffer else margins.end_fraction * max(0.0, float(headroom)) for headroom in headrooms
@@ -276,7 +277,12 @@ def view_shape(records: ZoneRecords, z: int, line: MapSegment, max_distance: flo
 
 @inlined
 def _view_circle(along: float, across: float, radius: float, horizontal_length: float) -> ShapeView:
-    """Measure a circle in the axes of a line, given its centre along and across the line."""
+    """Measure a circle in the axes of a line.
+
+    along, across: position of the centre along and across the line, from the start of the line, m.
+    radius: m.
+    horizontal_length: length of the line, m.
+    """
     distance_beyond_end = along - min(horizontal_length, max(0.0, along))
     min_distance = math.sqrt(distance_beyond_end * distance_beyond_end + across * across) - radius
     max_inside_distance = math.sqrt(max(abs(along), abs(along - horizontal_length)) ** 2 + across * across) - radius

@@ -1,7 +1,7 @@
 """Measure zones and the maximum height above ground: violations for the search, margins for the certificate.
 
 A search adds to a path's scores the depth of its legs in zones (bounds) and their excess over the maximum height above
-ground (terrain), both in m x km; the paper's scores count pieces of legs instead. Each leg is first tested as a
+ground (terrain), both in m·km; the paper's scores count pieces of legs instead. Each leg is first tested as a
 whole with the largest lateral deviation of the flight, corners included, and cut into parts only where that test fails.
 A certificate measures the distance from each zone and the maximum height above ground of every piece of the path.
 """
@@ -153,7 +153,7 @@ def add_airspace_violations(
     lags: Records,
     violations: Record,
 ) -> None:
-    """Add a path's violations of zones and of the maximum height to a `VIOLATIONS` record, m x km.
+    """Add a path's violations of zones and of the maximum height to a `VIOLATIONS` record, m·km.
 
     path: (w, 3) m.
     legs, lags: `LEG` and `HEIGHT_LAG` records of the legs.
@@ -169,7 +169,7 @@ def add_airspace_violations(
         offset_before, offset_after = float(flown_corners[i].fly_by_offset), float(flown_corners[i + 1].fly_by_offset)
         below, above = float(lags[i].max_below), -float(lags[i].min_below)
         if has_max_height:
-            violations.terrain += _leg_excess_height(data, required, path[i], path[i + 1], legs[i], lags[i], across)
+            violations.terrain += _leg_excess_height(data, required, path[i], path[i + 1], lags[i], across)
         max_offset = max(offset_before, offset_after)
         if has_zones and _leg_zone_penetration(data, path[i], path[i + 1], across + max_offset, below, above) > 0.0:
             first_fraction = min(1.0, END_DISTANCE_M / max(legs[i].run, 1e-6)) if i == 0 else 0.0
@@ -207,8 +207,9 @@ def add_airspace_violations(
 def airspace_excess(
     data: ProblemArrays, start: Floats, end: Floats, below: float, above: float, max_excess: float
 ) -> float:
-    """Return the zone penetration plus the excess height of a leg, integrated along the leg, m x km.
+    """Return the zone penetration plus the excess height of a leg, integrated along the leg, m·km.
 
+    start, end: (3,) ends of the leg, m.
     below, above: vertical tracking error, m.
     max_excess: value beyond which the integration stops.
     """
@@ -224,8 +225,9 @@ def airspace_excess(
 def _leg_zone_penetration(
     data: ProblemArrays, start: Floats, end: Floats, lateral: float, below: float, above: float
 ) -> float:
-    """Return the depth of a leg in zones enlarged by the tracking error, integrated along the leg, m x km.
+    """Return the depth of a leg in zones enlarged by the tracking error, integrated along the leg, m·km.
 
+    start, end: (3,) ends of the leg, m.
     lateral, below, above: tracking error, m.
     """
     zones = data.airspace.zones
@@ -238,25 +240,31 @@ def _leg_excess_height(
     required: RequiredClearance,
     leg_start: Floats,
     leg_end: Floats,
-    leg: Record,
     lag: Record,
-    across: float,
+    half_width: float,
 ) -> float:
-    """Return the excess of a leg over the maximum height above ground, integrated along the leg, m x km.
+    """Return the excess of a leg over the maximum height above ground, integrated along the leg, m·km.
 
-    lag: height lag of the autopilot on the leg, which is added to the altitude of the leg.
-    across: half width of the examined ground strip below the leg, m.
+    required: the maximum height, expressed as a clearance by `required_headroom`.
+    leg_start, leg_end: (3,) m.
+    lag: `HEIGHT_LAG` record of the leg; a height above the leg, by which the aircraft lags in a descent, adds to the
+        excess.
+    half_width: half width of the examined ground strip below the leg, m.
+
+    Lag and half width are ignored for an autopilot without tracking error.
     """
     if not data.tracking.has_error:
         return _swath_excess_height(data, required, leg_start, leg_end, 0.0, 0.0, math.inf)
     total, start, end = 0.0, np.empty(3), np.empty(3)
+    # The lag decays exponentially along the leg. The leg is cut at fixed multiples of the decay length, and each part
+    # gets the largest height above the leg at its two ends.
     for k in range(len(_LAG_CUTS)):
         begin_fraction = min(1.0, _LAG_CUTS[k] / max(1e-9, lag.decay))
         end_fraction = min(1.0, _LAG_CUTS[k + 1] / max(1e-9, lag.decay)) if k + 1 < len(_LAG_CUTS) else 1.0
         if end_fraction > begin_fraction:
             _cut_segment(leg_start, leg_end, begin_fraction, end_fraction, start, end)
             above = max(0.0, -lag_at(lag, begin_fraction), -lag_at(lag, end_fraction))
-            total += _swath_excess_height(data, required, start, end, across, above, math.inf)
+            total += _swath_excess_height(data, required, start, end, half_width, above, math.inf)
     return total
 
 
@@ -270,12 +278,14 @@ def _swath_excess_height(
     above: float,
     max_excess: float,
 ) -> float:
-    """Return the excess of a line over the maximum height, integrated along it, m x km.
+    """Return the excess of a line over the maximum height, integrated along it, m·km.
 
     The excess is the largest of three lines: the line itself, and one line at the distance `lateral` (m) on each side.
 
     required: the maximum height, expressed as a clearance by `required_headroom`.
-    max_excess: value beyond which the computation stops; the result is then a lower bound above it.
+    start, end: (3,) ends of the line, m.
+    above: largest height of the aircraft above the line, m.
+    max_excess: value beyond which the computation stops; the result is then a lower bound above it. inf never stops.
     """
     horizontal_length = max(1e-9, math.hypot(end[0] - start[0], end[1] - start[1]))
     east, north = lateral * (end[1] - start[1]) / horizontal_length, -lateral * (end[0] - start[0]) / horizontal_length
@@ -300,7 +310,12 @@ def _swath_excess_height(
 def _cut_segment(
     leg_start: Floats, leg_end: Floats, begin_fraction: float, end_fraction: float, start: Floats, end: Floats
 ) -> None:  # pragma: no cover
-    """Fill `start` and `end` with the ends of a part of a leg, between two fractions of the leg's length."""
+    """Fill `start` and `end` with the ends of a part of a leg, between two fractions of the leg's length.
+
+    leg_start, leg_end: (3,) ends of the leg, m.
+    begin_fraction, end_fraction: 0 to 1.
+    start, end: (3,) arrays to fill, m.
+    """
     for axis in range(3):
         start[axis] = leg_start[axis] + begin_fraction * (leg_end[axis] - leg_start[axis])
         end[axis] = leg_start[axis] + end_fraction * (leg_end[axis] - leg_start[axis])

@@ -120,7 +120,12 @@ def _piece_ends(decay: float, horizontal_length: float) -> Floats:
 
 @inner
 def _cut_piece(start: Floats, end: Floats, begin_fraction: float, end_fraction: float, piece: Record) -> None:
-    """Set the ends of a piece to the points at two fractions of a line."""
+    """Set the ends of a piece to the points at two fractions of a line.
+
+    start, end: (3,) ends of the line, m.
+    begin_fraction, end_fraction: 0 to 1.
+    piece: record whose ends are set.
+    """
     for axis in range(3):
         piece.begin[axis] = start[axis] + begin_fraction * (end[axis] - start[axis])
         piece.end[axis] = start[axis] + end_fraction * (end[axis] - start[axis])
@@ -128,7 +133,12 @@ def _cut_piece(start: Floats, end: Floats, begin_fraction: float, end_fraction: 
 
 @inner
 def _set_deviations(lag: Record, begin_fraction: float, end_fraction: float, piece: Record) -> None:
-    """Set the deviations of a piece below and above its leg, between two fractions of the leg."""
+    """Set the deviations of a piece below and above its leg, between two fractions of the leg.
+
+    lag: `HEIGHT_LAG` record of the leg.
+    begin_fraction, end_fraction: 0 to 1.
+    piece: record whose largest distances below and above the leg (m, not negative) are set.
+    """
     begin_lag, end_lag = lag_at(lag, begin_fraction), lag_at(lag, end_fraction)
     piece.below, piece.above = max(0.0, begin_lag, end_lag), max(0.0, -begin_lag, -end_lag)
 
@@ -186,7 +196,10 @@ def missile_distance(data: ProblemArrays, waypoints: Floats) -> float:
 def _segment_distance(threats: Records, start: Floats, end: Floats, min_distance: float) -> float:
     """Return the distance from a segment to the nearest missile sphere, m, if it is below `min_distance`.
 
-    Otherwise return `min_distance`.
+    Otherwise return `min_distance`. The distance is negative inside a sphere.
+
+    threats: records of the threats; those without a kill radius are ignored.
+    start, end: (3,) ends of the segment, m.
     """
     dx, dy, dz = end[0] - start[0], end[1] - start[1], end[2] - start[2]
     length2 = dx * dx + dy * dy + dz * dz
@@ -201,6 +214,10 @@ def _segment_distance(threats: Records, start: Floats, end: Floats, min_distance
         x, y, z = x + fraction * dx, y + fraction * dy, z + fraction * dz
         min_distance = min(min_distance, math.sqrt(x * x + y * y + z * z) - threat.kill_radius)
     return min_distance
+
+
+# Distance of the added points from the ends of the path, m; only the courses to them matter.
+_END_POINT_DISTANCE_M = 1e4
 
 
 @compiled
@@ -223,14 +240,20 @@ def with_end_course_points(data: ProblemArrays, path: Floats) -> Floats:
             for axis in range(2):
                 out[added_row, axis] = 2.0 * path[end_row, axis] - path[neighbour_row, axis]
         else:
-            out[added_row, 0] += sign * 1e4 * math.sin(course)
-            out[added_row, 1] += sign * 1e4 * math.cos(course)
+            out[added_row, 0] += sign * _END_POINT_DISTANCE_M * math.sin(course)
+            out[added_row, 1] += sign * _END_POINT_DISTANCE_M * math.cos(course)
     return out
 
 
 @compiled
 def turn_and_roll_lengths(data: ProblemArrays, waypoints: Floats) -> tuple[Floats, Floats]:  # pragma: no cover
-    """Return the lengths that each leg needs for its turns and for the roll between them, (w - 1,) m each."""
+    """Return the lengths that each leg needs for its turns, and for rolling from one bank to the next.
+
+    waypoints: (w, 3) m.
+
+    Returns the turn lengths and the roll lengths, (w - 1,) m each. The roll lengths of fly-over waypoints are 0: such a
+    turn begins at its waypoint, and its turn length already extends to where the track has rejoined the next leg.
+    """
     count = waypoints.shape[0]
     legs, corners = np.zeros(count - 1, dtype=LEG), np.zeros(count, dtype=CORNER)
     turns, rolls = np.zeros(count - 1), np.zeros(count - 1)

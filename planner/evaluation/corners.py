@@ -58,9 +58,15 @@ def measure_legs(path: Floats, legs: Records) -> None:
 
 @inner
 def measure_corners(data: ProblemArrays, wind: Wind, path: Floats, legs: Records, corners: Records) -> None:
-    """Measure the turns of a path (w, 3), and fill its `CORNER` records (w,).
+    """Measure the turns of a path, and fill its `CORNER` records.
 
-    legs: filled `LEG` records of the path.
+    wind: downwind unit vector.
+    path: (w, 3) m.
+    legs: filled `LEG` records (w - 1,) of the path.
+    corners: `CORNER` records (w,) to fill.
+
+    At the first and the last waypoint the turn is from or to the prescribed end course. There is no turn without one,
+    and none at a leg without length.
     """
     aircraft, tracking = data.aircraft, data.tracking
     leg_count: int = legs.shape[0]
@@ -92,8 +98,13 @@ def measure_corner(
 ) -> None:
     """Measure the turn between the unit courses u and v, and fill its `CORNER` record.
 
+    aircraft: performance, with the bank limit and the wind.
+    tracking: tracking error of the autopilot; it can lengthen the parts of the legs that the turn takes.
+    wind: downwind unit vector.
+    is_turning: False for a waypoint without a turn; all values are then 0.
+    ux, uy, vx, vy: east and north of the courses before and after the turn.
     amsl: altitude of the turn, m.
-    All values are 0 if `is_turning` is False.
+    corner: the record to fill.
     """
     tangent, radius, excursion = 0.0, 0.0, 0.0
     if is_turning:
@@ -142,6 +153,9 @@ def turn_length(fly_over: bool, corners: Records, i: int) -> float:
     """Return the length of leg i that its two turns take up, m.
 
     A fly-over turn takes up only the leg after it, where its track returns to the leg.
+
+    fly_over: True for fly-over waypoints.
+    corners: filled `CORNER` records (w,) of the path.
     """
     if not fly_over:
         return corners[i].after + corners[i + 1].before
@@ -157,7 +171,11 @@ def turn_length(fly_over: bool, corners: Records, i: int) -> float:
 def roll_length(aircraft: PerformanceTable, legs: Records, corners: Records, i: int, amsl: float, wind: Wind) -> float:
     """Return the length of leg i that the aircraft needs to roll between opposite turns at its ends, m.
 
-    The length is 0 if both turns have the same direction.
+    legs, corners: filled `LEG` records (w - 1,) and `CORNER` records (w,) of the path.
+    amsl: altitude of the leg, m.
+    wind: downwind unit vector.
+
+    The length is 0 on the first and the last leg, between turns of the same direction, and next to an unflyable turn.
     """
     if i == 0 or i == legs.shape[0] - 1 or corners[i].tangent <= 0.0 or corners[i + 1].tangent <= 0.0:
         return 0.0
@@ -190,9 +208,11 @@ def fly_by_vertices(
 ) -> Floats:
     """Return vertices (k, 3) of a path past `waypoint` that is nowhere higher than the flown path.
 
-    `blended_vertices` describes the vertices.
+    previous, waypoint, next_waypoint: (3,) m.
+    radius: radius of the fly-by arc, m.
 
-    The length of the blend is computed at the altitude of the waypoint.
+    The corner is flown as an arc with parabolas that blend the slopes of the two legs; `blended_vertices` describes the
+    vertices. The length of the blend is computed at the altitude of the waypoint.
     """
     return blended_vertices(half_blend_length(aircraft, waypoint[2]), previous, waypoint, next_waypoint, radius)
 
@@ -201,8 +221,8 @@ def fly_by_vertices(
 def blended_vertices(blend: float, previous: Floats, waypoint: Floats, next_waypoint: Floats, radius: float) -> Floats:
     """Return vertices (k, 3) of a path past `waypoint` that is nowhere higher than the flown path.
 
-    blend: half length of a blend (`half_blend_length`).
-    radius: radius of the fly-by arc, m; 0 for none.
+    blend: half length of a blend (`half_blend_length`), m per unit of the slope's change.
+    previous, waypoint, next_waypoint: (3,) m. radius: radius of the fly-by arc, m; 0 for none.
 
     The vertices are the point on the leg where the blend of slopes begins, points along the arc between its tangent
     points, and the point on the next leg where the blend ends. The height changes linearly along the arc. Where the
@@ -266,6 +286,7 @@ def leg_parts_at_corner(
 ) -> Floats:
     """Return the parts of both legs next to `waypoint` as three vertices, (3, 3) m.
 
+    previous, waypoint, next_waypoint: (3,) m.
     length_before, length_after: lengths of the two parts, m, at most the length of the leg.
 
     The waypoint is the second vertex.
@@ -282,7 +303,12 @@ def leg_parts_at_corner(
 
 @inlined
 def _set_vertex(out: Floats, row: int, east: float, north: float, up: float) -> None:
-    """Set row `row` of vertices (k, 3) to a position, m."""
+    """Set a row of vertices to a position.
+
+    out: (k, 3) array of vertices, m.
+    row: index of the row.
+    east, north, up: m.
+    """
     out[row, 0] = east
     out[row, 1] = north
     out[row, 2] = up

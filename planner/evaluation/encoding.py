@@ -348,6 +348,9 @@ def bearing_encoding(space: Space, waypoints: int) -> Encoding:
 def _step_encoding(name: str, space: Space, waypoints: int, max_angle: float, *, turning: bool) -> Encoding:
     """Make an encoding of each inner waypoint as a step (r, theta, up) from the previous one.
 
+    r is the horizontal length of the step, theta its course, and up the altitude of the waypoint.
+
+    waypoints: number w of waypoints of a path, both ends included.
     max_angle: limit of theta to either side, rad.
     turning: True if theta is relative to the previous step, False if relative to the direct line.
     """

@@ -54,7 +54,14 @@ def front_values(data: ProblemArrays, energy: TravelCost | None, paths: Floats) 
 def _fill_values(
     data: ProblemArrays, time_cost: TravelCost, energy_cost: TravelCost, paths: Floats, out: Floats
 ) -> None:
-    """Add the values of paths (n, w, 3) to a table of zeros (n, 5), in the order of `Value`."""
+    """Fill a table with the values of paths: length, exposure, clearance, time and energy.
+
+    time_cost, energy_cost: costs of a leg in time (s) and in energy.
+    paths: (n, w, 3) m.
+    out: (n, 5) table of zeros to fill, in the order of `Value`.
+
+    The exposure is the mean detection on a leg times the leg's time; the clearance is the smallest height.
+    """
     for n in range(paths.shape[0]):
         path = paths[n]
         min_height = math.inf

@@ -103,9 +103,14 @@ def score_path(
     violations: Record,
     objectives: Record,
 ) -> None:
-    """Score a path (w, 3): add to a `VIOLATIONS` record of zeros, and fill an `OBJECTIVES` record.
+    """Score a path: add its violations, and fill its objectives.
 
+    data: the planning problem.
+    limits: limits that are precomputed from the problem.
     scratch: working memory for a path of w waypoints.
+    path: (w, 3) m.
+    violations: `VIOLATIONS` record of zeros, to which the violations are added.
+    objectives: `OBJECTIVES` record to fill.
     """
     score_legs(data, limits, scratch, path, violations, objectives)
     score_ground(data, limits, scratch, path, violations)
@@ -152,7 +157,12 @@ def score_legs(
 def score_ground(
     data: ProblemArrays, limits: PrecomputedLimits, scratch: PathScratch, path: Floats, violations: Record
 ) -> None:
-    """Add the violations of the clearance above ground along the legs: the second part of `score_path`."""
+    """Add the violations of the clearance above ground along the legs: the second part of `score_path`.
+
+    scratch: legs and lags of the path from `score_legs`; its records of terrain samples are overwritten.
+    path: (w, 3) m.
+    violations: `VIOLATIONS` record, to whose terrain violation the deficits are added.
+    """
     legs, terrain_legs = scratch.legs, scratch.terrain_legs
     sample_terrain(
         data.heights,
@@ -179,7 +189,17 @@ def score_missiles(
     violations: Record,
     objectives: Record,
 ) -> None:
-    """Set the exposure to missiles, and add the clearance violations of corners, as part of `score_path`."""
+    """Set the exposure to missiles, and add the clearance violations of corners, as part of `score_path`.
+
+    scratch: legs, corners, ground samples and lags of the path from `score_legs` and `score_ground`; its missile gaps
+        are overwritten.
+    path: (w, 3) m.
+    violations: `VIOLATIONS` record; the violations of flown corners are added to its terrain violation.
+    objectives: `OBJECTIVES` record, whose kill exposure is set.
+
+    A corner is examined as flown only if it is near ground or missiles, or deviates by more than `CORNER_TOLERANCE_M`
+    from its legs.
+    """
     # Take arrays out of the data once, because passing the data on costs more than evaluating a leg.
     heights, to_pixel, missiles = data.heights, data.to_pixel, data.missiles
     slope_bounds, aircraft, required, margin = data.slope_bounds, data.aircraft, limits.required, data.kill_margin
@@ -190,20 +210,9 @@ def score_missiles(
         x, y, z = path[i, 0], path[i, 1], path[i, 2]
         x2, y2, z2 = path[i + 1, 0], path[i + 1, 1], path[i + 1, 2]
         gap_distance = max(flown_corners[i].missile_distance, flown_corners[i + 1].missile_distance)
+        below, above = lags[i].max_below, -lags[i].min_below
         exposure, at_beginning, at_end = kill_density(
-            missiles,
-            margin,
-            gap_distance,
-            x,
-            y,
-            z,
-            x2,
-            y2,
-            z2,
-            extents[i],
-            extents[i + 1],
-            lags[i].max_below,
-            -lags[i].min_below,
+            missiles, margin, gap_distance, x, y, z, x2, y2, z2, extents[i], extents[i + 1], below, above
         )
         gaps[i].at_beginning, gaps[i].at_end = at_beginning, at_end
         kill_sum += exposure * legs[i].length
@@ -216,6 +225,7 @@ def score_missiles(
             vertical_drop + lateral_offset > CORNER_TOLERANCE_M
             or min(gaps[i - 1].at_end, gaps[i].at_beginning) < vertical_drop + lateral_offset
         )
+        # A deviation below 1 cm is ignored.
         if vertical_drop + lateral_offset < 0.01 or not (is_near_ground or is_near_missile):
             continue
         if data.tracking.has_error:
@@ -234,7 +244,12 @@ def score_missiles(
 
 @inner
 def score_airspace(data: ProblemArrays, scratch: PathScratch, path: Floats, violations: Record) -> None:
-    """Add the violations of zones and of the maximum height above ground: the last part of `score_path`."""
+    """Add the violations of zones and of the maximum height above ground: the last part of `score_path`.
+
+    scratch: legs, corners and lags of the path from `score_legs`.
+    path: (w, 3) m.
+    violations: `VIOLATIONS` record to which the violations are added.
+    """
     if data.airspace.zones.required.shape[0] > 0 or data.airspace.max_height < math.inf:
         add_airspace_violations(data, path, scratch.legs, scratch.corners, scratch.flown, scratch.lags, violations)
 
@@ -256,7 +271,12 @@ def graded_scores(data: ProblemArrays, paths: Floats) -> tuple[Floats, Floats]:
 
 @compiled
 def _score_paths(data: ProblemArrays, paths: Floats, violations: Records, objectives: Records) -> None:
-    """Fill the `VIOLATIONS` and `OBJECTIVES` records (n,) of paths (n, w, 3)."""
+    """Score paths: add their violations, and fill their objectives.
+
+    paths: (n, w, 3) m.
+    violations: `VIOLATIONS` records (n,) of zeros, to which the violations are added.
+    objectives: `OBJECTIVES` records (n,) to fill.
+    """
     limits = precompute_limits(data)
     scratch = make_scratch(paths.shape[1])
     for n in range(paths.shape[0]):
@@ -269,6 +289,9 @@ def _arc_radius(legs_hold_turns: bool, legs: Records, corners: Records, i: int) 
 
     The radius is 0 at the ends. It is also 0 if turns are limited only by a maximum angle and a leg is too short for
     its two turns. `planner.evaluation.corners.fly_by_radii` gives the radii of a whole path.
+
+    legs_hold_turns: True if legs must hold their turns, so that none is too short.
+    legs, corners: filled `LEG` records (w - 1,) and `CORNER` records (w,) of the path.
     """
     radius: float = corners[i].radius
     if math.isinf(corners[i].tangent):
@@ -297,6 +320,13 @@ def _measure_arcs(
 
     The flight deviates from the legs downwards by the blend of slopes, and sideways by at most R(1/cos(theta/2) - 1)
     plus the sagitta of a chord. It does so within the tangent and half the arc, or within the blend.
+
+    legs_hold_turns: True if legs must hold their turns.
+    fly_over: True for fly-over waypoints, which have no arc before them.
+    path: (w, 3) m.
+    legs, corners: filled `LEG` records (w - 1,) and `CORNER` records (w,) of the path.
+    flown: `FLOWN_CORNER` records (w,) to fill.
+    extents: (w,) array to fill: distance from each waypoint within which the flight leaves the legs, m.
     """
     start, second = path[0], path[1]
     slope_out = (second[2] - start[2]) / max(legs[0].run, 1e-6)
@@ -348,8 +378,11 @@ def _clearance_deficit(
     extra_height: float,
     vertices: Floats,
 ) -> float:
-    """Return the missing clearance along the vertices (k, 3) of a flown turn, integrated, m x km.
+    """Return the missing clearance along the vertices (k, 3) of a flown turn, integrated, m·km.
 
+    heights, slope_bounds: ground heights by pixel, m, and steepest slopes of the ground.
+    to_pixel: map from east and north to column and row.
+    required: required clearance.
     extra_height: height that is required in addition to the clearance, m.
     """
     total = 0.0
@@ -363,9 +396,11 @@ def _clearance_deficit(
 
 @inner
 def _corner_exposure(missiles: MissileIndex, margin: float, vertices: Floats, below: float, above: float) -> float:
-    """Return the kill density times the length along a flown corner (k, 3).
+    """Return the kill density times the length along a flown corner.
 
-    below, above: vertical tracking error, m.
+    margin: distance that is added to the radii of the spheres, m.
+    vertices: (k, 3) points of the corner, m.
+    below, above: largest distance of the aircraft below and above the corner, from its tracking error, m.
     """
     total = 0.0
     for k in range(vertices.shape[0] - 1):

@@ -73,7 +73,11 @@ def clear_sums(sums: Record) -> None:
 
 @inlined
 def copy_point(source: Record, target: Record, size: int) -> None:
-    """Copy a point of each path of a block into another record."""
+    """Copy a point of each path of a block into another record.
+
+    source, target: records with one entry per path for east, north and up, m, and for raster column and row.
+    size: number of paths in the block.
+    """
     for b in range(size):
         target.east[b], target.north[b], target.up[b] = source.east[b], source.north[b], source.up[b]
         target.column[b], target.row[b] = source.column[b], source.row[b]
@@ -81,7 +85,11 @@ def copy_point(source: Record, target: Record, size: int) -> None:
 
 @inlined
 def subtract_points(end: Record, start: Record, size: int, out: Record) -> None:
-    """Fill `out` with the vector from one point to another, for each path of a block."""
+    """Fill `out` with the vector from one point to another, for each path of a block.
+
+    end, start, out: records with one entry per path for east, north and up, m, and for raster column and row.
+    size: number of paths in the block.
+    """
     for b in range(size):
         out.east[b] = end.east[b] - start.east[b]
         out.north[b] = end.north[b] - start.north[b]
@@ -92,7 +100,13 @@ def subtract_points(end: Record, start: Record, size: int, out: Record) -> None:
 
 @inlined
 def interpolate_legs(start: Record, step: Record, fraction: float, size: int, out: Record) -> None:
-    """Fill `out` with the point at a fraction of a leg, for each path of a block."""
+    """Fill `out` with the point at a fraction of a leg, for each path of a block.
+
+    start, step, out: records with one entry per path for east, north and up, m, and for raster column and row; `step`
+        is the vector from the start to the end of the leg.
+    fraction: 0 to 1.
+    size: number of paths in the block.
+    """
     for b in range(size):
         out.east[b] = start.east[b] + fraction * step.east[b]
         out.north[b] = start.north[b] + fraction * step.north[b]
@@ -217,6 +231,7 @@ def _min_slope_limit(data: ProblemArrays, air_angles: Floats) -> float:
     speed, air_angle = data.aircraft.airspeed, math.inf
     for k in range(air_angles.size):
         air_angle = min(air_angle, air_angles[k])
+    # A headwind of about the airspeed leaves no ground speed, so that no slope is defined.
     if not air_angle > 0.0 or wind >= 0.99 * speed * math.cos(air_angle):
         return -1.0
     return math.atan2(speed * math.sin(air_angle), speed * math.cos(air_angle) + wind)
@@ -235,7 +250,15 @@ def _straight_distance(start: Floats, destination: Floats) -> float:
 def _course_slope_limits(
     data: ProblemArrays, ux: float, uy: float, start_altitude: float, end_altitude: float, wind: Wind
 ) -> tuple[float, float]:
-    """Return the climb and dive limits on the unit course u between two altitudes, rad."""
+    """Return the climb and dive limits on the unit course u between two altitudes, rad.
+
+    ux, uy: east and north of the course.
+    start_altitude, end_altitude: m AMSL.
+    wind: downwind unit vector.
+
+    A limit of the scenario applies if there is one. Otherwise the lowest limit of the aircraft at the two altitudes and
+    half-way between them applies. The angle margin is subtracted.
+    """
     climb, dive = data.max_climb, data.max_dive
     if math.isnan(climb) or math.isnan(dive):
         wx, wy = wind
@@ -258,6 +281,8 @@ def _course_slope_limits(
 @compiled
 def slope_limits(data: ProblemArrays, start: Floats, end: Floats) -> tuple[float, float]:
     """Return the climb and dive limits of a leg, rad.
+
+    start, end: (3,) ends of the leg, m. A leg without horizontal length is taken to lead north.
 
     Each limit is the smallest limit at three altitudes of the leg, minus the margin `angle_margin`.
     """
@@ -304,9 +329,13 @@ def slope_excess(
 
 @inlined
 def _turn_excess(cos_max_turn: float, max_turn: float, ux: float, uy: float, vx: float, vy: float) -> float:
-    """Return the excess of the turn between the unit courses u and v over its limit, rad (eq. 1-2).
+    """Return the excess of the turn between the unit courses u and v over its limit, rad.
 
-    The excess is 0 for a turn within the limit.
+    The excess follows eqs. 1 and 2 of Yang, Tang and Lozano 2014. It is 0 for a turn within the limit, and for a leg
+    without a course.
+
+    max_turn, cos_max_turn: the limit, rad, and its cosine.
+    ux, uy, vx, vy: east and north of the courses; (0, 0) for a leg without length.
     """
     dot = ux * vx + uy * vy
     if dot >= cos_max_turn or (ux == 0.0 and uy == 0.0) or (vx == 0.0 and vy == 0.0):
@@ -362,7 +391,9 @@ def _add_turn_violations(
 ) -> None:
     """Add the turns that are too sharp, including the turns from and to prescribed end courses.
 
-    by_amount: True to add the excess, False to add 1.
+    legs: filled `LEG` records (w - 1,) of the path.
+    by_amount: True to add the excess over the turn limit, rad; False to add 1 for each turn.
+    violations: `VIOLATIONS` record, to whose turn violation they are added.
     """
     max_turn, leg_count = data.max_turn, legs.shape[0]
     for i in range(1, leg_count):
@@ -381,9 +412,15 @@ def _add_turn_violations(
 def _add_bounds_violations(
     data: ProblemArrays, path: Floats, corners: Records, by_amount: bool, violations: Record
 ) -> None:
-    """Add the waypoints that are off the map, below the floor or above the ceiling (eq. 7).
+    """Add the waypoints that are off the map, below the floor or above the ceiling.
 
-    The excursion of the flight at a corner reduces the distance to the map's edges.
+    The constraint is eq. 7 of Yang, Tang and Lozano 2014. The excursion of the flight at a corner reduces the distance
+    to the map's edges.
+
+    path: (w, 3) m.
+    corners: filled `CORNER` records (w,) of the path.
+    by_amount: True to add the excess, m; False to add 1 for each waypoint.
+    violations: `VIOLATIONS` record, to whose bounds violation they are added.
     """
     west = data.west
     east = data.east
@@ -411,6 +448,11 @@ def _add_leg_length_violations(
     """Add the missing lengths of legs that are too short for their turns, in units of 100 m.
 
     A leg must be long enough for its turns, the roll between them, and settling.
+
+    path: (w, 3) m.
+    legs, corners: filled `LEG` records (w - 1,) and `CORNER` records (w,) of the path.
+    by_amount: True to add the amounts, at most 10 each; False to add 1 for each leg that is too short.
+    violations: `VIOLATIONS` record, to whose turn violation the amounts are added.
     """
     for i in range(legs.shape[0]):
         required_length, horizontal_length = turn_length(data.fly_over, corners, i), legs[i].run
@@ -430,6 +472,10 @@ def _arc_slope_excess(
     data: ProblemArrays, limits: PrecomputedLimits, path: Floats, i: int, legs: Records, corners: Records
 ) -> float:
     """Return the excess of the slope of the arc at waypoint i over the aircraft's limits, m per m.
+
+    path: (w, 3) m.
+    i: index of an inner waypoint.
+    legs, corners: filled `LEG` records (w - 1,) and `CORNER` records (w,) of the path.
 
     The limits on both courses of the corner apply.
     """

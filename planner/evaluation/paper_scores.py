@@ -135,7 +135,12 @@ def _score_block(
 
 @inlined
 def _find_ground(heights: Heights, size: int, block: Record) -> None:
-    """Interpolate the ground height at one point of each path of a block, as `pixel_height` does."""
+    """Interpolate the ground height at one point of each path of a block, as `pixel_height` does.
+
+    heights: ground heights by pixel, m.
+    size: number of paths in the block.
+    block: one point of each path of the block; the ground heights are stored in it, NaN off the raster.
+    """
     rows, columns = heights.shape
     flat = heights.reshape(heights.size)
     last_column, last_row = columns - 2.0, rows - 2.0
@@ -179,7 +184,15 @@ def _find_ground(heights: Heights, size: int, block: Record) -> None:
 
 @inlined
 def _add_terrain(required: RequiredClearance, size: int, adds_height: bool, block: Record) -> None:
-    """Count the points that are too low, and add the heights above ground if `adds_height` (eq. 5, 11)."""
+    """Count the points that are too low, and add the heights above ground if `adds_height`.
+
+    These are eqs. 5 and 11 of Yang, Tang and Lozano 2014. A point above unknown ground counts as too low.
+
+    required: required clearance.
+    size: number of paths in the block.
+    adds_height: True to add the heights, m; a point below the ground adds 0.
+    block: one point of each path of the block, with the ground below it; its sums are updated.
+    """
     east, north, up = block.point.east, block.point.north, block.point.up
     ground = block.ground
     required_height = block.need
@@ -201,7 +214,12 @@ def _add_terrain(required: RequiredClearance, size: int, adds_height: bool, bloc
 
 @inlined
 def _find_nearby_units(threat_cells: ThreatCells, size: int, block: Record) -> None:
-    """Find the list of threats that may reach each point; store the first entry and the length of each list."""
+    """Find the list of threats that may reach each point; store the first entry and the length of each list.
+
+    threat_cells: lists of the threats by the cells of a grid that they reach.
+    size: number of paths in the block.
+    block: one point of each path of the block; the entries and lengths are stored in it.
+    """
     # A cell is not bounded in height; it stores the heights that its units reach.
     west, south, per_metre = threat_cells.west, threat_cells.south, 1.0 / threat_cells.side
     columns, rows, cells = threat_cells.columns, threat_cells.rows, threat_cells.cells
@@ -225,7 +243,14 @@ def _find_nearby_units(threat_cells: ThreatCells, size: int, block: Record) -> N
 
 @inlined
 def _add_exposures(spheres: Records, units: Int32s, size: int, block: Record) -> None:
-    """Add the kill and detection exposure of the points to nearby threats (eq. 9, 10).
+    """Add the kill and detection exposure of the points to nearby threats.
+
+    These are eqs. 9 and 10 of Yang, Tang and Lozano 2014.
+
+    spheres: centres, radii and scales of the threats.
+    units: numbers of the threats near each cell, one cell after another.
+    size: number of paths in the block.
+    block: one point of each path of the block, with its part of `units`; its sums are updated.
 
     Round k treats the k-th threat of every list that has one. Within a round no branch depends on the contents of a
     list, because the processor could not predict it.
@@ -263,7 +288,15 @@ def _add_exposures(spheres: Records, units: Int32s, size: int, block: Record) ->
 
 @inlined
 def _add_leg(limits: PrecomputedLimits, size: int, is_first: bool, block: Record) -> None:
-    """Add the length of a leg, and count its slope and the turn into it if too large (eq. 1-4, 8)."""
+    """Add the length of a leg, and count its slope and the turn into it if too large.
+
+    These are eqs. 1 to 4 and 8 of Yang, Tang and Lozano 2014.
+
+    limits: tangents of the slope limits, and cosine of the turn limit.
+    size: number of paths in the block.
+    is_first: True for the first leg, which has no turn.
+    block: one leg of each path of the block, and the leg before it; its sums are updated.
+    """
     climb, dive, cos_max_turn = limits.climb_slope, limits.dive_slope, limits.cos_max_turn
     east = block.step.east
     north = block.step.north
@@ -295,7 +328,14 @@ def _add_leg(limits: PrecomputedLimits, size: int, is_first: bool, block: Record
 
 @inlined
 def _add_bounds_violations(data: ProblemArrays, size: int, waypoints: Record, sums: Record) -> None:
-    """Count the waypoints that are off the map, below the floor or above the ceiling (eq. 7)."""
+    """Count the waypoints that are off the map, below the floor or above the ceiling.
+
+    This is eq. 7 of Yang, Tang and Lozano 2014.
+
+    size: number of paths in the block.
+    waypoints: record with one entry per path for east, north and up, m.
+    sums: record with one entry per path, whose counts of waypoints outside are updated.
+    """
     west = data.west
     east = data.east
     south = data.south

@@ -241,6 +241,9 @@ def _make_required_clearance(
 def clearance_at(required: RequiredClearance, east: float, north: float) -> float:
     """Return the required height above ground at a position, m.
 
+    required: clearance, and buffers at both ends and between them, m.
+    east, north: m.
+
     If an end has less than the full buffer, the buffer grows with the distance from this end.
     """
     # Without branches, so that loops over many points become vector instructions: an end with the full buffer never
@@ -380,6 +383,8 @@ def _certified_arrays(scenario: Scenario, limits: Limits, terrain: Terrain) -> P
         clearance=float(limits.min_clearance),
         buffer=buffer,
         kill_margin=CERTIFIED_KILL_MARGIN_M + limits.reserve_threats,
+        # Less than half the spacing of the elevation data, so that no cell is skipped; limited for very fine or coarse
+        # data.
         sample_spacing=min(50.0, max(15.0, 0.4 * terrain.spacing)),
         start_course=_none_to_nan(scenario.start_course),
         destination_course=_none_to_nan(scenario.destination_course),
@@ -403,7 +408,13 @@ def _certified_arrays(scenario: Scenario, limits: Limits, terrain: Terrain) -> P
 def _search_airspace(
     scenario: Scenario, certified: ProblemArrays, attempt: int, up: float, limits: Limits
 ) -> PlannerAirspace:
-    """Return the airspace of a scenario with the margins of a search."""
+    """Return the airspace of a scenario with the margins of a search, which exceed those of the certificate.
+
+    certified: problem with the certificate's margins.
+    attempt: number of the attempt, from 0; the margins grow with it.
+    up: additional buffer above ground, m.
+    limits: limits of the path, with the reserves for the tracking error.
+    """
     buffer = SEARCH_BUFFER_M + attempt * ATTEMPT_BUFFER_M + up
     margins = _zone_margins(scenario, SEARCH_ZONE_MARGIN_M, buffer + limits.reserve_threats, 1.0)
     return make_airspace(
@@ -478,8 +489,13 @@ def _end_buffer(terrain: Terrain, limits: Limits, point: Floats, buffer: float, 
     """Return the buffer (height required above the clearance) at a fixed end, m.
 
     It is the full buffer, or a fraction of the available height if the end is too low for the full buffer.
+
+    point: position of the end, (3,) m.
+    buffer: full buffer, m.
+    fraction: 0 to 1.
     """
     height_above_ground = float(point[2] - terrain.height(point[0], point[1]))
+    # 1 cm less, against rounding.
     available_height = height_above_ground - limits.min_clearance - 0.01
     return buffer if available_height >= buffer else fraction * max(0.0, available_height)
 

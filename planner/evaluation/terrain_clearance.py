@@ -45,7 +45,10 @@ def lag_length(
 ) -> float:
     """Return the distance over the ground that the aircraft covers during its altitude lag, m.
 
+    tracking: tracking error of the autopilot, with the lag, s.
     east, north: unit course.
+    amsl: altitude, m.
+    wind: downwind unit vector.
     """
     (wx, wy), wind_speed, airspeed = wind, wind_speed_at(aircraft, amsl), true_airspeed(aircraft, amsl)
     speed_over_ground = ground_speed(
@@ -84,6 +87,9 @@ def compute_height_lags(
 
     There is no lag at the start of the path.
 
+    tracking: tracking error of the autopilot.
+    wind: downwind unit vector.
+    legs: filled `LEG` records (w - 1,) of the path.
     lags: `HEIGHT_LAG` records to fill, (w - 1,).
     """
     below = 0.0
@@ -122,7 +128,7 @@ TERRAIN_LEG = np.dtype(
         ("next_fraction", np.float64),
         ("beginning", np.float64),
         ("ending", np.float64),
-        # Sum of depths below the required clearance, m x km; and smallest heights above it near both ends, m.
+        # Sum of depths below the required clearance, m·km; and smallest heights above it near both ends, m.
         ("depth", np.float64),
         ("height_at_beginning", np.float64),
         ("height_at_end", np.float64),
@@ -149,8 +155,9 @@ def _take_sample(
 
     Return the height above the required clearance and the next step.
 
-    tiles, tile_side: bounds on the slope of the ground, as in `SlopeBounds`.
-    growth: slope of the required height, as in `RequiredClearance`.
+    heights: ground heights by pixel, m.
+    tiles, tile_side: upper bound on the ground's slope (m per m) within `tile_side` m of each tile of the raster.
+    growth: largest slope of the required height, m per m.
     column, row, up: raster position and altitude of the point.
     required_height: required clearance, m.
     max_further_height: largest height that is required in addition elsewhere on the line, m.
@@ -186,11 +193,15 @@ def terrain_excess(
     bz: float,
     max_excess: float,
 ) -> float:
-    """Return the depth below the required clearance along the line a-b, summed over samples, m x km.
+    """Return the depth below the required clearance along the line a-b, summed over samples, m·km.
 
+    heights: ground heights by pixel, m.
+    slope_bounds: steepest slopes of the ground near each pixel, which set the steps between samples.
+    required: required clearance, with the spacing of samples near the ground.
     extra_height: additional height that is required on this line, m.
     ends: columns and rows of a and b.
-    max_excess: value beyond which the sum ends.
+    ax, ay, az, bx, by, bz: east, north and altitude of the two ends, m.
+    max_excess: value beyond which the sum ends, m·km.
     """
     column, row, last_column, last_row = ends
     column_step, row_step = last_column - column, last_row - row
@@ -232,7 +243,15 @@ def terrain_excess(
 def _start_sampling(
     to_pixel: PolyMapRecord, sample_spacing: float, path: Floats, legs: Records, extents: Floats, terrain_legs: Records
 ) -> None:
-    """Fill `TERRAIN_LEG` records (w - 1,) with their state before the first sample."""
+    """Fill `TERRAIN_LEG` records (w - 1,) with their state before the first sample.
+
+    to_pixel: map from east and north to column and row.
+    sample_spacing: spacing of samples near the ground, m.
+    path: (w, 3) m.
+    legs: filled `LEG` records (w - 1,) of the path.
+    extents: (w,) distance from each waypoint within which the flight leaves the legs, m.
+    terrain_legs: the records to fill.
+    """
     start = path[0]
     column, row = polymap(to_pixel, start[0], start[1])
     for i in range(legs.shape[0]):
@@ -266,8 +285,8 @@ def sample_terrain(
 ) -> None:
     """Fill the `TERRAIN_LEG` record of each leg of a path (w, 3): its depth and its smallest heights.
 
-    extents: (w,) distance within which a point is near a waypoint, m.
-    unfinished: (w - 1,) scratch.
+    legs, lags: filled `LEG` and `HEIGHT_LAG` records (w - 1,) of the path.
+    extents, unfinished: (w,) distance within which a point is near a waypoint, m, and (w - 1,) scratch.
 
     Depths and heights are measured from the required clearance. The smallest heights are exact up to
     `NEAR_GROUND_HEIGHT_M`, and lower bounds above it. The legs are sampled in turn, because the next sample of a leg
@@ -326,7 +345,11 @@ def sample_terrain(
 
 @inlined
 def segment_pixels(to_pixel: PolyMapRecord, ax: float, ay: float, bx: float, by: float) -> Pixels:  # pragma: no cover
-    """Return the raster columns and rows of both ends of a segment."""
+    """Return the raster columns and rows of both ends of a segment: column and row of a, then of b.
+
+    to_pixel: map from east and north to column and row.
+    ax, ay, bx, by: east and north of the two ends, m.
+    """
     column_a, row_a = polymap(to_pixel, ax, ay)
     column_b, row_b = polymap(to_pixel, bx, by)
     return column_a, row_a, column_b, row_b

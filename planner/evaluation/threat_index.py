@@ -89,7 +89,13 @@ def make_threat_cells(position: Floats, radius: Floats, bounds: Floats) -> Threa
 
 @compiled
 def _fill_cells(first: Int32s, units: Int32s, min_altitudes: Int32s, max_altitudes: Int32s, cells: Records) -> None:
-    """Fill the records of the cells: their part of the list of units, and the altitude range of these units."""
+    """Fill the records of the cells: their part of the list of units, and the altitude range of these units.
+
+    first: (cells + 1,) first entry of each cell in the list.
+    units: units of one cell after another.
+    min_altitudes, max_altitudes: (u,) lowest and highest altitude that each unit reaches, m.
+    cells: `THREAT_CELL` records to fill.
+    """
     for k in range(cells.shape[0]):
         cell = cells[k]
         cell.first, cell.count = first[k], first[k + 1] - first[k]
@@ -107,6 +113,12 @@ def _list_units(
     """List the units that reach each cell; return each cell's first entry in the list, and the list.
 
     The list contains the units of one cell after another; the last cell lists all units.
+
+    position: (u, 3) positions of the units, m; altitudes are ignored.
+    radius: (u,) horizontal reach of the units, m; a unit with 0 or less is left out.
+    west, south: edges of the grid, m.
+    cell_size: side of a cell, m.
+    columns, rows: size of the grid.
     """
     count = columns * rows
     first = np.zeros(count + 2, dtype=np.int32)
@@ -238,10 +250,12 @@ def kill_density(
 ) -> tuple[float, float, float]:
     """Return the mean kill density over the segment a-b, and the distances to spheres near its ends, m.
 
+    index: missiles in classes of similar radii, each with its own grid of cells.
     margin: distance that is added to the radii, m.
-    max_distance: a returned distance is exact if it is below this, m.
-    length_a, length_b: lengths at a and at b on which the distances are measured, m.
-    below, above: vertical tracking error, m.
+    max_distance: a returned distance is exact if it is below this, m; otherwise it may be inf.
+    ax, ay, az, bx, by, bz: east, north and altitude of the two ends, m.
+    length_a, length_b: lengths at a and at b on which the distances to the surfaces of spheres are measured, m.
+    below, above: largest distance of the aircraft below and above the segment, from its tracking error, m.
     """
     dx, dy, dz = bx - ax, by - ay, bz - az
     length2 = dx * dx + dy * dy + dz * dz
@@ -338,7 +352,9 @@ def _closest2(
     """Return the squared distance from a point to the part of a segment between two fractions, m^2.
 
     closest_fraction: fraction of the infinite line that is closest to the point.
-    dot, start2, length2: products of the segment and the vector from the point, as in `window_exposure`.
+    begin_fraction, end_fraction: limits of the part, 0 to 1.
+    dot, start2, length2: scalar products of the segment's vector d and the vector s from the point to the segment's
+        start: d.s, s.s and d.d, m^2.
     """
     fraction = closest_fraction if closest_fraction < end_fraction else end_fraction
     fraction = fraction if fraction > begin_fraction else begin_fraction

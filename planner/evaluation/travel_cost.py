@@ -126,6 +126,9 @@ def make_travel_cost(
     The cost is the path's length, or its time or energy divided by the time or energy of a metre of level flight.
     Returns None for the objective energy if the aircraft's power is unknown.
 
+    table: performance of the aircraft at the airspeed of the path.
+    winds: wind of a forecast; without it, only the mean wind is used.
+
     >>> from planfly.workflow.uav import load_uav
     >>> from world.scenario import load_scenario
     >>> limits = load_uav(load_scenario("tight")).limits
@@ -148,6 +151,9 @@ def make_energy_cost(envelope: Envelope, table: PerformanceTable, winds: WindGri
     The power is that of `Envelope.power`: a parabola through idle at the steepest descent, level flight, and full
     throttle. At a height at which level flight is impossible, the power at the nearest height with level flight
     applies.
+
+    table: performance of the aircraft at the airspeed of the path.
+    winds: wind of a forecast; without it, only the mean wind is used.
     """
     rows = np.array([_power_parabola(envelope, true_airspeed(table, float(amsl)), float(amsl)) for amsl in table.amsl])
     is_known = np.isfinite(rows).all(axis=1)
@@ -165,6 +171,9 @@ def _power_parabola(envelope: Envelope, airspeed: float, amsl: float) -> tuple[f
 
     Return its coefficients and the limits of the sine: level, linear, square, min_sine and max_sine, as in
     `TravelCost`. All are NaN if the power is unknown.
+
+    airspeed: m/s.
+    amsl: altitude, m.
     """
     climb, descent = envelope.air_angles(airspeed, amsl)
     min_sine, max_sine = -math.sin(descent), math.sin(climb)
@@ -237,6 +246,9 @@ class _FlightConditions(NamedTuple):
 def _interpolate_wind(winds: WindGrid, x: float, y: float, z: float) -> tuple[float, float]:
     """Return the wind of a grid at a place, m/s, east and north, by trilinear interpolation.
 
+    winds: velocities at the points of a regular grid.
+    x, y, z: east, north and altitude of the place, m.
+
     Beyond the grid the wind at its edge applies.
     """
     velocities = winds.velocities
@@ -257,7 +269,15 @@ def _interpolate_wind(winds: WindGrid, x: float, y: float, z: float) -> tuple[fl
 
 @inner
 def _conditions_at(travel: TravelCost, table: PerformanceTable, x: float, y: float, amsl: float) -> _FlightConditions:
-    """Return the airspeed, the wind and the power coefficients at a place (x, y on the map, m, and m AMSL)."""
+    """Return the airspeed, the wind and the power coefficients at a place.
+
+    travel: weights of the cost, with the wind of a forecast if there is one.
+    table: performance of the aircraft, with the mean wind.
+    x, y: east and north, m.
+    amsl: altitude, m.
+
+    Without a cost of energy the power coefficients are 0.
+    """
     airspeed = true_airspeed(table, amsl)
     if travel.winds.velocities.size == 0:
         (wx, wy), wind_speed = downwind_vector(table), wind_speed_at(table, amsl)
@@ -297,6 +317,8 @@ def _time_energy_cost(
 ) -> tuple[float, bool]:
     """Return the cost of a leg's time and energy in the wind of one place, and True if the leg can be flown.
 
+    travel: weights of time and energy in the cost.
+    table: performance of the aircraft.
     leg: vector of the leg, m.
     x, y, amsl: place at which the wind is taken, m.
     """
@@ -316,7 +338,14 @@ def _time_energy_cost(
 def leg_cost(
     travel: TravelCost, table: PerformanceTable, start: NDArray[np.float64], end: NDArray[np.float64]
 ) -> float:
-    """Return the cost of a leg; inf if the leg cannot be flown."""
+    """Return the cost of a leg; inf if the leg cannot be flown.
+
+    travel: weights of length, time and energy in the cost.
+    table: performance of the aircraft.
+    start, end: (3,) ends of the leg, m.
+
+    Time and energy are integrated along the leg by Simpson's rule with three points.
+    """
     dx, dy, dz = end[0] - start[0], end[1] - start[1], end[2] - start[2]
     total = travel.length * math.sqrt(dx * dx + dy * dy + dz * dz)
     if travel.time == 0.0 and travel.energy == 0.0:
@@ -356,13 +385,15 @@ class LegModel(NamedTuple):
 
 @inner
 def model_leg(travel: TravelCost, table: PerformanceTable, start: Floats, finish: Floats, model: LegModel) -> float:
-    """Return the cost of a leg, which is always finite.
+    """Return the cost of a leg, which is always finite, and model it to second order.
 
-    Fill its first and second derivatives by the leg's ends.
+    travel, table: weights of length, time and energy in the cost, and performance of the aircraft.
+    start, finish: (3,) ends of the leg, m.
+    model: derivatives (2, 3) and curvature (2, 3, 2, 3) of the cost by the two ends, which are filled.
 
-    The curvature (second derivative) is the sum of the curvatures of the length, of the time at each
-    height, and of the power, which are all convex. The coupling of height and course is omitted, so the matrix has no
-    negative eigenvalue.
+    The curvature (second derivative) is the sum of the curvatures of the length, of the time at each height, and of the
+    power, which are all convex. The coupling of height and course is omitted, so the matrix has no negative eigenvalue.
+    Time and energy are integrated along the leg by Simpson's rule with three points.
     """
     slopes, curvature = model.slopes, model.curvature
     slopes[:], curvature[:] = 0.0, 0.0
@@ -433,6 +464,9 @@ def _add_place_model(
     fraction: fraction of the leg at which the place lies.
     weight: weight of the place in the cost of the leg.
     timed_cost: cost of time and energy of the leg in the wind of the place.
+    model: derivatives and curvature of the leg's cost, to which the shares of both ends are added.
+
+    The derivatives are central differences over `HORIZONTAL_STEP_M` and `HEIGHT_STEP_M`.
     """
     x, y, amsl = start[0] + fraction * step[0], start[1] + fraction * step[1], start[2] + fraction * step[2]
     # A forecast changes wind on each axis, the mean profile only with altitude.
@@ -490,6 +524,13 @@ def _add_step_model(
     slope_factor: float,
 ) -> None:
     """Add a leg's curvature and gradient, given with respect to its vector, to the arrays for its two ends.
+
+    curvature: (2, 3, 2, 3) second derivatives of the leg's cost by its ends; updated.
+    slopes: (2, 3) derivatives of the leg's cost by its ends; updated.
+    step_curvature: (3, 3) second derivatives with respect to the vector.
+    factor: factor on `step_curvature`.
+    gradient: derivatives with respect to the vector.
+    slope_factor: factor on `gradient`.
 
     The vector is the end minus the start, so the gradient with respect to the start has the opposite sign.
     """

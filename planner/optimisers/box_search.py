@@ -29,7 +29,14 @@ class BoxSearch(ABC):
         *,
         initial: Floats | None = None,
     ) -> None:
-        """Draw or clip the first samples; the class documents the arguments."""
+        """Clip the first samples to the box, or draw them uniformly.
+
+        lower, upper: (d,) box.
+        rank: function of scores (n, c) that returns their ranks (n,); smaller is better.
+        population: even number of samples.
+        rng: generator of random numbers.
+        initial: (population, d) first samples; None for uniform ones.
+        """
         self.lower, self.upper = lower, upper
         self._rank = rank
         self._rng = rng

@@ -92,7 +92,16 @@ class FrontSampling:
         population: int,
         rng: np.random.Generator,
     ) -> None:
-        """Start with an empty archive; the class documents the arguments."""
+        """Start with an empty archive.
+
+        lower, upper: (d,) box.
+        directions: (k, d) directions of the noise, each as long as its largest deviation.
+        reference: (m,) reference point; solutions with objectives beyond it are ignored.
+        axes: number of variables per point.
+        size: size of the archive.
+        population: number of samples per generation.
+        rng: generator of random numbers.
+        """
         self._lower, self._upper, self._directions = lower, upper, directions
         self.reference, self._axes = reference, axes
         self._size, self._population, self._rng = size, population, rng

@@ -53,7 +53,13 @@ class Gaussian:
     """
 
     def __init__(self, mean: Floats, deviation: float, population: int, scale: Floats | None = None) -> None:
-        """Set the learning rates of CMA-ES for this population and number of variables."""
+        """Set the learning rates of CMA-ES for this population and number of variables.
+
+        mean: (d,) centre of the first samples.
+        deviation: standard deviation of the first samples.
+        population: number of samples per generation.
+        scale: (d,) factors on the deviation along each axis; None for 1.
+        """
         size = mean.size
         self.mean, self.deviation, self.population = mean.copy(), deviation, population
         weights = np.log(population / 2.0 + 0.5) - np.log(np.arange(1, population // 2 + 1))
@@ -67,6 +73,7 @@ class Gaussian:
         self._rank_one_rate = 2.0 / ((size + 1.3) ** 2 + parent_count)
         rate = 2.0 * (parent_count - 2.0 + 1.0 / parent_count) / ((size + 2.0) ** 2 + parent_count)
         self._rank_mu_rate = min(1.0 - self._rank_one_rate, rate)
+        # Mean length of a vector of standard normal variables.
         self._expected_length = math.sqrt(size) * (1.0 - 1.0 / (4.0 * size) + 1.0 / (21.0 * size**2))
         self._matrix = np.diag(np.ones(size) if scale is None else scale**2)
         self._factor = cholesky(self._matrix, 0.0)
@@ -116,6 +123,7 @@ class Gaussian:
             self.best = points[best_row].copy(), scores[best_row].copy()
         self._update_distribution(self._draws[order[: self.weights.size]])
         factor_diagonal = np.diag(self._factor)
+        # Smaller generations learn less, so that more of them may pass without a better point.
         max_stalled_generations = 30 + round(60 * self.mean.size / self.population)
         max_deviation = self.deviation * math.sqrt(float(np.diag(self._matrix).max()))
         self.is_done = (
@@ -136,6 +144,7 @@ class Gaussian:
         ) * mean_draw
         length = math.sqrt(float((self._step_path**2).sum()))
         expected_length = self._expected_length * math.sqrt(1.0 - (1.0 - rate) ** (2 * self._generations))
+        # The test h_sigma of the tutorial: a long step path stalls the path of the covariance.
         is_steady = float(length < (1.4 + 2.0 / (self.mean.size + 1.0)) * expected_length)
         rate = self._path_rate
         path_factor = is_steady * math.sqrt(rate * (2.0 - rate) * self._effective_parent_count)
@@ -181,7 +190,14 @@ class Multistart(BoxSearch):
         *,
         initial: Floats | None = None,
     ) -> None:
-        """Start the first search if there are no first samples; the class documents the arguments."""
+        """Start the first search if there are no first samples.
+
+        lower, upper: (d,) box.
+        rank: function of scores (n, c) that returns their ranks (n,); smaller is better.
+        population: size of the largest generation.
+        rng: generator of random numbers.
+        initial: (n, d) first samples, which are evaluated before the first search; None for none.
+        """
         super().__init__(lower, upper, rank, population, rng, initial=initial)
         self._population = population
         self._centre, self._scale = np.full(lower.size, 0.5), None

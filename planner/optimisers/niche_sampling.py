@@ -159,6 +159,10 @@ def _is_distinct(row: Floats, other_rows: Floats, clearing_radius: Floats) -> bo
     """Return True if a sample (d,) is at least the clearing radius away from every other sample.
 
     Two samples are at least the radius apart if they differ by it or more in at least one variable.
+
+    row: (d,) the sample.
+    other_rows: (n, d) the other samples.
+    clearing_radius: (d,) radius in each variable.
     """
     for n in range(other_rows.shape[0]):
         is_near = True

@@ -86,7 +86,14 @@ class PartialResampling(BoxSearch):
         *,
         initial: Floats | None = None,
     ) -> None:
-        """Start with a small population of samples; the class documents the arguments."""
+        """Start with a small population of samples.
+
+        lower, upper: (d,) box.
+        rank: function of scores (n, c) that returns their ranks (n,); smaller is better.
+        population: size of the largest population.
+        rng: generator of random numbers.
+        initial: (n, d) first population; None for uniform samples.
+        """
         super().__init__(lower, upper, rank, population, rng, initial=initial)
         self._max_count = population
         self._count = min(population, max(MIN_POPULATION, FIRST_POPULATION_PER_VARIABLE * lower.size))

@@ -241,8 +241,12 @@ def _dense_ranks(rows: Floats, begin: int, end: int) -> tuple[Ints, int]:
 def _add_dominator_counts_by_tree(rows: Floats, begin: int, end: int, order: Ints, candidate_ranks: Ints) -> None:
     """Add the number of dominators of each candidate of a group to `candidate_ranks`, in O(n log n).
 
-    The arguments are those of `_add_dominator_counts`, with two rows of scores. A Fenwick tree over the second row
-    counts the dominators; it is faster than a scan if there are many candidates.
+    rows: (2, n) scores, one column per candidate.
+    begin, end: the group is the columns from begin to end - 1, which are sorted by the first score, then by the second.
+    order: (n,) number of the candidate in each column.
+    candidate_ranks: (n,) rank of each candidate by its number; updated.
+
+    A Fenwick tree over the second row counts the dominators; it is faster than a scan if there are many candidates.
     """
     dense_ranks, rank_count = _dense_ranks(rows, begin, end)
     tree = np.zeros(rank_count + 1, dtype=np.int64)

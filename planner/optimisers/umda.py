@@ -49,7 +49,16 @@ class Umda(BoxSearch):
         basis: Floats | None = None,
         floor: Floats | None = None,
     ) -> None:
-        """Draw or clip the first samples; the class documents the arguments."""
+        """Clip the first samples to the box, or draw them uniformly.
+
+        lower, upper: (d,) box.
+        rank: function of scores (n, c) that returns their ranks (n,); smaller is better.
+        population: even number of samples.
+        rng: generator of random numbers.
+        initial: (population, d) first samples; None for uniform ones.
+        basis: (d, d) directions along which marginals are independent, as columns; None for the variables themselves.
+        floor: (d,) minimum standard deviation along each direction, or None.
+        """
         super().__init__(lower, upper, rank, population, rng, initial=initial)
         self._basis = basis
         self._floor = floor

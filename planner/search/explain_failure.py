@@ -92,7 +92,13 @@ def find_separating_zones(scenario: Scenario) -> SeparatingZones | None:
 def _end_cell(
     scenario: Scenario, end: Floats, cell_side: float, min_altitudes: Floats, max_altitudes: Floats
 ) -> tuple[int, int, int]:
-    """Return level, row and column of the cell that contains a fixed end of the path."""
+    """Return level, row and column of the cell that contains a fixed end of the path.
+
+    end: position of the end, (3,) m.
+    cell_side: side of a cell, m.
+    min_altitudes, max_altitudes: (rows, columns) lowest and highest allowed altitude, m; the levels divide each column
+        evenly between them.
+    """
     cell = ((end[:2] - scenario.bounds[:, 0]) / cell_side).astype(np.int64)
     column, row = (
         int(np.clip(index, 0, size - 1))

@@ -92,7 +92,12 @@ def _best_row(scores: Floats) -> Floats:
 def _make_optimiser(
     search: Search, rank: Callable[[Floats], Ints], population: int, initial: Floats | None
 ) -> Umda | DifferentialEvolution:
-    """Make the optimiser that the algorithm names."""
+    """Make the optimiser that the algorithm names.
+
+    rank: function of scores (n, c) that returns their ranks (n,); smaller is better.
+    population: number of samples.
+    initial: (population, d) first samples; None for uniform ones.
+    """
     lower, upper = search.encoding.lower, search.encoding.upper
     if search.algorithm.optimiser == "differential":
         return DifferentialEvolution(lower, upper, rank, population, search.rng, initial=initial)

@@ -261,6 +261,10 @@ def _reaches_destination(
 ) -> bool:
     """Return True if open altitudes of neighbouring columns connect start and destination.
 
+    column_size: side of a column, m.
+    range_bottoms, range_tops: (columns, rows, ranges) bottom and top of the closed ranges of each column, m AMSL.
+    range_counts: (columns, rows) number of closed ranges of each column.
+
     Each open range of a column lies above the closed range with the same index.
     """
     columns, rows, range_limit = range_bottoms.shape

@@ -193,6 +193,7 @@ class _Site:
     def slopes(self, course: float, amsl: float) -> tuple[float, float]:
         """Return the climb and the dive slope (m per m) to plan with on a course (rad) at an altitude (m AMSL)."""
         certified_slopes = aircraft_slopes(self.problem.certified.aircraft, course, amsl)
+        # Slopes stay 1.1 times the angle margin below a limit: the margin of the certificate, and 10 % for rounding.
         stated_limits = (self.limits.max_climb, self.limits.max_dive)
         slopes = []
         for aircraft_slope, certified_slope, stated_limit in zip(
@@ -224,6 +225,7 @@ class _Site:
             ground than required.
         """
         data = self.problem.certified
+        # Near a low end, three quarters of the available height are required; 1 cm less, against rounding.
         start_buffer, end_buffer = (
             min(data.buffer, 0.75 * max(0.0, self.height_above_ground(point) - data.clearance - 0.01))
             for point in end_points
@@ -258,7 +260,16 @@ class _Site:
 
 
 def _make_site(plan: Plan, limits: Limits, home: Floats, terrain: Terrain) -> _Site:
-    """Make the problems that certify departures and approaches, and measure the size of turns in them."""
+    """Make the problems that certify departures and approaches, and measure the size of turns in them.
+
+    plan: plan of the part in the air.
+    limits: limits of the path, without those of the planning algorithm.
+    home: position of home, (3,) m.
+    terrain: ground heights.
+
+    A second problem certifies departures and approaches near the ground: it has neither a clearance nor inclusions with
+    a floor.
+    """
     scenario = plan.scenario
     algorithm = scenario.planner.algorithm if plan.algorithm == GIVEN_WAYPOINTS else plan.algorithm
     algorithm_limits = limits_for(find_algorithm(algorithm, scenario.name), limits)
@@ -319,7 +330,12 @@ def _join_altitudes(points: Sequence[MapPoint], altitudes: Floats) -> Floats:
 
 
 def _ground_profile(terrain: Terrain, start: MapPoint, course: float, length: float) -> tuple[Floats, Floats]:
-    """Return distances along a course, m, and the terrain altitude at each of them, m AMSL; NaN if unknown."""
+    """Return distances along a course, m, and the terrain altitude at each of them, m AMSL; NaN if unknown.
+
+    start: east and north of the first point, m.
+    course: rad.
+    length: length of the profile, m.
+    """
     distances = np.arange(0.0, length + _GROUND_SPACING_M, _GROUND_SPACING_M)
     east, north = start[0] + distances * math.sin(course), start[1] + distances * math.cos(course)
     return distances, terrain.height(east, north)
@@ -351,7 +367,13 @@ class _BestRejected:
 
 
 def _find_departure(site: _Site, launch: Launch) -> tuple[ClimbOut | None, str]:
-    """Return the shortest accepted departure, or None and the reason why no departure is accepted."""
+    """Return the shortest accepted departure, or None and the reason why no departure is accepted.
+
+    A departure may circle before it leads to the plan's first waypoint; the smallest number of laps is tried first.
+
+    site: plan, limits and terrain around home.
+    launch: launch of the scenario, which may prescribe a course.
+    """
     data, first_waypoint = site.problem.certified, site.plan.waypoints[0]
     home_altitude, start_altitude = float(site.home[2]), float(first_waypoint[2])
     takeoff_height = max(_MIN_TAKEOFF_HEIGHT_M, data.clearance + data.buffer + _CLEARANCE_EXCESS_M)
@@ -390,6 +412,9 @@ def _make_departure(
 ) -> ClimbOut | Certificate | None:
     """Make the departure over some points of the map; return it, or its certificate if it is rejected.
 
+    site: plan, limits and terrain around home.
+    course: launch course, rad.
+    points: east and north of the departure from home to the first waypoint, m.
     takeoff_altitude: altitude at the end of the take-off, m AMSL.
 
     Return None if the aircraft cannot climb to the first waypoint on this path.
@@ -510,6 +535,8 @@ def _list_departures(
 ) -> Iterator[tuple[float, float, list[MapPoint]]]:
     """Yield the cost (m), launch course and points of departures from home to the plan's first waypoint.
 
+    site: plan, limits and terrain around home.
+    launches: the launches to try, with their courses.
     laps: number of laps in which the aircraft gains height.
     """
     first_waypoint, start_course = site.plan.waypoints[0], site.scenario.start_course
@@ -564,7 +591,14 @@ class _Final(NamedTuple):
 
 
 def _find_approach(site: _Site, strip: LandingStrip, final_model: FinalModel) -> tuple[Descent | None, str]:
-    """Return the first accepted approach, or None and the reason why no approach is accepted."""
+    """Return the first accepted approach, or None and the reason why no approach is accepted.
+
+    The finals on all landing courses of the strip are tried in turn. An approach is accepted if a path leads from the
+    plan's last waypoint to the final, and if a go-around clears the ground.
+
+    site: plan, limits and terrain around the strip.
+    final_model: airspeed and slope at which the autopilot flies a final.
+    """
     field_altitude = float(site.terrain.height(strip.east, strip.north))
     point = np.array([strip.east, strip.north, field_altitude])
     landing_course = strip.landing_course(site.scenario.wind, field_altitude)
@@ -619,7 +653,12 @@ def _find_finals(
     """Return the clear and flyable finals on a course, and the reason to state if there are none.
 
     Finals that PX4 accepts come first, then the shortest ones.
+
+    site: plan, limits and terrain around the strip.
+    strip: landing strip, which may prescribe the length (m) and the slope (rad) of the final.
+    course: landing course, rad.
     point: landing point, (3,) m.
+    final_model: airspeed and slope at which the autopilot flies a final.
     """
     field_altitude = float(point[2])
     tailwind = site.scenario.wind.components_on_course(course, field_altitude)[0]
@@ -761,6 +800,10 @@ def _approach_altitudes(
     """Return the altitudes of a path between two altitudes, (n,) m AMSL.
 
     The path climbs and descends at a fraction of its slope limits.
+
+    points: (n) east and north of the path, m.
+    slope_factor: fraction of the slope limits.
+    start_altitude, end_altitude: m AMSL.
     """
     top_altitude = max(start_altitude, end_altitude)
     climb, dive = (partial(_scale_slope, site, slope_factor, is_descent, top_altitude) for is_descent in (False, True))
@@ -768,7 +811,13 @@ def _approach_altitudes(
 
 
 def _scale_slope(site: _Site, factor: float, is_descent: bool, altitude: float, course: float) -> float:
-    """Return `factor` times the climb slope, or the dive slope if `is_descent`, on a course (rad)."""
+    """Return a part of the climb slope, or of the dive slope, on a course, m per m.
+
+    factor: fraction of the slope.
+    is_descent: True for the dive slope.
+    altitude: m AMSL.
+    course: rad.
+    """
     return factor * site.slopes(course, altitude)[is_descent]
 
 
@@ -816,6 +865,7 @@ def _min_height_to_line_up(site: _Site, turn_point: Floats, line_up: Floats) -> 
     """Return the minimum height above ground between the end of a go-around's climb and the line-up, m.
 
     turn_point: end of the go-around's climb, (3,) m.
+    line_up: point at which the final begins, (3,) m.
 
     Returns -inf if the ground is unknown.
     """

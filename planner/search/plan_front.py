@@ -400,7 +400,15 @@ def _run_generations(
     stop: StopCondition | None,
     generations: int,
 ) -> tuple[int, str]:
-    """Sample generations from the seeds; return the number of evaluated paths and why the search ended."""
+    """Sample generations from the seeds; return the number of evaluated paths and why the search ended.
+
+    task: the planning task, which scores paths.
+    search: sampler, whose archive receives the front.
+    default: (w, 3) path of the default plan, from which the seeds are made, m.
+    progress: called after each generation, or None.
+    stop: returns a reason to end the search, or "" to continue; or None.
+    generations: maximum number of generations.
+    """
     paths, reason = [], ""
     for path in seed_paths(task, np.array(default)):
         paths.append(path)
@@ -544,7 +552,11 @@ def _certify_distinct(
 
 
 def _drop_dominated(plans: list[FrontPlan], fourth: str, amounts: Floats) -> list[FrontPlan]:
-    """Return the plans that no other plan dominates and that differ noticeably from each other."""
+    """Return the plans that no other plan dominates and that differ noticeably from each other.
+
+    fourth: fourth objective, after length, exposure and clearance: "time" or "energy".
+    amounts: noticeable difference in each objective.
+    """
     objectives = np.array([_objective_row(plan, fourth) for plan in plans])
     indices = np.arange(len(objectives))
     # Keep the first of several equal plans.

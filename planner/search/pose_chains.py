@@ -114,6 +114,7 @@ class TurnLengths(NamedTuple):
 
         For a turn beyond the end of the table, return about the lengths of the table's sharpest turn.
         """
+        # Just before the last entry, so that an entry follows.
         position = min(turn / TURN_STEP_RAD, len(self.before) - 1.001)
         index = int(position)
         fraction = position - index
@@ -214,9 +215,11 @@ def descent_altitudes(
 ) -> Floats:
     """Compute the altitudes (n,) of a path that descends as late, or climbs as early, as possible.
 
-    climb, dive: functions that return the slope on a course.
+    points: (n) east and north of the path, m.
+    start_altitude, end_altitude: m AMSL.
+    climb, dive: functions that return the tangent of the steepest slope on a course.
 
-    Altitudes are m AMSL. If the path is too short, the first or the last altitude differs from the requested altitude.
+    If the path is too short, the first or the last altitude differs from the requested altitude.
 
     >>> descent_altitudes([(0.0, 0.0), (0.0, 500.0), (0.0, 1500.0)], 200.0, lambda _: 0.1, lambda _: 0.1, 50.0).tolist()
     [200.0, 150.0, 50.0]

@@ -137,7 +137,12 @@ def _choose_cheaper(
 ) -> _CertifiedPath:
     """Shorten a start path; return the result if it is certified and cheaper, otherwise the best path so far.
 
-    Larger margins are tried until a shortened path is certified.
+    Larger margins are tried until a shortened path is certified. For each margin, paths between the best path and the
+    shortened path are also tried if the airspace has zones or a maximum height.
+
+    evaluation_data: the planning problem with the cost to minimise.
+    start: (w, 3) path to shorten, m.
+    best_path: the best certified path so far, and its certificate.
     """
     path = start
     for extra_margin, slope_margin in EXTRA_MARGINS:

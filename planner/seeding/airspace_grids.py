@@ -70,7 +70,13 @@ class _ClosedHeights(NamedTuple):
 def _fill_column(
     data: ProblemArrays, frame: RotatedFrame, grid: AirspaceGrid, along: float, across: float, column: Record
 ) -> None:
-    """Fill the `COLUMN` record of a grid position: its ground and its range of allowed altitudes."""
+    """Fill the `COLUMN` record of a grid position: its ground and its range of allowed altitudes.
+
+    along, across: position in the rotated frame, m.
+    column: the record to fill; its lowest altitude exceeds its highest outside the area and above unknown ground.
+
+    The range obeys the floor, the ceiling, the clearance, and the limits of inclusion zones.
+    """
     east, north = to_world_position(frame, along, across)
     column.lowest, column.highest = math.inf, -math.inf
     if not (data.west <= east <= data.east and data.south <= north <= data.north):
@@ -95,7 +101,9 @@ def _fill_column(
 def _closed_heights(zones: ZonesWithMargins, line: MapSegment, lateral: float, ground: float) -> _ClosedHeights:
     """Return the range of altitudes at which zones block a horizontal step, m AMSL.
 
+    line: horizontal line of the step.
     lateral: tracking error to add to the zones' margins, m.
+    ground: altitude of the ground at the start of the step, m, from which a zone's heights above ground are measured.
     """
     low, high = math.inf, -math.inf
     for z in range(zones.inclusions):
@@ -152,6 +160,8 @@ def _set_layer_costs(
 ) -> None:
     """Fill the cost per m of path in the cells of a stage; inf for a cell that no path may enter.
 
+    columns: `COLUMN` records (across,) of the stage, with the range of allowed altitudes.
+    obstacles: `OBSTACLE` records: kill spheres in the rotated frame.
     along: position of the stage, m.
     extra: (across,) additional cost per m.
     first_across, last_across: range of cells across, both included.
@@ -199,9 +209,10 @@ def _relax_airspace_stage(
 ) -> None:
     """Compute the costs of the cheapest routes to the cells of a stage, and store their parents.
 
-    cost, next_cost: (across, layers) costs of the routes to the cells of the previous stage and of this stage.
-
-    A change of course is measured from the cheapest route to a cell only, so the result is not exactly the optimum.
+    previous_columns, columns: `COLUMN` records (across,) of the previous stage and of this stage.
+    cost, next_cost: (across, layers) costs of the routes to the cells of the previous stage and this stage (updated).
+    cell_costs: (across, layers) cost per m of the steps to this stage. A change of course from the parent also costs.
+    previous_parents, parents: (across, layers) parents in both stages, as across x layers + layer; the latter updated.
     """
     step, width, zones, spacing = frame.length / grid.stages, grid.across.size, data.airspace.zones, grid.layer_spacing
     lateral = 0.0 if stage in (1, grid.stages) else float(data.tracking.across)  # No tracking error at a fixed end.
@@ -329,7 +340,12 @@ def continue_airspace_route(
     search: AirspaceSearch,
     max_stages: int,
 ) -> AirspaceSearch:
-    """Continue a search by up to `max_stages` stages, or until no route can continue; return it."""
+    """Continue a search by up to `max_stages` stages, or until no route can continue; return it.
+
+    extra: (stages + 1, across) additional cost per m of path in each position.
+    bound: upper limit on the cost of the route; cells that only dearer routes can use are dropped.
+    search: state of the search; its arrays are overwritten.
+    """
     stages, width, step = grid.stages, grid.across.size, frame.length / grid.stages
     obstacles, columns, cells, cost, next_cost, cell_costs, centre_index, reached_stage = search
     last_stage, goal_distances = min(stages, reached_stage + max_stages), np.empty(width)
@@ -377,7 +393,10 @@ def end_airspace_route(
 ) -> tuple[Floats, float]:
     """Trace the route that a search found; return its points and its cost.
 
-    The points are along, across and up, (stages + 1, 3). Without a route, the points are (0, 3) and the cost is inf.
+    grid: grid that was searched.
+    search: the search after its last stage.
+
+    The points are along, across and up, (stages + 1, 3) m. Without a route, the points are (0, 3) and the cost is inf.
     """
     stages = grid.stages
     step = frame.length / grid.stages
@@ -466,7 +485,7 @@ def airspace_routes(
     """Yield routes over grids, for a problem with zones or a maximum height.
 
     grids: for each grid, its number of stages (multiplied by `STAGE_FACTOR`) and its number of different routes.
-    pause: as in `cheapest_airspace_route`.
+    pause: called from time to time; an exception raised there stops the search.
     finer_only: True to skip a grid that is no finer than an earlier grid, because `MAX_CELLS` limits it.
 
     Grids are gentle (see `AirspaceGrid`), because their routes are easier to fly. Before that, the first grid is
@@ -509,7 +528,9 @@ def _find_route(
 ) -> GridRoute | None:
     """Return the cheapest route over a grid that keeps away from earlier routes; None if there is none.
 
-    expected_cost: upper limit on the cost with which the search is tried first.
+    earlier_routes: routes near which a path costs more.
+    expected_cost: upper limit on the cost with which the search is tried first; the second search has no limit.
+    pause: called from time to time; an exception raised there stops the search.
     """
     extra = proximity_cost(np.linspace(0.0, frame.length, grid.stages + 1), grid.across, earlier_routes)
     for bound in (expected_cost, math.inf):

@@ -45,34 +45,38 @@ def bridge_basis(inner: int) -> Floats:
     return basis
 
 
-def first_samples(
-    space: Space, encoding: Encoding, population: int, starts: Floats, rng: np.random.Generator
-) -> Floats:
-    """Draw the first population (n, d): the start vectors, and smooth paths around them.
+def first_samples(space: Space, encoding: Encoding, count: int, starts: Floats, rng: np.random.Generator) -> Floats:
+    """Draw the first samples (count, d) of a search: the start vectors, and smooth paths around them.
 
-    starts: vectors (s, d) to start from; without starts, the smooth paths are drawn around the straight line.
+    A sample holds three values for each inner waypoint: the positions along and across the direct line, and the
+    altitude. Smooth random displacements move it across and up.
+
+    starts: vectors (s, d) to start from; without starts, the smooth paths are drawn around the straight line, raised by
+        a random part of the space below the ceiling.
     """
     inner_count = encoding.waypoints - 2
     modes, deviations = bridge_modes(inner_count)
     lower, upper = encoding.lower.reshape(inner_count, 3), encoding.upper.reshape(inner_count, 3)
-    spread = np.array([1.0, 0.25 * np.median(upper[:, 1] - lower[:, 1]), 0.25 * (space.up[1] - space.up[0])])
-    # The entries of a bridge mode decrease with the number of waypoints; its middle should move by the spread.
-    spread[1:] *= np.sqrt((inner_count + 1) / 2.0)
+    # Standard deviation at mid-path of the first mode, across and up: a quarter of the allowed range.
+    spread = np.array([0.25 * np.median(upper[:, 1] - lower[:, 1]), 0.25 * (space.up[1] - space.up[0])])
+    # The modes are those of a Brownian bridge, which is zero at both ends of the path. The middle entry of the first
+    # mode is sqrt(2 / (n + 1)): this factor makes it 1.
+    spread *= np.sqrt((inner_count + 1) / 2.0)
 
-    def draw_displacements(count: int) -> Floats:
-        """Draw smooth displacements (count, inner, 2) of the inner waypoints, across and up."""
-        weights = rng.normal(size=(count, inner_count, 2)) * deviations[:, None] * spread[1:]
+    def draw_displacements(path_count: int) -> Floats:
+        """Draw smooth displacements (path_count, inner, 2) of the inner waypoints, across and up."""
+        weights = rng.normal(size=(path_count, inner_count, 2)) * deviations[:, None] * spread
         return np.asarray(np.einsum("nka,ik->nia", weights, modes, optimize=False))
 
-    out = np.empty((population, inner_count, 3))
+    out = np.empty((count, inner_count, 3))
     fraction = np.linspace(0.0, 1.0, inner_count + 2)[1:-1, None]
-    out[..., 0] = rng.uniform(lower[:, 0], upper[:, 0], (population, inner_count))
+    out[..., 0] = rng.uniform(lower[:, 0], upper[:, 0], (count, inner_count))
     out[..., 1] = 0.0
     heights = space.start[2] * (1.0 - fraction) + space.destination[2] * fraction
-    out[..., 2] = heights[:, 0] + rng.uniform(0.0, 1.0, (population, 1)) * np.maximum(0.0, space.up[1] - heights[:, 0])
-    out[..., 1:] += draw_displacements(population)
+    out[..., 2] = heights[:, 0] + rng.uniform(0.0, 1.0, (count, 1)) * np.maximum(0.0, space.up[1] - heights[:, 0])
+    out[..., 1:] += draw_displacements(count)
     if len(starts):
-        around_count = min(population, max(len(starts), int(SEEDED_SAMPLE_FRACTION * population)))
+        around_count = min(count, max(len(starts), int(SEEDED_SAMPLE_FRACTION * count)))
         seeds = starts[np.arange(around_count) % len(starts)].reshape(around_count, inner_count, 3)
         scale = np.exp(rng.uniform(np.log(MIN_SPREAD_FRACTION), np.log(MAX_SPREAD_FRACTION), (around_count, 1, 1)))
         scale[: len(starts)] = 0.0
@@ -81,4 +85,4 @@ def first_samples(
         out[:around_count, :, :1] += (
             scale * rng.normal(size=(around_count, inner_count, 1)) * (upper[:, :1] - lower[:, :1])
         )
-    return np.clip(out.reshape(population, -1), encoding.lower, encoding.upper)
+    return np.clip(out.reshape(count, -1), encoding.lower, encoding.upper)

@@ -122,7 +122,12 @@ def corners_near_ground(
 def _find_steep_arcs(data: ProblemArrays, path: Floats, corners: Records, flown: FlownCorners) -> None:
     """Fill the radii and the slope limits of the arcs whose slopes are close to their limits.
 
-    A slope limit is the lower of the limits on the two courses of the corner.
+    path: (w, 3) m.
+    corners: filled `CORNER` records (w,) of the path.
+    flown: corners whose `slopes` and `steep_radii` are filled.
+
+    A slope limit is the lower of the limits on the two courses of the corner. An arc is steep if its climb or descent
+    needs more than `STEEP_FRACTION` of its length.
     """
     level_start, level_end = np.zeros(3), np.zeros(3)
     for i in range(1, path.shape[0] - 1):
@@ -153,6 +158,8 @@ def spare_arc_length(
 ) -> float:
     """Return the length by which a corner's arc exceeds the length that its climb or descent needs, m.
 
+    previous, waypoint, next_waypoint: (3,) m.
+    radius: radius of the arc, m.
     sign: 1 for a climb, -1 for a descent.
     max_slope: tangent of the maximum slope.
 
@@ -204,8 +211,10 @@ def corner_point(
 ) -> None:
     """Compute the position of a sample of the flown corner at `waypoint`, and fill `out` (3,) with it.
 
+    previous_waypoint, waypoint, next_waypoint: (3,) m.
     radius: radius of the turn, m.
-    sample: number of the sample.
+    sample: number of the sample, from 0 to `SAMPLES_PER_CORNER` - 1.
+    out: (3,) m.
 
     A sample has the height of the leg, or of the arc between its tangent points.
     """
@@ -268,7 +277,15 @@ def corner_derivatives(
 
 @inner
 def spare_length_derivatives(corner: Floats, radius: float, sign: float, max_slope: float, slopes: Floats) -> None:
-    """Fill `slopes` (3, 3) with the derivatives of `spare_arc_length` with respect to a corner's waypoints."""
+    """Fill `slopes` (3, 3) with the derivatives of `spare_arc_length` with respect to a corner's waypoints.
+
+    corner: (3, 3) the waypoints, m; changed during the computation, and restored.
+    radius: radius of the arc, m.
+    sign: 1 for a climb, -1 for a descent.
+    max_slope: tangent of the maximum slope.
+
+    The derivatives are central differences with the step `CORNER_STEP_M`.
+    """
     for row in range(3):
         for axis in range(3):
             coordinate, slopes[row, axis] = corner[row, axis], 0.0
@@ -283,7 +300,10 @@ def spare_length_derivatives(corner: Floats, radius: float, sign: float, max_slo
 def height_derivatives(data: ProblemArrays, x: float, y: float, out: Floats) -> None:
     """Fill `out` (3,) with the derivatives of the height above ground with respect to a point's position.
 
-    The horizontal derivatives are 0 if the ground nearby is unknown.
+    x, y: east and north of the point, m.
+
+    The derivatives by east and north are central differences of the ground with the step `GROUND_STEP_M`. They are 0 if
+    the ground nearby is unknown.
     """
     heights, to_pixel = data.heights, data.to_pixel
     column, row = polymap(to_pixel, x + GROUND_STEP_M, y)

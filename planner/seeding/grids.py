@@ -92,6 +92,8 @@ def _min_height(
 ) -> float:
     """Return the lowest allowed altitude in a cell, m: the highest of some ground samples plus the clearance.
 
+    required: required clearance.
+    along, across: position of the cell in the rotated frame, m.
     steps: steps between the 3 x 3 samples; with a step of 0 along the frame only the middle sample is taken.
 
     The result is inf outside the map or without data.
@@ -183,6 +185,7 @@ def _add_kill_cost(
             for y in range(first_y, last_y + 1):
                 distance2 = plane_distance2 + (across[y] - obstacle.across) ** 2
                 if distance2 < radius * radius:
+                    # From KILL_COST at the surface to three times as much at the centre.
                     cell_costs[z, y] += KILL_COST * (3.0 - 2.0 * math.sqrt(distance2) / radius)
 
 
@@ -201,6 +204,9 @@ def set_cell_costs(
 ) -> None:
     """Fill the costs per m of cells of a stage.
 
+    required: required clearance.
+    stage: number of the stage.
+    obstacles: `OBSTACLE` records: kill spheres in the rotated frame.
     extra: (stages + 1, across) additional cost per m.
     first_across, last_across: range of the cells across, both included.
     cell_costs: (layers, across) array to fill.
@@ -239,6 +245,11 @@ def layers_per_step(data: ProblemArrays, frame: RotatedFrame, step: float, layer
     """Return the steepest climb and descent of a step, in layers: `STEP_LAYERS` records (sideways, layers).
 
     They depend on the course of the step and on the layer at its beginning.
+
+    frame: frame of the direct line.
+    step: length of a step along the line, m.
+    layers: altitudes of the layers, m.
+    ratio: spacing across as a fraction of a step.
     """
     layer_spacing = layers[1] - layers[0] if layers.size > 1 else 1.0
     step_layers = np.zeros((2 * MAX_SIDE + 1, layers.size), dtype=STEP_LAYERS)
@@ -351,9 +362,14 @@ def fill_goal_distances(
 ) -> None:
     """Fill `out` with the shortest horizontal distance to the destination from each position across, m.
 
+    columns: number of positions across.
     goal_index: index across of the destination.
+    remaining_stages: number of stages between this stage and the destination.
+    step: length of a step along the line, m.
+    ratio: spacing across as a fraction of a step.
+    out: (columns,) array to fill; inf if the destination cannot be reached in the remaining stages.
 
-    The distance is inf if the destination cannot be reached in the remaining stages.
+    Each step moves k or k + 1 positions across; k is the mean number, rounded down.
     """
     for y in range(columns):
         offset = abs(y - goal_index)
@@ -380,9 +396,11 @@ def prune_cells(
 
     Fill the spans.
 
+    next_cost: (layers, across) costs of the routes to the cells; updated.
     spans: `SPAN` records (layers,) to fill with the remaining cells.
     goal_distances: (across,) horizontal distance to the destination, m.
     height_differences: (layers,) height differences to the destination, m.
+    first_across, last_across: range of cells across, both included.
     """
     for z in range(next_cost.shape[0]):
         spans[z].first, spans[z].last = next_cost.shape[1], -1
@@ -487,7 +505,11 @@ def continue_route(
     search: GridSearch,
     max_stages: int,
 ) -> GridSearch:
-    """Continue a search by up to `max_stages` stages, or until no route can continue; return it."""
+    """Continue a search by up to `max_stages` stages, or until no route can continue; return it.
+
+    extra: (stages + 1, across) additional cost per m of path in each position.
+    bound, search: upper limit on the cost of the route, and state of the search, whose arrays are overwritten.
+    """
     stages, width, layer_count = grid.stages, grid.across.size, grid.layers.size
     step = frame.length / stages
     layer_spacing = grid.layers[1] - grid.layers[0] if layer_count > 1 else 1.0
@@ -647,7 +669,7 @@ def grid_route(
     earlier_routes: earlier routes; the cost is higher near them, so that the next route takes another side.
     expected_cost: upper limit on the cost with which the search is tried first, such as the cost on a coarser grid. If
         it fails, a search without a limit follows.
-    pause: as in `cheapest_route`.
+    pause: called from time to time; an exception raised there stops the search.
     """
     if grid.layers.size == 0:
         return None
@@ -686,8 +708,10 @@ def grid_routes(
 ) -> Iterator[GridRoute]:
     """Yield the routes of each grid, cheapest first.
 
+    frame: frame of the direct line.
+    span: smallest and largest offset of the cells across the line, m.
     grids: for each grid, its number of stages and its number of different routes.
-    pause: as in `cheapest_route`.
+    pause: called from time to time; an exception raised there stops the search.
     """
     expected_cost = EXPECTED_COST_RATIO * math.dist(data.start, data.destination)
     for stages, route_count in grids:

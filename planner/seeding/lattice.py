@@ -161,7 +161,11 @@ def _expand_state(
 ) -> None:
     """Expand a state: push the successors that it reaches at a lower cost than before to the open list.
 
+    lattice: points of the lattice; a state is a point, a layer and one of eight courses.
+    table: costs, parents and flags of all states; updated.
+    state: number of the state: (point x layers + layer) x 8 + course.
     max_turn: largest turn per step, in units of 45 degrees.
+    open_states: heap of (priority, state), to which the successors are added.
 
     The priority of a successor is its cost plus its remaining cost.
     """
@@ -321,7 +325,12 @@ def begin_lattice_search(
 
 @compiled
 def _start_states(data: ProblemArrays, frame: RotatedFrame, lattice: Lattice, table: _StateTable) -> Codes:
-    """Mark the states at the start as reached, at the prescribed course or on all courses; return them, (k,)."""
+    """Mark the states at the start as reached, at the prescribed course or on all courses; return them, (k,).
+
+    frame: frame of the direct line.
+    lattice: points of the lattice; a state is a point, a layer and one of eight courses.
+    table: costs and parents of all states, in which the states at the start get the cost 0.
+    """
     first_state = ((lattice.behind * lattice.across + lattice.right) * lattice.layers + lattice.start_layer) * 8
     start_course = _nearest_course(frame, data.start_course)
     states = np.arange(first_state, first_state + 8) if start_course < 0 else np.array([first_state + start_course])
@@ -385,7 +394,12 @@ def _is_inside(data: ProblemArrays, point: Floats) -> bool:
 
 @compiled
 def trace_route(parents: Numbers, goal_state: int, lattice: Lattice) -> Records:
-    """Return `LATTICE_CELL` records of the route from the start to a given state."""
+    """Return `LATTICE_CELL` records of the route from the start to a given state.
+
+    parents: parent of each state plus 1, as the search stores them; -1 for a state at the start.
+    goal_state: number of the state at the end of the route.
+    lattice: points of the lattice.
+    """
     count, state = 0, goal_state
     while state >= 0:
         count, state = count + 1, parents[state] - 1
@@ -456,6 +470,7 @@ def turning_step(data: ProblemArrays) -> float:
     path = np.column_stack([square, np.full(4, data.start[2])])
     turns, rolls = turn_and_roll_lengths(data, path)
     turn_length = float(turns[1] + rolls[1])
+    # Settling depends on the length of the leg, which is about a tenth longer than the turns.
     return min(MAX_STEP_M, max(MIN_STEP_M, turn_length + settling_length(turn_length, 1.1 * turn_length)))
 
 
@@ -470,6 +485,7 @@ def make_lattice(data: ProblemArrays, frame: RotatedFrame, step: float) -> Latti
     corners = [(east, north, 0.0) for east in (data.west, data.east) for north in (data.south, data.north)]
     min_corner, max_corner = frame.to_frame(corners)[:, :2].min(axis=0), frame.to_frame(corners)[:, :2].max(axis=0)
     level_point = np.array([*data.destination[:2], data.start[2]])
+    # The lower of the climb and the descent limit on the direct course, but at least 0.01 rad.
     gentler_slope = math.tan(max(0.01, min(slope_limits(data, np.array(data.start), level_point))))
     min_altitude = max(data.floor, float(np.nanmin(data.heights)) + data.clearance)
     stages, spacing = max(1, math.ceil(frame.length / step)), frame.length

@@ -31,7 +31,7 @@ from world.kernels import Record, Records, compiled, copy_into, inner
 TURN_PRICE = 2.0
 # Price of a slope violation, length ratio per unit of slope.
 SLOPE_PRICE = 20.0
-# Price of a terrain violation, length ratio per m x km.
+# Price of a terrain violation, length ratio per m·km.
 TERRAIN_PRICE = 0.5
 # Price of a bounds violation, length ratio per m.
 BOUNDS_PRICE = 1.0
@@ -190,6 +190,10 @@ def _evaluate_merit(
 ) -> tuple[float, bool]:
     """Return the merit of a vector (length ratio plus priced violations), and True if its path is feasible.
 
+    frames: origin and rotation of the frame in which each waypoint moves.
+    vector: (3 n,) along, across and altitude of the n inner waypoints in their frames, m.
+    candidate: scratch; its path is overwritten with the waypoints, and its records with the scores.
+
     Each part of the evaluation only adds to the merit. Therefore the evaluation ends as soon as the merit reaches
     `best_merit`. If the path is feasible so far, it must also reach `feasible_merit`. The returned merit is then a
     lower bound.
@@ -238,6 +242,8 @@ def _merit_of_scores(violations: Record, objectives: Record) -> tuple[float, boo
 def _begin_search(data: ProblemArrays, frames: WaypointFrames, start: Floats, steps: Floats) -> _State:
     """Return a new search that starts at a vector (d,).
 
+    frames: origin and rotation of the frame in which each waypoint moves.
+    start: (d,) along, across and altitude of each inner waypoint in its frame, m.
     steps: (k,) initial size of each move; the search changes this array.
     """
     limits, candidate = precompute_limits(data), _make_candidate(data, start.size // 3 + 2)
@@ -266,6 +272,9 @@ def _fill_trial(
     """Apply move k to a vector (d,), clip the result to the box, and fill `trial` (d,) with it.
 
     If k is one more than the last move, the displacement of the whole round is repeated instead.
+
+    moves, steps: moves, (n, d), and the size of each, (n,).
+    round_start: (d,) vector at the beginning of the round.
     """
     for d in range(vector.size):
         step = steps[k] * moves[k, d] if k < moves.shape[0] else vector[d] - round_start[d]
@@ -286,6 +295,7 @@ def _continue_search(
     """Continue a search up to `pause_count` evaluations, or to its end at `max_evaluations`.
 
     moves, initial_steps: moves, (k, d), and their initial sizes, (k,).
+    frames, state: frame in which each waypoint moves, and state of the search, whose vectors are overwritten.
     """
     best_vector, best_merit, feasible_vector, feasible_merit, round_start, steps, move, has_moved, evaluations, _ = (
         state
@@ -330,6 +340,7 @@ def _continue_search(
                     break
                 steps[k] = -steps[k]
             if k < moves.shape[0]:
+                # A successful move grows, an unsuccessful one shrinks.
                 steps[k] *= 1.5 if is_better else 0.5
                 has_moved = True
         move = 0

@@ -52,7 +52,15 @@ MIN_MOVE_M = 0.05
 def _newton_step(
     path: Floats, min_corner: Floats, max_corner: Floats, model: LagrangianModel, factor: Floats, step: Floats
 ) -> float:
-    """Fill `step` (n,) with a Newton step of a path within its box; return its largest component, m."""
+    """Fill `step` (n,) with a Newton step of a path within its box; return its largest component, m.
+
+    path: (w, 3) m.
+    min_corner, max_corner: (3,) corners of the box, m.
+    model: gradient and Hessian at the path; coordinates at a bound that would leave the box are removed from it.
+    factor: scratch, like the band of the Hessian.
+
+    A step with a component beyond `MAX_STEP_M` is scaled down to it.
+    """
     size = step.size
     for row in range(size):
         model.band[row, 0] += HESSIAN_DAMPING_PER_M
@@ -161,7 +169,12 @@ def _descend(
 ) -> int:
     """Minimise the augmented Lagrangian of a path (w, 3) in place; return the number of models evaluated.
 
-    values: filled with the final values of the constraints.
+    active: the active constraints and their coefficients.
+    path: overwritten with the result, m.
+    multipliers: (c,) multipliers of the constraints.
+    values: (c,) array to fill with the final values of the constraints.
+    penalty: penalty factor, 1 / m.
+    descent: box of the waypoints, and scratch.
     """
     min_corner = descent.min_corner
     max_corner = descent.max_corner

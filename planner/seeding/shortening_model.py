@@ -167,7 +167,13 @@ def _find_near_missiles(
 ) -> tuple[Ints, Floats]:
     """Return pairs of a leg and a missile near it, (p, 2), and the distance required in each pair, m, (p,).
 
-    Distances are measured from the centre of a sphere.
+    path: (w, 3) m.
+    corners: filled `CORNER` records (w,) of the path.
+    lags: filled `HEIGHT_LAG` records (w - 1,) of the path.
+    extra_margin: additional margin to spheres, m.
+
+    Distances are measured from the centre of a sphere. The required distance includes the excursion of the flight at a
+    near corner, and the altitude lag in the direction of the missile.
     """
     missiles = data.missiles.missiles
     pairs, distances = [(0, 0) for _ in range(0)], [0.0 for _ in range(0)]
@@ -268,7 +274,14 @@ def _add_constraint(
 ) -> float:
     """Add a constraint on consecutive waypoints to the model; return its contribution to the merit.
 
-    The derivatives of the constraint with respect to these waypoints are in `model.slopes`.
+    value: value of the constraint, m; negative if violated.
+    first_waypoint, waypoint_count: the waypoints of the path on which the value depends.
+    multiplier: multiplier of the constraint.
+    penalty: penalty factor, 1 / m.
+    model: its gradient and band are updated. The derivatives of the value by the waypoints are in `model.slopes`.
+
+    The contribution is (max(0, m - p c)^2 - m^2) / 2 p for the multiplier m, the penalty p and the value c. The fixed
+    waypoints at the ends of the path have no row in the gradient.
     """
     new_multiplier = multiplier - penalty * value
     if not new_multiplier > 0.0:
@@ -350,7 +363,13 @@ def _add_missiles(
 ) -> float:
     """Add the distances between legs and missiles to the model; return their contribution to the merit.
 
-    These are the first constraints. See `lagrangian` for the parameters.
+    These are the first constraints. Their value is the distance beyond the required distance from the missile, m.
+
+    path: (w, 3) m.
+    multipliers: (c,) multipliers of all constraints.
+    values: (c,) values of all constraints; those added here are filled.
+    penalty: penalty factor, 1 / m.
+    model: gradient and Hessian of the augmented Lagrangian, to which the constraints are added.
     """
     merit, slopes, missiles = 0.0, model.slopes, data.missiles.missiles
     for p in range(active.pairs.shape[0]):
@@ -385,9 +404,14 @@ def _add_ground(
 ) -> float:
     """Add a clearance constraint for each ground sample of a leg; return their contribution to the merit.
 
-    first_number: number of the first of these constraints.
-
     The value of a constraint is the height above the required clearance, m.
+
+    path: (w, 3) m.
+    multipliers: (c,) multipliers of all constraints.
+    values: (c,) values of all constraints; those added here are filled.
+    penalty: penalty factor, 1 / m.
+    model: gradient and Hessian of the augmented Lagrangian, to which the constraints are added.
+    first_number: number of the first of these constraints.
     """
     merit = 0.0
     slopes = model.slopes
@@ -426,9 +450,15 @@ def _add_corners(
 ) -> float:
     """Add the heights of flown corners and the lengths of steep arcs; return their contribution to the merit.
 
-    first_number: number of the first of these constraints.
-
     A height is measured above the required height (m), a length beyond the length that the arc needs (m).
+
+    flown: the corners that are flown near the ground or almost as steeply as possible; others have the radius 0.
+    path: (w, 3) m.
+    multipliers: (c,) multipliers of all constraints.
+    values: (c,) values of all constraints; those added here are filled.
+    penalty: penalty factor, 1 / m.
+    model: gradient and Hessian of the augmented Lagrangian, to which the constraints are added.
+    first_number: number of the first of these constraints.
     """
     merit = 0.0
     point = np.empty(3)
@@ -476,9 +506,14 @@ def _add_slopes(
 ) -> float:
     """Add the slope margins and the minimum lengths of legs; return their contribution to the merit.
 
-    first_number: number of the first of these constraints.
-
     A slope margin is expressed as a height (m), a length as the excess over the minimum (m).
+
+    path: (w, 3) m.
+    multipliers: (c,) multipliers of all constraints.
+    values: (c,) values of all constraints; those added here are filled.
+    penalty: penalty factor, 1 / m.
+    model: gradient and Hessian of the augmented Lagrangian, to which the constraints are added.
+    first_number: number of the first of these constraints.
     """
     merit, slopes = 0.0, model.slopes
     for i in range(path.shape[0] - 1):
@@ -515,7 +550,8 @@ def _add_turns(
 ) -> float:
     """Add the turn margins and the lengths of legs between turns; return their contribution to the merit.
 
-    first_number: number of the first of these constraints.
+    A turn margin is scaled to m. A length is the part of a leg that its turns, roll and settling leave over, m.
+    multipliers, values: (c,) multipliers and values of all constraints, of which these begin at `first_number`.
     """
     merit, slopes, count = 0.0, model.slopes, path.shape[0] - 1
     turn = np.zeros(count + 1)

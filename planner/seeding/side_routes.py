@@ -64,9 +64,9 @@ class GridCosts(NamedTuple):
 
 @inner
 def _relax_stage_back(
-    goal_costs: Floats,
+    next_costs: Floats,
     cell_costs: Floats,
-    previous_goal_costs: Floats,
+    costs: Floats,
     successors: Codes,
     spans: Records,
     step_layers: Records,
@@ -76,16 +76,19 @@ def _relax_stage_back(
 ) -> None:
     """Compute the costs from the cells of a stage to the destination, from the costs of the next stage.
 
-    goal_costs, previous_goal_costs: (layers, across) costs to the destination from the cells of the next stage, and of
-        this stage.
-    successors: (layers, across) cells of the next stage to which the cheapest routes lead.
-    spans: `SPAN` records (layers,) of this stage's cells that are within the bound.
-
-    The other arguments are the same as for `relax_stage`.
+    next_costs: (layers, across) costs from the cells of the next stage to the destination.
+    cell_costs: (layers, across) cost per m of the steps to the cells of the next stage.
+    costs: output, (layers, across): costs from the cells of this stage to the destination.
+    successors: output, (layers, across): cells of the next stage to which the cheapest routes lead.
+    spans: `SPAN` records (layers,) of this stage's cells whose cost is within the route-cost bound.
+    step_layers: `STEP_LAYERS` records (sideways, layers): steepest climb and descent from this stage.
+    step: length of a step along the line, m.
+    layer_spacing: m.
+    ratio: spacing across as a fraction of a step.
     """
-    layer_count, width = goal_costs.shape
-    flat_goal_costs = goal_costs.ravel()
-    flat_previous = previous_goal_costs.ravel()
+    layer_count, width = next_costs.shape
+    flat_next_costs = next_costs.ravel()
+    flat_costs = costs.ravel()
     flat_successors = successors.ravel()
     flat_cell_costs = cell_costs.ravel()
     for z in range(layer_count):
@@ -102,9 +105,9 @@ def _relax_stage_back(
                 length = math.sqrt(step * step * (1.0 + (side * ratio) ** 2) + ((next_z - z) * layer_spacing) ** 2)
                 source, target = z * width + first_cell, next_z * width + first_cell + side
                 relax_cells(
-                    flat_goal_costs,
+                    flat_next_costs,
                     flat_cell_costs,
-                    flat_previous,
+                    flat_costs,
                     flat_successors,
                     target,
                     source,
@@ -192,7 +195,11 @@ def begin_grid_costs(data: ProblemArrays, frame: RotatedFrame, grid: Grid) -> Si
 def continue_grid_costs(
     data: ProblemArrays, frame: RotatedFrame, grid: Grid, bound: float, search: SideSearch, max_stages: int
 ) -> SideSearch:
-    """Continue a search by up to `max_stages` stages, or end it if no route can continue; return it."""
+    """Continue a search by up to `max_stages` stages, or end it if no route can continue; return it.
+
+    The first half of the stages computes costs from the start forwards, the second half costs to the destination.
+    bound, search: upper limit on the cost of a route, and state of the search, whose arrays are overwritten.
+    """
     stages, width, layer_count = grid.stages, grid.across.size, grid.layers.size
     step, required = frame.length / stages, required_clearance(data)
     layer_spacing = grid.layers[1] - grid.layers[0] if layer_count > 1 else 1.0
@@ -264,6 +271,9 @@ def cheapest_passings(costs: GridCosts, grid: Grid, obstacles: Records, step: fl
 
     The sides are those of `passing_side`. A route passes an obstacle at the stage that is nearest to the obstacle's
     centre. An obstacle beyond the ends of the grid is not passed, and has the cost inf.
+
+    costs: costs of the cheapest routes from the start to each cell, and from there to the destination.
+    step: length of a step along the line, m.
     """
     passings = np.zeros((obstacles.shape[0], 4), dtype=PASSING)
     for k in range(obstacles.shape[0]):
@@ -288,7 +298,11 @@ def cheapest_passings(costs: GridCosts, grid: Grid, obstacles: Records, step: fl
 
 @compiled
 def route_through(costs: GridCosts, stage: int, layer: int, across: int) -> Records:
-    """Return `ROUTE_CELL` records (stages + 1,) of the cheapest route through a given cell."""
+    """Return `ROUTE_CELL` records (stages + 1,) of the cheapest route through a given cell.
+
+    costs: costs from the start and to the destination, with the neighbours on the cheapest routes.
+    stage, layer, across: the cell.
+    """
     last_stage, width = costs.successors.shape[0] - 1, costs.successors.shape[2]
     cells = np.zeros(last_stage + 1, dtype=ROUTE_CELL)
     previous_cells = trace_back(costs.parents[: stage + 1], layer, across)
@@ -342,7 +356,7 @@ def side_routes(
 
     bound: upper limit on the cost.
     max_routes: maximum number of routes.
-    pause: as in `grid_costs`.
+    pause: called from time to time; an exception raised there stops the search.
 
     Each route is the cheapest that passes one obstacle on one side; the first route is the cheapest of all. Among
     routes close to each other, only the cheapest is returned.
@@ -413,10 +427,14 @@ def optimistic_grid(
     spread: float,
     ratio: float,
 ) -> Grid:
-    """Make a grid with smaller kill spheres and lower ground, so that its routes also use narrow gaps.
+    """Make a grid that underestimates threats and terrain, so that its routes also use narrow gaps.
 
-    shrink, spread, ratio: reduction of the spheres, size of the area of highest ground, and spacing across, as in
-    `Grid`.
+    frame: frame of the direct line from start to destination.
+    span: smallest and largest offset of the cells across the line, m.
+    stages: number of stages along the line.
+    shrink: fraction of a step by which the kill spheres are reduced.
+    spread: fraction of a step around a cell over which the highest ground is taken.
+    ratio: spacing across as a fraction of a step.
 
     The highest layer is at the ceiling, where the spheres of missiles on the ground are narrowest.
     """

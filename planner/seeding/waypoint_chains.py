@@ -194,7 +194,7 @@ def _extend_paths(
     step: 1 for paths from the start, -1 for paths from the destination.
     cost, link: (w, k) cost and neighbouring candidate of each partial path.
     max_cost: upper limit on the cost of a partial path.
-    open_ends: candidates of the previous waypoint with partial paths.
+    legs, open_ends: costs of legs (-x: x is a lower bound), and candidates of the previous waypoint with partial paths.
     """
     previous, evaluated_count, point = i - step, 0, candidates[i, k]
     if not max_cost > 0.0 or open_ends.size == 0:
@@ -262,7 +262,11 @@ def _corner_cost(
 ) -> float:
     """Return the cost of a turn beyond the limit, and of legs that are too short for the turn, m of path.
 
-    corners: scratch memory, one record.
+    previous_waypoint, waypoint, next_waypoint: (3,) m.
+    corners: scratch, one `CORNER` record.
+
+    A missing leg length of 100 m costs as much as an excess of 1 rad; it costs at most as much as 10 rad. A corner at a
+    leg without length costs as much as 1 rad.
     """
     ux = waypoint[0] - previous_waypoint[0]
     uy = waypoint[1] - previous_waypoint[1]

@@ -21,7 +21,7 @@ from planner.seeding.grids import KILL_COST
 from world.arrays import Floats, Ints
 from world.kernels import compiled, inner
 
-# Cost of depth, in m of path per m x km.
+# Cost of depth, in m of path per m·km.
 DEPTH_COST = 2e4
 # Cost of slope excess, in m of path per unit of slope.
 SLOPE_COST = 1e6
@@ -80,6 +80,7 @@ def penalised_leg_cost(data: ProblemArrays, limits: PrecomputedLimits, a: Floats
         max(0.0, -depth_below),
     )
     if exposure > 0.0:
+        # At least a tenth of the full cost, so that even a slight exposure is avoided.
         total += KILL_COST * length * min(1.0, 0.1 + exposure)
     if total > max_cost:
         return total
@@ -102,6 +103,11 @@ def _max_depth_below_leg(
     """Return the largest distance of the aircraft below a long leg, m; negative if it stays above the leg.
 
     east, north: unit course of the leg.
+    horizontal_length: m.
+    start_altitude, end_altitude: m AMSL.
+
+    The altitude lags by the lag length times the slope. A leg with a smaller change of altitude than the step of the
+    tracking error is demanded at its final altitude from its start, so that the aircraft is low by the whole change.
     """
     altitude_change = end_altitude - start_altitude
     if abs(altitude_change) < data.tracking.step:
@@ -187,6 +193,7 @@ def fit_waypoints(
     """
     edges = np.linspace(0.0, frame.length, waypoints - 1)
     interval = edges[1] - edges[0]
+    # Candidates keep a tenth of the interval from both of its ends, so that neighbours stay apart.
     fractions = np.linspace(0.1, 0.9, fit.candidates)
     along = edges[:-1, None] + fractions * interval
     points = np.stack([along, *(np.interp(along, route[:, 0], route[:, axis]) for axis in (1, 2))], axis=-1)
@@ -196,7 +203,9 @@ def fit_waypoints(
 def fit_points(data: ProblemArrays, frames: WaypointFrames, points: Floats, fit: WaypointFit = CLOSE_FIT) -> Floats:
     """Choose waypoints among candidate points, move them locally, and return them with both ends, (w, 3).
 
+    frames: origin and rotation of the frame in which each waypoint moves.
     points: (w - 2, k, 3) candidates of each inner waypoint, in the frame of the waypoint, m.
+    fit: heights by which the candidates are also lifted, m, and the pattern of the moves.
 
     The returned waypoints are world positions, m.
     """
@@ -260,7 +269,8 @@ def _move_waypoints(
 def _pick_candidates(data: ProblemArrays, frames: WaypointFrames, candidates: Floats) -> tuple[Floats, int]:
     """Return the best candidate of each waypoint in the waypoint's frame, (w, 3), and the number of legs evaluated.
 
-    The ends are fixed.
+    frames: origin and rotation of the frame in which each waypoint moves.
+    candidates: (w, k, 3) candidates in these frames, m; the ends are overwritten with the fixed ends.
     """
     inner_count = len(candidates) - 2
     # An end has the frame of the waypoint next to it.

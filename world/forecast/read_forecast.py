@@ -342,7 +342,11 @@ class _ForecastReader:
         return factor
 
     def _wind_pairs(self, dataset: Any) -> Iterator[tuple[Any, Any]]:
-        """Yield each eastward wind of a dataset with its northward wind, which differs in name by u and v."""
+        """Yield each eastward wind of a dataset with its northward wind, whose name has v in place of u.
+
+        A single eastward and a single northward wind belong together whatever their names are.
+        Raises an error for a wind without its other component, and for components of different dimensions.
+        """
         variables = dataset.data_vars.items()
         east = {str(name): array for name, array in variables if _is_component(name, array, _U_NAME, _EAST_NAMES)}
         north = {str(name): array for name, array in variables if _is_component(name, array, _V_NAME, _NORTH_NAMES)}

@@ -74,6 +74,9 @@ def _describe_mission_faults(
     """Describe mission items that arming requires but the mission lacks, and items that it forbids.
 
     Follows `AP_Arming::mission_checks` and `AP_Arming_Plane::mission_checks`.
+
+    parameters: ArduPlane's parameters.
+    values: value of every parameter by name; the default where no file states one.
     """
     if parameters.by_origin("file").get("RTL_AUTOLAND") == 0.0:
         for mark in _MARKS_OF_AUTOLAND:
@@ -108,6 +111,9 @@ def _describe_radio_failsafe_faults(parameters: ArduPilotParameters, values: Map
 
     `Plane::rc_failsafe_active` takes a throttle pulse at or below THR_FS_VALUE (at or above it for a reversed channel)
     as a lost radio. `AP_Arming::manual_transmitter_checks` fails if the pulse at idle is such a pulse.
+
+    parameters: ArduPlane's parameters.
+    values: value of every parameter by name; the default where no file states one.
     """
     channel, value = f"RC{values['RCMAP_THROTTLE']:g}", values["THR_FS_VALUE"]
     is_reversed = values.get(f"{channel}_REVERSED", 0.0) > 0.0
@@ -158,6 +164,9 @@ def _describe_fence_faults(
     """Describe a fence that prevents arming: it has no limits, its limits are unusable, or home violates it.
 
     Follows `AC_Fence::pre_arm_check`.
+
+    parameters: ArduPlane's parameters.
+    values: value of every parameter by name; the default where no file states one.
     """
     kinds = int(parameters.fence_type)
     has_mission_fence = bool(kinds & _MISSION_FENCE_BIT and mission.has_fence)

@@ -196,21 +196,27 @@ class ArduPlane(Autopilot):
 
     @cached_property
     def checks(self) -> MissionChecks:
-        """Rules of mission commands, and checks from TERRAIN_ENABLE, MIS_OPTIONS, FENCE_OPTIONS and BATT_*."""
+        """ArduPlane's rules for mission commands, and checks that TERRAIN_ENABLE, MIS_OPTIONS and others decide.
+
+        The others are FENCE_OPTIONS and BATT_*. Unsimulated settings are those of the simulated autopilot, not those of
+        a flight with the ArduPlane program.
+        """
         parameters = self.parameters
         return MissionChecks(
             dialect="ardupilot",
             resets_jump_counters=parameters.resets_jump_counters,
             follows_terrain=parameters.terrain_enable == 1.0,
-            unites_inclusions=bool(int(self._stated_values.get("FENCE_OPTIONS", 0.0)) & _UNION_OF_INCLUSIONS_BIT),
+            any_inclusion_suffices=bool(
+                int(self._parameter_values.get("FENCE_OPTIONS", 0.0)) & _UNION_OF_INCLUSIONS_BIT
+            ),
             battery_failsafes=battery_failsafes(parameters),
             describe_unsimulated_settings=partial(self.describe_unsimulated_settings, by_program=False),
             parameter_notes=(*parameters.notes, *_mission_notes(parameters)),
         )
 
     @property
-    def _stated_values(self) -> dict[str, float]:
-        """Value of each parameter of the set, by name."""
+    def _parameter_values(self) -> dict[str, float]:
+        """Values of the set's parameters by name, including default values."""
         return {name: value for name, value, _ in self.parameters.values}
 
     def describe_unsimulated_settings(self, mission: MissionParts, *, by_program: bool) -> list[str]:
@@ -218,7 +224,7 @@ class ArduPlane(Autopilot):
 
         by_program: True for a flight with the ArduPlane program, in which more settings have an effect.
         """
-        parameters, values = self.parameters, self._stated_values
+        parameters, values = self.parameters, self._parameter_values
         texts = [
             f"{name} {values[name]:g} affects the flight, but is not simulated"
             for name, neutral in _NEUTRAL.items()
@@ -329,7 +335,16 @@ class ArduPlane(Autopilot):
         abort_limits: tuple[Floats, Floats] | None = None,
         engine_out: bool = False,
     ) -> "SimulatedReturns":
-        """Simulate RTLs; see `flight.autopilots.parts.FlyReturns`."""
+        """Simulate the RTL from each of n starts to its target.
+
+        starts: positions, velocities, banks and times of the starts, `RETURN_START` records (n,).
+        targets: target of each RTL (n).
+        aircraft: point mass of the aircraft in the wind.
+        environment: terrain and kill spheres from which the clearances are measured.
+        store_positions: True to store the flown positions.
+        abort_limits: heights above ground, (n,), and distances outside spheres, (n,), m, below which an RTL is aborted.
+        engine_out: True after an engine failure: the aircraft glides.
+        """
         # Imported here: only simulated RTLs need the trims of JSBSim.
         from flight.autopilots.arduplane.rtl_point_mass import fly_returns
 
@@ -350,12 +365,15 @@ class ArduPlane(Autopilot):
         )
 
     def _failsafe_causes(self, mission: ReturnMission) -> tuple[Cause, ...]:
-        """Return the events that can end a mission in AUTO, each with ArduPlane's reaction."""
+        """Return the events that can end a mission in AUTO, each with ArduPlane's reaction.
+
+        A landing sequence begins with DO_LAND_START; a mission with a landing item ends on the ground.
+        """
         return failsafe_causes(
             self.parameters,
             has_fence=mission.has_fence,
-            has_landing=bool(mission.landings),
-            ends_landed=not mission.commands.isdisjoint(LANDINGS),
+            has_landing_sequence=bool(mission.landings),
+            ends_with_landing=not mission.commands.isdisjoint(LANDINGS),
         )
 
     def _unsimulated_return_text(self, mission: ReturnMission) -> str:
@@ -406,7 +424,10 @@ class ArduPlane(Autopilot):
     def _landing_glide(self, height: float, run: float, tail_wind: float, amsl: float) -> LandingGlide:
         """Return the landing glide that ArduPlane flies, by LAND_FLARE_*, LAND_WIND_COMP and TECS_LAND_*.
 
-        Arguments as for `flight.autopilots.parts.GroundRules.glide`.
+        height: height of the approach's start above the landing point, m.
+        run: horizontal length of the approach, m.
+        tail_wind: tail wind on the landing course, m/s.
+        amsl: altitude of the landing point, m.
         """
         airspeed = self._landing_airspeed(0.0, tail_wind, amsl)
         return landing_glide(height, run, airspeed + tail_wind, self.parameters)
@@ -614,7 +635,7 @@ class ArduPlaneFromGround:
         glide = self.autopilot.ground.glide(
             approach.start_altitude - landing_altitude, approach.length, approach.tail_wind, landing_altitude
         )
-        ground.has_landing, ground.landing_leg = True, approach.leg
+        ground.has_landing_sequence, ground.landing_leg = True, approach.leg
         ground.east, ground.north, ground.up = approach.point
         ground.glide_start_altitude, ground.slope = approach.start_altitude, glide.slope
         # `AP_TECS::_update_height_demand`.
@@ -677,6 +698,7 @@ def read_loiter_radius(loiter: Loiter) -> float:
         return abs(loiter.radius)
     stated_radius = float(math.floor(abs(loiter.radius)))
     if not (loiter.endless or loiter.to_altitude) and stated_radius > _MAX_BYTE_RADIUS_M:
+        # ArduPlane stores a larger radius in steps of 10 m.
         stated_radius = 10.0 * min(_MAX_BYTE_RADIUS_M, math.floor(stated_radius / 10.0))
     return stated_radius if stated_radius > _MAX_IGNORED_RADIUS_M else 0.0
 

@@ -32,13 +32,17 @@ _FENCE_REACTION: dict[int, FailsafeAction] = {0: "on", 1: "return", 6: "guided",
 
 
 def failsafe_causes(
-    parameters: ArduPilotParameters, *, has_fence: bool, has_landing: bool = False, ends_landed: bool = False
+    parameters: ArduPilotParameters,
+    *,
+    has_fence: bool,
+    has_landing_sequence: bool = False,
+    ends_with_landing: bool = False,
 ) -> tuple[Cause, ...]:
     """Return the events that can end a mission in AUTO, each with ArduPlane's reaction, in a fixed order.
 
     has_fence: True if the mission carries a fence.
-    has_landing: True if the mission has a landing sequence; without one the reaction "land" is an RTL.
-    ends_landed: True if the mission ends on the ground.
+    has_landing_sequence: True if the mission has a landing sequence; without one the reaction "land" is an RTL.
+    ends_with_landing: True if the mission contains a landing item, so that it ends on the ground.
 
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
     >>> parameters = ArduPilotParameters.defaults().changed(FS_LONG_ACTN=1, BATT_FS_LOW_ACT=1, BATT_LOW_VOLT=14)
@@ -53,11 +57,11 @@ def failsafe_causes(
     """
     causes = [
         Cause("the pilot's RTL", "return"),
-        Cause("the mission's end", "landed" if ends_landed else "return"),
+        Cause("the mission's end", "landed" if ends_with_landing else "return"),
         *_remote_control_causes(parameters),
         _station_cause(parameters),
     ]
-    causes += _battery_causes(parameters, has_landing=has_landing)
+    causes += _battery_causes(parameters, has_landing_sequence=has_landing_sequence)
     if has_fence:
         action = int(parameters.fence_action)
         if parameters.fence_enable > 0.0 or parameters.fence_auto_enable > 0.0:
@@ -128,12 +132,12 @@ def link_loss_reactions(parameters: ArduPilotParameters, use: LinkUse) -> tuple[
     return tuple(reactions) or (LinkLossReaction("on", math.inf, last_cause.parameter, last_cause.value),)
 
 
-def _battery_causes(parameters: ArduPilotParameters, *, has_landing: bool) -> list[Cause]:
+def _battery_causes(parameters: ArduPilotParameters, *, has_landing_sequence: bool) -> list[Cause]:
     """Return ArduPlane's reactions to a low and to a critical battery, for each battery monitor that is on.
 
     The reaction is "never" if there is no monitor, or no threshold that the monitor can measure.
 
-    has_landing: True if the mission has a landing sequence; without one the reaction "land" is an RTL.
+    has_landing_sequence: True if the mission has a landing sequence; without one the reaction "land" is an RTL.
     """
     monitors, causes = monitored_batteries(parameters), []
     for monitor in dict.fromkeys(["BATT", *monitors]):
@@ -142,7 +146,7 @@ def _battery_causes(parameters: ArduPilotParameters, *, has_landing: bool) -> li
             parameter = f"{monitor}_FS_{level}_ACT"
             value = int(parameters[parameter])
             action = _BATTERY_FAILSAFE.get(value, "on")
-            if action == "land" and not has_landing:
+            if action == "land" and not has_landing_sequence:
                 action = "return"
             has_voltage = parameters[f"{monitor}_{level}_VOLT"] > 0.0 and parameters[f"{monitor}_LOW_TIMER"] > 0.0
             has_charge = parameters[f"{monitor}_{level}_MAH"] > 0.0 and measures_current(parameters, monitor)

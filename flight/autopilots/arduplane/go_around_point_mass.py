@@ -167,7 +167,11 @@ def fly_go_arounds(
 
 
 def _make_climb(parameters: ArduPilotParameters, end_altitude: float) -> Record:
-    """Return the `CLIMB` record of a go-around whose climb ends above an altitude, m AMSL."""
+    """Return the `CLIMB` record of a go-around.
+
+    parameters: ArduPlane's parameters, which state the throttle of the climb and the rate at which it increases.
+    end_altitude: altitude above which the climb ends, m AMSL.
+    """
     climb: Record = np.zeros(1, CLIMB)[0]
     climb.is_required, climb.top, climb.slew = True, end_altitude, parameters.throttle_slew or math.inf
     climb.throttle = parameters.takeoff_throttle or parameters.throttle_max

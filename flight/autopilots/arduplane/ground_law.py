@@ -145,6 +145,8 @@ _HEADING_GAIN = 4.4428
 _MIN_ROTATION_PITCH_RAD = math.radians(5.0)
 # A take-off levels off only above this height over home, m.
 _MIN_LEVELING_HEIGHT_M = 10.0
+# A take-off levels off only at more than this climb rate, m/s.
+_MIN_LEVELING_CLIMB_RATE_MPS = 0.1
 # The approach begins within this angle of the landing line, rad ...
 _LINE_UP_ANGLE_RAD = math.radians(10.0)
 # ... and within this cross-track distance, m.
@@ -220,9 +222,14 @@ def ground_loop(
     frictions: Records,
     count: int,
 ) -> int:
-    """Fly up to ``count`` ticks with a `flight.dynamics.compiled_model.CompiledModel`, and return a status.
+    """Fly up to ``count`` ticks with a compiled model, and return a status.
 
     The status is 0 if the flight continues, otherwise a key of `flight.simulation.tick.ENDS`.
+
+    block: state, settings and path of the flight, the memory of a `flight.simulation.tick.Workspace`; updated.
+    heights: ground heights of the terrain by pixel, m.
+    frames, numbers, code, contacts, frictions: arrays of a `flight.dynamics.compiled_model.CompiledModel`: state of the
+        motion, registers, instructions, landing-gear contacts and scratch for their friction.
     """
     for _ in range(count):
         read_state(block, numbers, code)
@@ -296,7 +303,16 @@ def end_status(work: Record, ground: Record) -> int:
 
 @inner
 def _tick_take_off(work: Record, arduplane: Record, waypoints: Records, pieces: Records) -> None:
-    """Set the commands for one tick of the take-off; begin the first leg once the take-off is complete."""
+    """Set the commands for one tick of the take-off; begin the first leg once the take-off is complete.
+
+    Navigation and TECS run every `NAVIGATION_TICK_S`, the attitude controllers in each tick. The take-off is complete
+    above its end altitude, or once the aircraft has leveled.
+
+    work: state, commands and settings of the flight, a `WORKSPACE` record; updated.
+    arduplane: parameters and memories of the control law and of take-off and landing; updated.
+    waypoints: `WAYPOINT` records of the route, (w,).
+    pieces: pieces of the reference path.
+    """
     state = work.state
     estimated = work.estimated
     ground = arduplane.ground
@@ -342,6 +358,9 @@ def _is_leveled(parameters: Record, ground: Record) -> bool:
     """Return True once the aircraft has leveled off for TKOFF_PLIM_SEC at the end of a take-off.
 
     Follows `Plane::check_takeoff_timeout_level_off`.
+
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    ground: state of take-off and landing, a `GROUND_STATE` record.
     """
     return ground.leveling_height > 0.0 and ground.time - ground.leveling_start > parameters.takeoff_leveling
 
@@ -352,6 +371,11 @@ def _limit_rotation_pitch(estimated: Record, parameters: Record, ground: Record,
 
     Below TKOFF_ROTATE_SPD the pitch demand is TKOFF_GND_PITCH. Above it, the pitch limit grows with the ground speed,
     from at least five degrees, until the ground speed exceeds AIRSPEED_CRUISE. Follows `Plane::takeoff_calc_pitch`.
+
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    ground: state of the take-off; the end of the rotation is stored in it.
+    memory: `ARDUPILOT_MEMORY` record; its pitch demand (rad) is limited.
     """
     if ground.rotation_complete:
         return
@@ -373,6 +397,10 @@ def _set_take_off_parameters(
 
     Follows `Plane::takeoff_calc_pitch` and `Plane::takeoff_calc_roll`.
 
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    stage_parameters: copy of the parameters in which the limits of the take-off are set.
+    ground: state of the take-off: its pitch and launch altitude, m AMSL.
     roll_error: magnitude of demanded roll minus roll, rad; a large error reduces the pitch.
     """
     stage_parameters.tecs_speed_weight = 2.0
@@ -394,6 +422,10 @@ def _leveling_fraction(estimated: Record, parameters: Record, ground: Record) ->
 
     Follows `Plane::get_takeoff_pitch_min_cd`: the reduction begins once the climb would reach the end altitude within
     TKOFF_PLIM_SEC. Before that the factor is 1.
+
+    estimated: estimated position and velocity over the ground, a `MOTION` record.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    ground: state of take-off and landing, a `GROUND_STATE` record.
     """
     remaining_height = ground.takeoff_end_altitude - estimated.up
     if ground.leveling_height > 0.0:
@@ -402,7 +434,7 @@ def _leveling_fraction(estimated: Record, parameters: Record, ground: Record) ->
     if (
         is_near_end
         and remaining_height > 0.0
-        and estimated.velocity_up > 0.1
+        and estimated.velocity_up > _MIN_LEVELING_CLIMB_RATE_MPS
         and estimated.up - ground.home_up >= _MIN_LEVELING_HEIGHT_M
     ):
         ground.leveling_height, ground.leveling_start = remaining_height, ground.time
@@ -413,7 +445,13 @@ def _leveling_fraction(estimated: Record, parameters: Record, ground: Record) ->
 def _demand_heading(state: Record, estimated: Record, parameters: Record, ground: Record, memory: Record) -> None:
     """Set the lateral acceleration demand that holds the take-off heading; 0 until the heading is known.
 
-    Follows `AP_L1_Control::update_heading_hold`.
+    The heading is known after some time at a minimum ground speed. Follows `AP_L1_Control::update_heading_hold`.
+
+    state: attitude, airspeed and rates of the aircraft, a `STATE` record.
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    ground: state of the take-off; its heading is set once it is known.
+    memory: `ARDUPILOT_MEMORY` record; its lateral acceleration (m/s^2) is set.
     """
     ground_speed = math.hypot(estimated.velocity_east, estimated.velocity_north)
     if ground.time_at_course_speed > 0.0 or ground_speed > _COURSE_SPEED_MPS:
@@ -438,6 +476,13 @@ def _begin_first_leg(
     """Begin the leg after the take-off at the aircraft's position.
 
     The aircraft flies straight to the end of the leg, without a line to follow (`Plane::set_next_WP`).
+
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    waypoints: `WAYPOINT` records of the route, (w,); the end of the leg is marked as without cross-track control.
+    pieces: pieces of the reference path; the guidance advances to the first one of the leg.
+    guidance: `GUIDANCE_MEMORY` record; its piece is updated.
+    ground: state of take-off and landing; its stage becomes `IN_AIR`.
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record; updated.
     """
     ground.stage = IN_AIR
     memory.leg = ground.leg
@@ -457,6 +502,10 @@ def _begin_first_leg(
 def _tick_landing(work: Record, arduplane: Record, landing_point: Record) -> None:
     """Set the commands for one tick of the landing.
 
+    Navigation and TECS run every `NAVIGATION_TICK_S`, the attitude controllers in each tick.
+
+    work: state, commands and settings of the flight, a `WORKSPACE` record; updated.
+    arduplane: parameters and memories of the control law and of take-off and landing; updated.
     landing_point: record of `flight.guidance.lateral_reference_laws.WAYPOINT` for the landing point.
     """
     state = work.state
@@ -499,6 +548,11 @@ def _follow_line_to_point(
 
     Follows `AP_L1_Control::update_waypoint`.
 
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    ground: state of the landing, with the landing point.
+    memory: `ARDUPILOT_MEMORY` record with the start of the line; its demand and L1's integrator are updated.
+
     Return the remaining distance along the line (m), the fraction of the line already flown, the magnitude of L1's
     angle (`_last_Nu`, rad), and the magnitude of the cross-track error (m).
     """
@@ -540,7 +594,12 @@ def _update_stage(
 
     Follows `AP_Landing::type_slope_verify_land`.
 
-    line_position: result of `_follow_line_to_point`.
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    ground: state of the landing; its stage and the entry into the flare are set.
+    memory: `ARDUPILOT_MEMORY` record with the altitude and climb rate demands.
+    line_position: remaining distance (m), flown fraction, angle (rad) and cross-track error (m) on the line to the
+        landing point, as `_follow_line_to_point` returns them.
     """
     _, fraction, line_angle, cross_track = line_position
     height, sink_rate = estimated.up - ground.up, -estimated.velocity_up
@@ -581,6 +640,10 @@ def _demand_glide(
 
     Follows `AP_Landing::type_slope_setup_landing_glide_slope` and `AP_TECS::_update_height_demand`.
 
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    ground: state of the landing; its altitudes in the flare are updated.
+    memory: `ARDUPILOT_MEMORY` record; its demands are set.
     remaining_distance: distance to the landing point along the line, m; negative beyond it.
     """
     memory.max_climb_scaler, memory.max_sink_scaler = 1.0, 1.0
@@ -610,6 +673,9 @@ def _set_landing_parameters(
     """Set the control parameters for the current stage of the landing in ``stage_parameters``.
 
     line_fraction: fraction of the line to the landing point that is already flown.
+    estimated: estimated position and velocity over the ground, a `MOTION` record.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    ground: state of take-off and landing, a `GROUND_STATE` record.
     """
     stage_parameters.tecs_time = parameters.landing_time
     stage_parameters.airspeed_min = parameters.airspeed_min

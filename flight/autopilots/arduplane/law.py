@@ -122,7 +122,9 @@ def update_height_demand(estimated: Record, target: Record, parameters: Record, 
 
     estimated: a record of `flight.guidance.navigation_error.MOTION`.
     target: the leg's end, a record of `flight.guidance.lateral_reference_laws.WAYPOINT`.
-    parameters, memory: as for `flight.autopilots.arduplane.navigator.navigate_legs`.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record; updated.
+    dt: duration of a tick, s.
     """
     if target.is_rtl:
         altitude_target = _rtl_altitude(estimated, target, parameters, memory)
@@ -159,6 +161,7 @@ def _is_altitude_step(start_altitude: float, altitude_change: float, target: Rec
     start_altitude: altitude of the leg's start, m AMSL.
     altitude_change: height of the leg's end above the aircraft, m.
     target: the leg's end.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
     """
     if altitude_change < 0.0:
         return False
@@ -175,6 +178,11 @@ def _leg_altitude(estimated: Record, target: Record, parameters: Record, memory:
     loiter's center. The demand is the altitude of the leg's end in three cases: the altitude changes in a step or only
     a little; the aircraft is on a loiter; and, in 4.7, the aircraft climbs at a low height above home. Follows
     `Plane::set_target_altitude_proportion`.
+
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    target: end of the leg, a `WAYPOINT` record.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    memory: `ARDUPILOT_MEMORY` record with the start of the leg; the altitude of the start changes if the slope does.
     """
     end_altitude: float = target.up
     if memory.sloped_leg != memory.leg + 1:
@@ -222,6 +230,11 @@ def _terrain_following_altitude_demand(estimated: Record, target: Record, parame
     (`Plane::set_target_altitude_proportion_terrain`). If the terrain ahead rises faster than the aircraft climbs at
     half of its maximum climb rate, the excess height is added to the demand. A descent of the leg reduces this excess
     (`lookahead_adjustment` in ArduPlane/altitude.cpp).
+
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    target: end of the leg, a `WAYPOINT` record, with its height above ground.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    memory: `ARDUPILOT_MEMORY` record with the ground altitude at the aircraft and the terrain lookahead.
     """
     if memory.terrain_leg != memory.leg + 1:
         # The leg began in this update: `update_terrain_lookahead` has not yet looked up the ground at its start.
@@ -251,7 +264,11 @@ def update_terrain_lookahead(
     every TERRAIN_SPACING towards the waypoint, up to the waypoint or TERRAIN_LOOKAHD, and the climb rate is half of
     TECS_CLMB_MAX. Samples of unknown ground are ignored.
 
-    work: a record of `flight.simulation.tick.WORKSPACE`.
+    work: estimated position and ground altitude, a record of `flight.simulation.tick.WORKSPACE`.
+    heights: ground heights of the terrain by pixel, m.
+    waypoints: `WAYPOINT` records of the route, (w,).
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record; updated.
     """
     target = waypoints[memory.leg + 1]
     # Before the first update of the control law, the start of the first leg is not set.
@@ -299,6 +316,11 @@ def _rtl_altitude(estimated: Record, rtl: Record, parameters: Record, memory: Re
     demand never exceeds the altitude at which the RTL began (`Plane::set_offset_altitude_location`,
     `Plane::constrain_target_altitude_location`; seen in 20 flights). During the climb before the turn, the demand is
     above both the start and the target (`Plane::update_alt`).
+
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    rtl: loiter at the RTL's end, a `WAYPOINT` record.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    memory: `ARDUPILOT_MEMORY` record with the position at which the RTL began.
     """
     end_altitude: float = rtl.up
     if not memory.rtl_climb_complete:
@@ -375,9 +397,14 @@ def arduplane_loop(
     frictions: Records,
     count: int,
 ) -> int:
-    """Fly up to ``count`` ticks with a `flight.dynamics.compiled_model.CompiledModel`, and return a status.
+    """Fly up to ``count`` ticks with a compiled model, and return a status.
 
     The status is 0 if the flight continues, otherwise a key of `flight.simulation.tick.ENDS`.
+
+    block: state, settings and path of the flight, the memory of a `flight.simulation.tick.Workspace`; updated.
+    heights: ground heights of the terrain by pixel, m.
+    frames, numbers, code, contacts, frictions: arrays of a `flight.dynamics.compiled_model.CompiledModel`: state of the
+        motion, registers, instructions, landing-gear contacts and scratch for their friction.
     """
     for _ in range(count):
         read_state(block, numbers, code)
@@ -402,14 +429,17 @@ def control_as_ardupilot(
     commands: Record,
     dt: float,
 ) -> None:
-    """Compute the commands for one tick of ``dt`` seconds, and update ``guidance`` and ``memory``.
+    """Compute the commands for one tick of ``dt`` s, and update the memories ``guidance`` and ``memory``.
 
-    guidance: a record of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.
-    parameters: a record of `flight.autopilots.arduplane.parameters.ARDUPILOT_PARAMETERS`.
-    memory: a record of `flight.autopilots.arduplane.law.ARDUPILOT_MEMORY`.
-    Other arguments as for `flight.autopilots.planfly.law.guide`.
+    ArduPlane's navigation and TECS run every `NAVIGATION_TICK_S`, its attitude controllers in each tick. ArduPlane does
+    not use the path: the track is only measured against it.
 
-    ArduPlane does not use the path; the track is only measured against it.
+    state, estimated: true attitude, airspeed and rates, a `STATE` record, and estimated motion, a `MOTION` record.
+    pieces, nodes: course and altitude profile of the reference path, arrays of a `FlyByPath`.
+    waypoints: `WAYPOINT` records of the route, (w,).
+    gains, guidance: gains of the inner loops, and their memory with the progress on the path.
+    parameters, memory: ArduPlane's parameters, and the memory of its control law, an `ARDUPILOT_MEMORY` record.
+    commands: `COMMANDS` record to fill.
     """
     find_on_path(estimated, pieces, guidance)
     target = waypoints[memory.leg + 1]
@@ -452,7 +482,17 @@ def control_as_ardupilot(
 def initialise_memory(
     state: Record, estimated: Record, waypoints: Records, guidance: Record, parameters: Record, memory: Record
 ) -> None:
-    """Initialise the control law's memory for steady flight at the first waypoint (`AP_TECS::_initialise_states`)."""
+    """Initialise the control law's memory for steady flight at the first waypoint.
+
+    Follows `AP_TECS::_initialise_states`.
+
+    state: attitude, airspeed and rates of the aircraft, a `STATE` record.
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    waypoints: `WAYPOINT` records of the route, (w,).
+    guidance: `GUIDANCE_MEMORY` record, which states the throttle of level flight.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    memory: `ARDUPILOT_MEMORY` record to initialise.
+    """
     memory.is_initialised = True
     memory.from_east, memory.from_north, memory.from_up = waypoints[0].east, waypoints[0].north, waypoints[0].up
     memory.altitude_demand_in = estimated.up
@@ -485,10 +525,17 @@ def control_attitude(
 ) -> None:
     """Drive roll and pitch to their demands with the lags of ArduPlane's controllers; set the throttle.
 
-    Represents `Plane::stabilize_roll`, `Plane::stabilize_pitch` and `Plane::set_servos`.
+    Follows `Plane::stabilize_roll`, `Plane::stabilize_pitch` and `Plane::set_servos`.
 
+    state: attitude, airspeed and rates of the aircraft, a `STATE` record.
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    gains: gains of the inner loops, a `GAINS` record.
+    guidance: memory of the inner loops and progress on the path, a `GUIDANCE_MEMORY` record; updated.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record; updated.
     eas2tas: ratio of true to equivalent airspeed.
-    dt: s.
+    commands: `COMMANDS` record to fill.
+    dt: duration of a tick, s.
     """
     memory.roll_demand = limited_nav_roll(
         memory.lateral_acceleration, state.pitch, state.airspeed / eas2tas, parameters

@@ -73,6 +73,7 @@ def is_past_finish_line(estimated: Record, from_east: float, from_north: float, 
 
     from_east, from_north: start of the leg, m.
     east, north: end of the leg, m.
+    estimated: estimated position and velocity over the ground, a `MOTION` record.
     """
     leg_e, leg_n = east - from_east, north - from_north
     remaining_e, remaining_n = east - estimated.east, north - estimated.north
@@ -123,6 +124,8 @@ def _leg_end(target: Record, memory: Record) -> tuple[float, float]:
     """Return east and north of the leg's end, m: the target, or a point beyond a target with a pass-by distance.
 
     Follows `Plane::verify_nav_wp`, which moves the waypoint along the leg by the pass-by distance.
+
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record.
     """
     leg_e, leg_n = target.east - memory.from_east, target.north - memory.from_north
     leg_length = math.hypot(leg_e, leg_n)
@@ -162,6 +165,9 @@ def _follow_line(
     l1_distance: L1 distance, m.
     ground_speed: m/s.
     dt: s.
+    estimated: estimated position and velocity over the ground, a `MOTION` record.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record.
     """
     from_e, from_n = (estimated.east, estimated.north) if without_crosstrack else (memory.from_east, memory.from_north)
     angle, aim_angle = l1_angles(estimated, from_e, from_n, end_e, end_n, l1_distance)
@@ -182,6 +188,8 @@ def keep_turn_side(estimated: Record, angle: float, target_e: float, target_n: f
 
     angle: angle from the direction to the L1 point to the ground velocity, rad (`-Nu`).
     target_e, target_n: position that the aircraft flies to, m.
+    estimated: estimated position and velocity over the ground, a `MOTION` record.
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record.
     """
     course = math.atan2(estimated.velocity_east, estimated.velocity_north)
     bearing = math.atan2(target_e - estimated.east, target_n - estimated.north)
@@ -201,6 +209,9 @@ def _turn_angle(waypoints: Records, target: Record, memory: Record) -> float:
 
     Follows `Plane::setup_turn_angle`. The course of a leg that begins or ends on a loiter is measured from or to the
     center of the loiter.
+
+    waypoints: `WAYPOINT` records of the route, (w,).
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record.
     """
     turn_angle: float = target.turn
     if memory.leg + 2 >= waypoints.shape[0]:
@@ -219,6 +230,10 @@ def _begin_leg(estimated: Record, waypoints: Records, leg: int, memory: Record) 
 
     The line to follow usually starts at the first waypoint of the leg. It starts at the aircraft's position if the
     aircraft leaves a loiter on a tangent, or if the aircraft is already past the leg's end.
+
+    estimated: estimated position and velocity over the ground, a `MOTION` record.
+    waypoints: `WAYPOINT` records of the route, (w,).
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record.
     """
     start, target = waypoints[leg], waypoints[leg + 1]
     memory.leg = leg
@@ -259,6 +274,9 @@ def _is_leg_over(
     turn_angle: turn of the route at the target, rad.
     l1_distance: L1 distance, m.
     eas2tas: ratio of true to equivalent airspeed.
+    estimated: estimated position and velocity over the ground, a `MOTION` record.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record.
     """
     is_past_end = is_past_finish_line(estimated, memory.from_east, memory.from_north, end_e, end_n)
     if (
@@ -290,12 +308,17 @@ def _update_loiter(
 ) -> None:
     """Fly to a loiter and around it, until the loiter is complete and the aircraft heads for the next waypoint.
 
-    Follows `Plane::update_loiter`.
+    Follows `Plane::update_loiter`: far from the circle the aircraft flies straight to its centre, then around it. The
+    next leg begins once the loiter is complete and the course leads to the next waypoint that is not on the circle.
 
-    loiter: waypoint on the loiter; its loiter_radius is the radius at the altitude of the waypoint.
-    l1_distance: L1 distance, m.
-    ground_speed: m/s.
-    eas2tas: ratio of true to equivalent airspeed.
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    waypoints: `WAYPOINT` records of the route, (w,).
+    loiter: waypoint on the loiter; its loiter_radius (m) is the radius at the altitude of the waypoint. The radius
+        grows with the square of the true airspeed.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record; updated.
+    l1_distance, ground_speed: L1 distance, m, and ground speed, m/s.
+    eas2tas, dt: ratio of true to equivalent airspeed, and duration of a tick, s.
     """
     eas2tas_ratio = eas2tas / eas_to_tas_ratio(loiter.up)
     radius = abs(loiter.loiter_radius) * eas2tas_ratio * eas2tas_ratio
@@ -339,6 +362,11 @@ def _update_loiter_angle(estimated: Record, loiter: Record, memory: Record, dt: 
     """Update the time on a loiter and the angle flown around it, both since the aircraft reached the circle.
 
     Also record whether the aircraft has reached the loiter's altitude. Follows `Plane::loiter_angle_update`.
+
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    loiter: waypoint on the loiter, a `WAYPOINT` record.
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record; updated.
+    dt: duration of a tick, s.
     """
     bearing = math.atan2(estimated.east - loiter.centre_east, estimated.north - loiter.centre_north)
     if memory.loiter_started:
@@ -360,6 +388,9 @@ def _is_loiter_done(estimated: Record, loiter: Record, memory: Record) -> bool:
 
     The altitude is treated as reached if three laps hardly change the aircraft's altitude. Follows
     `Plane::verify_loiter_turns`, `verify_loiter_time` and `verify_loiter_to_alt`.
+
+    estimated: estimated position and velocity over the ground, a `MOTION` record.
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record.
     """
     if not memory.loiter_started:
         return False
@@ -385,7 +416,11 @@ def _is_heading_lined_up(
     waypoint. Follows `ModeLoiter::isHeadingLinedUp`, whose tangent touches the circle in the direction of the aircraft
     from the center.
 
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    next_waypoint: `WAYPOINT` record of the next leg's end.
+    loiter: `WAYPOINT` record on the circle; its exit bearing (rad) is 0 if it states none.
     radius: radius of the circle, m.
+    memory: `ARDUPILOT_MEMORY` record with the angle flown since the loiter was complete.
     """
     next_e, next_n = (
         (next_waypoint.centre_east, next_waypoint.centre_north)
@@ -420,6 +455,12 @@ def _navigate_rtl(estimated: Record, rtl: Record, parameters: Record, memory: Re
     The aircraft turns to the center of the RTL loiter at once. The loiter's radius grows with altitude as the square of
     the ratio of true to equivalent airspeed (`AP_L1_Control::loiter_radius`). During the initial climb, the bank is
     limited to LEVEL_ROLL_LIMIT. The altitude slope begins where that climb ends.
+
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    rtl: loiter at the RTL's end, a `WAYPOINT` record.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record; updated.
+    eas2tas: ratio of true to equivalent airspeed.
     """
     if not memory.is_in_rtl:
         memory.is_in_rtl, memory.reached_loiter_target = True, False
@@ -452,6 +493,11 @@ def _join_landing(estimated: Record, waypoints: Records, rtl: Record, memory: Re
     Without a landing sequence the aircraft stays on the loiter.
 
     Follows `ModeRTL::navigate` of ArduPlane 4.6 with RTL_AUTOLAND 1. The next leg begins at the aircraft's position.
+
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    waypoints: `WAYPOINT` records of the route, (w,); those after the RTL are the landing sequence.
+    rtl: waypoint on the RTL loiter.
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record; updated.
     """
     landing_index = memory.leg + 2
     while landing_index < waypoints.shape[0] and waypoints[landing_index].is_rtl:
@@ -487,6 +533,9 @@ def _loiter_acceleration(
     radius: radius of the circle, m.
     l1_distance: L1 distance, m.
     ground_speed: m/s.
+    estimated: estimated position and velocity over the ground, a `MOTION` record.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record.
     """
     direction = math.copysign(1.0, loiter.loiter_radius)
     offset_e, offset_n = estimated.east - loiter.centre_east, estimated.north - loiter.centre_north

@@ -281,6 +281,9 @@ def _describe_missing_outputs(parameters: ArduPilotParameters, values: Mapping[s
     """Describe each control (ailerons, elevator, motor) to which the user's file assigns no servo output.
 
     A file without any servo parameter is not described.
+
+    parameters: ArduPlane's parameters.
+    values: value of every parameter by name; the default where no file states one.
     """
     if not any(name.startswith("SERVO") for name in parameters.by_origin("file")):
         return
@@ -301,6 +304,9 @@ def _describe_pitch_rates(parameters: ArduPilotParameters, values: Mapping[str, 
 
     `AP_PitchController::get_servo_out` limits the sum of two rates: the rate that a turn needs, and the rate that
     changes the pitch.
+
+    parameters: ArduPlane's parameters.
+    values: value of every parameter by name; the default where no file states one.
     """
     bank = parameters.roll_limit
     turn_rate = math.degrees(GRAVITY / parameters.airspeed_cruise * math.tan(min(bank, _MAX_COORDINATED_BANK_RAD)))

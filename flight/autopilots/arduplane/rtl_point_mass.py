@@ -224,7 +224,15 @@ def waypoint_ahead(start: Record) -> Records:
 
 
 def rtl_timeout(start: Record, stages: Records, aircraft: PointMass) -> float:
-    """Return the timeout of an RTL, s, from the distances and altitude changes between its stages."""
+    """Return the timeout of an RTL, s, from the distances and altitude changes between its stages.
+
+    Each leg is flown against the strongest wind, but at 5 m/s or more over the ground, with a lap of the loiter at its
+    end. The altitude changes by 2 m/s. The sum is multiplied by `TIMEOUT_RATIO`, and `TIMEOUT_BASE_S` is added.
+
+    start: position of the start, a `RETURN_START` record.
+    stages: `WAYPOINT` records of the RTL's stages, (n,).
+    aircraft: point mass of the aircraft in the wind.
+    """
     min_ground_speed = max(5.0, aircraft.record.airspeed - aircraft.record.max_wind)
     east = start["east"]
     north = start["north"]
@@ -263,10 +271,10 @@ def fly_stages(
 ) -> None:
     """Simulate the flight from stage to stage for up to ``timeout`` s; fill the `RETURN_RESULT` ``result``.
 
-    stages: successive targets, (n,) of `flight.guidance.lateral_reference_laws.WAYPOINT`; the last loiter is flown on.
+    start, stages: `RETURN_START` record, and successive targets, `WAYPOINT` records (n,); the last loiter is flown on.
     climb, climb_parameters: the climb at the start and its parameters. engine_out: True if the engine failed there.
     min_clearance, min_distance: height above ground and distance outside spheres, m, below which the flight is aborted.
-    positions: array (t, 3), m, to fill, one position a second. excesses, power, field: tables of a `PointMass`.
+    positions: array (t, 3), m, to fill, one per second. aircraft, excesses, power, field: tables of a `PointMass`.
     """
     spaced, progress_records = np.zeros(6, WAYPOINT), np.zeros(1, LOITER_PROGRESS)  # Spaced as in `waypoint_column`.
     waypoints, loiter = spaced[::2], progress_records[0]
@@ -321,7 +329,11 @@ def fly_stages(
 
 @inner
 def _lag_fractions(parameters: Record, dt: float) -> tuple[float, float, float]:
-    """Return the fractions by which roll, pitch and path angle approach their demands in one tick of ``dt`` s."""
+    """Return the fractions by which roll, pitch and path angle approach their demands in one tick of ``dt`` s.
+
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    dt: duration of a tick, s.
+    """
     return (
         1.0 - math.exp(-dt / (ROLL_LAG_RATIO * parameters.roll_time)),
         1.0 - math.exp(-dt / (PITCH_LAG_RATIO * parameters.pitch_time)),
@@ -331,7 +343,13 @@ def _lag_fractions(parameters: Record, dt: float) -> tuple[float, float, float]:
 
 @inner
 def _record_arrival(estimated: Record, time: float, engine_out: bool, result: Record) -> None:
-    """Record time and altitude of the first arrival at the loiter; after an engine failure, end the RTL there."""
+    """Record time and altitude of the first arrival at the loiter; after an engine failure, end the RTL there.
+
+    estimated: position over the ground, a `MOTION` record.
+    time: time since the start of the RTL, s.
+    engine_out: True after an engine failure.
+    result: `RETURN_RESULT` record; updated at the first arrival only.
+    """
     if math.isnan(result.arrival_time):
         result.arrival_time, result.arrival_altitude = time, estimated.up
         if engine_out:
@@ -357,10 +375,16 @@ def _is_stage_complete(
 
     A stage is the flight straight ahead before the engine failure is noticed, the climb, or the leg to the target.
 
+    target: end of the leg, a `WAYPOINT` record.
     loiter: progress around the loiter, a record of `flight.autopilots.return_steps.LOITER_PROGRESS`.
+    climb: the climb at the start, a `CLIMB` record.
     is_before_reaction: True while the engine failure is not yet noticed and the aircraft flies straight on.
+    is_first_stage, is_last_stage: True for the first stage and for the last one.
     time: time since the start, s.
     arrival_radius: distance from the center, m, within which the aircraft has arrived at the loiter.
+    estimated: position and velocity over the ground, a `MOTION` record.
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record.
+    dt: duration of a tick, s.
     """
     if is_before_reaction:
         return time >= ENGINE_FAILURE_REACTION_S
@@ -383,9 +407,14 @@ def _demand_climb(
 ) -> None:
     """Demand a climb straight ahead: level wings, a fixed pitch, and increasing throttle.
 
-    Both pitch limits of ``climb_parameters`` are this pitch.
-
+    state: attitude, airspeed and rates of the aircraft, a `STATE` record.
+    estimated: position and velocity over the ground, a `MOTION` record.
+    climb_parameters: `ARDUPILOT_PARAMETERS` record, both of whose pitch limits are the pitch of the climb.
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record; updated.
+    climb: throttle of the climb and the rate at which it increases, a `CLIMB` record.
     airspeed_demand: equivalent airspeed, m/s.
+    eas2tas: ratio of true to equivalent airspeed.
+    dt: duration of a tick, s.
     """
     memory.lateral_acceleration = 0.0
     memory.altitude_demand_in = estimated.up
@@ -423,6 +452,8 @@ def _is_target_reached(
     loiter: progress around the last loiter, a record of `flight.autopilots.return_steps.LOITER_PROGRESS`.
     arrival_radius: distance from the center, m, within which the aircraft has arrived at the loiter.
     dt: s since the last call.
+    estimated: position and velocity over the ground, a `MOTION` record.
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record.
     """
     if target.loiter_radius == 0.0:
         return memory.leg > 0
@@ -439,6 +470,11 @@ def _load_stage(stages: Records, index: int, waypoints: Records, estimated: Reco
     The leg starts at the previous stage. It starts at the aircraft if there is no previous stage, or if the aircraft is
     already past the leg's end. Waypoints 1 and 2 both become a copy of the stage: once `navigate_legs` begins the leg
     to waypoint 2, the stage is reached.
+
+    stages: `WAYPOINT` records of the RTL's stages.
+    waypoints: three `WAYPOINT` records that the navigator follows; the last two are overwritten.
+    estimated: position and velocity over the ground, a `MOTION` record.
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record; updated.
     """
     stage, is_previous_reached = stages[index], memory.leg > 0
     for k in range(1, 3):
@@ -484,6 +520,12 @@ def _initialise_memory(
 
     Follows `flight.autopilots.arduplane.law.initialise_memory`, which assumes level flight. In a climb or descent the
     input of the altitude demand is ahead of the aircraft by the lag of the demand.
+
+    start: position, velocity, bank and time of the start, a `RETURN_START` record.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    aircraft, excess_table, field: record, excess power and wind field of a `PointMass`.
+    state: `STATE` record to fill.
+    memory: `ARDUPILOT_MEMORY` record to fill.
     """
     initialise_state(start, aircraft, field, state)
     climb_rate = start.velocity_up
@@ -519,9 +561,16 @@ def _update_demands(
 ) -> None:
     """Update the demands for bank, altitude, throttle and pitch on the leg to ``waypoints[1]``.
 
-    excess_table: specific excess power, see `flight.autopilots.point_mass.PointMass`.
+    excess_table: specific excess power, m/s, `PointMass.excess`.
     eas2tas: ratio of true to equivalent airspeed.
     is_gliding: True while the aircraft flies its RTL without an engine.
+    state: attitude, airspeed and rates of the aircraft, a `STATE` record.
+    estimated: position and velocity over the ground, a `MOTION` record.
+    waypoints: `WAYPOINT` records, (w,).
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record.
+    aircraft: the point mass, a `POINT_MASS` record.
+    dt: duration of a tick, s.
     """
     target = waypoints[1]
     navigate_legs(estimated, waypoints[: 2 if target.loiter_radius != 0.0 else 3], parameters, memory, eas2tas, dt)
@@ -550,14 +599,21 @@ def _demand_throttle_and_pitch(
 ) -> None:
     """Demand throttle and pitch by TECS; in a gliding turn, demand the pitch that holds the airspeed.
 
-    airspeed_demand: equivalent airspeed, m/s. In a bank it is multiplied by the square root of the load factor, so that
-        the angle of attack stays the same.
+    state: attitude, airspeed and rates of the aircraft, a `STATE` record.
+    estimated: position and velocity over the ground, a `MOTION` record.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record; updated.
+    aircraft: a `POINT_MASS` record.
+    excess_table: specific excess power, m/s, `PointMass.excess`.
+    airspeed_demand: equivalent airspeed, m/s. In a gliding turn it is multiplied by the square root of the load factor,
+        so that the angle of attack stays the same.
+    eas2tas: ratio of true to equivalent airspeed.
+    is_gliding: True while the aircraft flies its RTL without an engine.
+    dt: duration of a tick, s.
 
     In six of eight ArduPlane flights, the aircraft held its airspeed in this way and lost 55 m in the turn back. In the
     other two, which had been sinking before, it held its altitude, slowed down, and lost half as much. The worse case
     is simulated.
-
-    is_gliding: True while the aircraft flies its RTL without an engine.
     """
     seb_integrator, ske_integrator = memory.seb_integrator, memory.ske_integrator
     update_tecs(state, estimated, parameters, memory, airspeed_demand * eas2tas, eas2tas, dt)

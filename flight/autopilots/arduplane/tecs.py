@@ -23,7 +23,9 @@ def nav_roll(lateral_acceleration: float, pitch: float, parameters: Record) -> f
     Follows `AP_L1_Control::nav_roll_cd`.
 
     pitch: rad.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
     """
+    # ArduPlane limits the pitch to 60 degrees here.
     cos_pitch = math.cos(min(math.radians(60.0), max(-math.radians(60.0), pitch)))
     bank = math.atan(lateral_acceleration / (GRAVITY * cos_pitch))
     return min(parameters.roll_limit, max(-parameters.roll_limit, bank))
@@ -36,9 +38,12 @@ def min_airspeed(bank: float, parameters: Record) -> float:
     The minimum is AIRSPEED_MIN times the square root of the turn's load factor. If AIRSPEED_STALL is stated, the
     minimum is AIRSPEED_STALL times this root, but at least AIRSPEED_MIN. Without stall prevention the minimum is
     AIRSPEED_MIN.
+
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
     """
     if parameters.stall_prevention <= 0.0:
         return parameters.airspeed_min
+    # The bank is limited to 85 degrees, to keep the load factor finite.
     load_factor_root = 1.0 / math.sqrt(math.cos(min(math.radians(85.0), abs(bank))))
     if parameters.airspeed_stall > 0.0:
         return max(parameters.airspeed_min, parameters.airspeed_stall * load_factor_root)
@@ -65,6 +70,7 @@ def limited_nav_roll(lateral_acceleration: float, pitch: float, airspeed: float,
 
     pitch: rad.
     airspeed: equivalent, m/s.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
     """
     bank = nav_roll(lateral_acceleration, pitch, parameters)
     if parameters.stall_prevention <= 0.0:
@@ -147,6 +153,12 @@ def _update_speed(state: Record, estimated: Record, parameters: Record, memory: 
     The fast changes come from the acceleration along the nose, the slow changes from the measured airspeed. With
     gravity removed, an accelerometer along the nose measures the change of the velocity over the ground, including its
     vertical component. At the start of a climb, this change is larger than the change of the airspeed.
+
+    state: attitude, airspeed and rates of the aircraft, a `STATE` record.
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    memory: `ARDUPILOT_MEMORY` record; its airspeeds (m/s, true) and airspeed rates (m/s^2) are updated.
+    dt: duration of a tick, s.
     """
     cos_pitch = math.cos(state.pitch)
     acceleration = (estimated.velocity_east - memory.last_velocity_east) * math.sin(state.yaw) * cos_pitch
@@ -173,12 +185,17 @@ def _update_speed(state: Record, estimated: Record, parameters: Record, memory: 
 def detect_underspeed(estimated: Record, parameters: Record, memory: Record, tas_min: float, dt: float) -> bool:
     """Update the underspeed flag, and return it: True while airspeed has priority over altitude.
 
-    Follows `AP_TECS::_detect_underspeed`.
-
-    tas_min: AIRSPEED_MIN as a true airspeed, m/s.
+    The flag is set below `_UNDERSPEED_RATIO` times the minimum airspeed at full throttle. It lasts until the aircraft
+    is at its altitude demand again, or has been fast enough for some time. Follows `AP_TECS::_detect_underspeed`.
 
     After an engine failure, underspeed lasts until the altitude demand has descended to the gliding aircraft. From then
     on the aircraft glides at AIRSPEED_MIN, which is above the underspeed threshold (seen in 14 flights).
+
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record; updated.
+    tas_min: AIRSPEED_MIN as a true airspeed, m/s.
+    dt: duration of a tick, s.
     """
     is_slow = memory.tas < _UNDERSPEED_RATIO * tas_min
     memory.time_above_underspeed_threshold = 0.0 if is_slow else memory.time_above_underspeed_threshold + dt
@@ -209,8 +226,13 @@ def airspeed_target(
     The increase rises at once, but falls only in steps of at least `_GROUND_SPEED_HYSTERESIS_MPS`. The result is
     limited to AIRSPEED_MIN..AIRSPEED_MAX. Follows `Plane::calc_airspeed_errors` and `Plane::calc_gndspeed_undershoot`.
 
+    state: attitude, airspeed and rates of the aircraft, a `STATE` record.
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
     commanded_airspeed: equivalent airspeed, m/s.
     waypoint: end of the leg, which states the minimum ground speed, m/s; 0 for none.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record; updated.
+    eas2tas: ratio of true to equivalent airspeed.
     """
     target_airspeed = commanded_airspeed
     if waypoint.min_ground_speed > 0.0:
@@ -237,10 +259,15 @@ def update_tecs(
     Follows `AP_TECS::update_pitch_throttle`: `_update_speed`, `_detect_underspeed`, `_update_speed_demand`,
     `_update_energies`, `_update_throttle_with_airspeed` and `_update_pitch`.
 
-    state: a record of `flight.dynamics.state.STATE`.
-    tas_target: m/s, true.
+    state: attitude, airspeed and rates of the aircraft, a `STATE` record.
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record; updated.
+    tas_target: target true airspeed, m/s.
     eas2tas: ratio of true to equivalent airspeed.
-    Other arguments as for `flight.autopilots.arduplane.law.update_height_demand`.
+    dt: duration of a tick, s.
+
+    SPE, SKE and STE are the specific potential, kinetic and total energy, m^2/s^2.
     """
     _update_speed(state, estimated, parameters, memory, dt)
     tas = memory.tas
@@ -282,8 +309,12 @@ def _update_tas_max(
     The maximum falls towards AIRSPEED_CRUISE while the throttle is saturated, and rises again afterwards. With this
     rule `AP_TECS::_update_speed` slows down an aircraft that cannot climb at its maximum airspeed.
 
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    memory: `ARDUPILOT_MEMORY` record; its drop of the maximum airspeed is updated.
     tas_min: minimum true airspeed, m/s.
-    ste_rate_max, ste_rate_min: STE rates at full and at idle throttle, m^2/s^3.
+    eas2tas: ratio of true to equivalent airspeed.
+    ste_rate_max, ste_rate_min: rates of the specific total energy at full and at idle throttle, m^2/s^3.
+    dt: duration of a tick, s.
     """
     tas_max = parameters.airspeed_max * eas2tas
     ste_rate = ste_rate_min if memory.is_throttle_saturated else ste_rate_max
@@ -305,11 +336,15 @@ def _update_speed_demand(
 ) -> float:
     """Move the airspeed demand towards a target, and return the demanded SKE rate, m^2/s^3.
 
-    Follows `AP_TECS::_update_speed_demand`. A rise of the airspeed may use half of the energy rate of a climb at
-    TECS_CLMB_MAX. A fall may use nine tenths of the energy rate of a descent: at TECS_SINK_MIN at AIRSPEED_CRUISE, at
-    TECS_SINK_MAX at the maximum airspeed, and interpolated in between.
+    SKE is the specific kinetic energy. Follows `AP_TECS::_update_speed_demand`. A rise of the airspeed may use half of
+    the energy rate of a climb at TECS_CLMB_MAX. A fall may use nine tenths of the energy rate of a descent: at
+    TECS_SINK_MIN at AIRSPEED_CRUISE, at TECS_SINK_MAX at the maximum airspeed, and interpolated in between.
 
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record; updated.
     tas_target, tas_min, tas_max: true airspeeds, m/s.
+    eas2tas: ratio of true to equivalent airspeed.
+    dt: duration of a tick, s.
     """
     tas, tas_cruise = memory.tas, parameters.airspeed_cruise * eas2tas
     fraction = 1.0 if tas_max <= tas_cruise else min(1.0, max(0.0, (tas - tas_cruise) / (tas_max - tas_cruise)))
@@ -329,8 +364,9 @@ def _is_bad_descent(parameters: Record, memory: Record, ste_error: float, ste_ra
 
     Follows `AP_TECS::_detect_bad_descent`. A bad descent lasts until the STE error is no longer positive.
 
-    ste_error: m^2/s^2.
-    ste_rate: m^2/s^3.
+    ste_error, ste_rate: error (m^2/s^2) and rate (m^2/s^3) of the specific total energy.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record.
     """
     if memory.bad_descent and ste_error > 0.0:
         return True
@@ -354,9 +390,13 @@ def _update_throttle(
 
     Follows `AP_TECS::_update_throttle_with_airspeed`.
 
-    ste_error: m^2/s^2.
+    ste_error: error of the specific total energy (STE), m^2/s^2.
     ste_rate_demand, ste_rate: m^2/s^3.
     ste_rate_max, ste_rate_min: STE rates at full and at idle throttle, m^2/s^3.
+    state: attitude, airspeed and rates of the aircraft, a `STATE` record.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record.
+    dt: duration of a tick, s.
     """
     # There is no reverse thrust (`Plane::apply_throttle_limits`).
     throttle_min, throttle_max = max(0.0, parameters.throttle_min), parameters.throttle_max
@@ -394,6 +434,9 @@ def wind_up_ste_integrator(parameters: Record, memory: Record) -> None:
 
     `AP_TECS::_update_throttle_with_airspeed` does so at every update of a take-off and of an aborted landing. Therefore
     the throttle stays open for a while afterwards.
+
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record.
     """
     throttle_min, throttle_max = max(0.0, parameters.throttle_min), parameters.throttle_max
     integrator_limit = _STE_INTEGRATOR_FRACTION * (throttle_max - throttle_min)
@@ -421,6 +464,9 @@ def _update_pitch_integrators(
     seb_rate_demand_total: SEB rate demand without integrators, m^2/s^3.
     seb_change, ske_change: changes of the integrators in this update, m^2/s^3.
     pitch_min, pitch_max: rad.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record.
+    dt: duration of a tick, s.
     """
     seb_rate_per_pitch = memory.tas * GRAVITY
     seb_max = (pitch_max + _PITCH_OVERSHOOT_RAD) * seb_rate_per_pitch - seb_rate_demand_total
@@ -455,10 +501,14 @@ def _update_pitch(
 ) -> None:
     """Set the pitch demand from the balance of potential and kinetic energy.
 
-    Follows `AP_TECS::_update_pitch`.
+    Follows `AP_TECS::_update_pitch`. SEB is the specific energy balance: potential minus kinetic energy, each weighted.
 
-    spe_error, ske_error: m^2/s^2.
-    spe_rate, ske_rate: m^2/s^3.
+    state: attitude and airspeed of the aircraft, a `STATE` record.
+    parameters, memory: ArduPlane's parameters, and the memory of its control law, which is updated.
+    spe_error, ske_error: errors of the specific potential and kinetic energy, m^2/s^2.
+    spe_rate, ske_rate: rates of the specific potential and kinetic energy, m^2/s^3.
+    is_underspeed: True to use the pitch only to regain airspeed.
+    dt: duration of a tick, s.
     """
     ske_weight = 1.0 if is_underspeed else min(1.0, parameters.tecs_speed_weight)
     spe_weight = 0.0 if is_underspeed else min(1.0, 2.0 - parameters.tecs_speed_weight)

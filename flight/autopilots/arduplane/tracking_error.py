@@ -35,6 +35,10 @@ _SETTLED_CROSS_TRACK_M = 2.0
 _SETTLED_TIME_S = 8.0
 # Length of the legs on both sides of a corner, m; the flights end there at the latest.
 _LEG_LENGTH_M = 4000.0
+# Fraction of the second leg after which a simulation ends at the latest.
+_MAX_DISTANCE_FRACTION = 0.75
+# Time after which a simulation ends at the latest, s.
+_TIMEOUT_S = 120.0
 # Distance before the earliest turn at which the flights begin, m.
 _RUN_IN_M = 200.0
 # Number of acceptance radii that are tried in one round.
@@ -146,6 +150,9 @@ def _measure_corners(
     airspeed: equivalent airspeed, m/s.
     turn_angles: rad.
     ground_speeds: m/s.
+    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
+    corners: `CORNER_TRACKING` records (turns, speeds) to fill.
+    waypoints: scratch, three `WAYPOINT` records.
     """
     for i in range(turn_angles.size):
         for j in range(ground_speeds.size):
@@ -184,9 +191,9 @@ def _fly_corner(
     """Simulate one corner; return the excursion and the settling distance, m.
 
     The excursion is the maximum distance from the nearer leg. The settling distance is measured along the second leg;
-    beyond it the aircraft stays close to the leg. The first leg leads north to the origin; the turn is a right turn.
-
-    airspeed (equivalent), ground_speed: m/s. turn_angle: rad. acceptance: acceptance radius, m.
+    beyond it the aircraft stays within `_SETTLED_CROSS_TRACK_M` of the leg. The first leg leads north to the origin.
+    airspeed, ground_speed: equivalent airspeed and ground speed, m/s. turn_angle: rad, to the right.
+    acceptance: acceptance radius, m. waypoints: scratch, three `WAYPOINT` records, whose positions are overwritten.
     """
     motions, memories = np.zeros(1, MOTION), np.zeros(1, ARDUPILOT_MEMORY)
     estimated, memory = motions[0], memories[0]
@@ -201,7 +208,7 @@ def _fly_corner(
     lag = ROLL_LAG_RATIO * parameters.roll_time
     decay = math.exp(-NAVIGATION_TICK_S / lag)
     course, lateral_acceleration, time, excursion, settled_distance, distance_along = 0.0, 0.0, 0.0, 0.0, 0.0, -1.0
-    while distance_along < 0.75 * _LEG_LENGTH_M and time < 120.0:
+    while distance_along < _MAX_DISTANCE_FRACTION * _LEG_LENGTH_M and time < _TIMEOUT_S:
         estimated.velocity_east = ground_speed * math.sin(course)
         estimated.velocity_north = ground_speed * math.cos(course)
         navigate_legs(estimated, waypoints, parameters, memory, 1.0, NAVIGATION_TICK_S)

@@ -30,6 +30,8 @@ from world.kernels import Record, compiled, inner
 
 # Height above its standing position at which an aircraft on a runway has lifted off, m.
 _LIFT_OFF_HEIGHT_M = 2.0
+# The aircraft is past the landing point if it flies away from it within this distance, m.
+_MAX_PASSING_DISTANCE_M = 500.0
 # From the start of the flare a low airspeed is no stall.  The flare is taken to begin below this multiple of the
 # glide's flare height above the landing point ...
 _MAX_FLARE_HEIGHT_RATIO = 2.0
@@ -84,7 +86,7 @@ def update_phase(true: Record, ground: Record, on_last_leg: bool) -> None:
         offset_east, offset_north = true.east - ground.east, true.north - ground.north
         is_past = (
             offset_east * true.velocity_east + offset_north * true.velocity_north > 0.0
-            and math.hypot(offset_east, offset_north) < 500.0
+            and math.hypot(offset_east, offset_north) < _MAX_PASSING_DISTANCE_M
         )
         if is_past or true.up - ground.up <= max(_MIN_FLARE_HEIGHT_M, _MAX_FLARE_HEIGHT_RATIO * ground.flare_height):
             ground.stage = FLARING

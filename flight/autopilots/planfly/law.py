@@ -61,6 +61,28 @@ _NOSE_LIMIT_RAD = math.radians(80.0)
 _BANK_PER_NOSE_ANGLE_RATIO = 4.0
 # Fraction of the lateral acceleration at maximum bank that an arc may require before the aircraft slows down for it.
 ARC_ACCELERATION_FRACTION = 0.95
+# Lowest ground speed with which the lateral law computes, m/s.
+_MIN_GROUND_SPEED_MPS = 5.0
+# Lowest airspeed with which the longitudinal law computes, m/s.
+_MIN_AIRSPEED_MPS = 8.0
+# Largest cross-track error at which its integrator changes, m.
+_MAX_INTEGRATED_CROSS_TRACK_M = 20.0
+# Limit of the integrator of the cross-track error to either side, m s.
+_MAX_CROSS_TRACK_INTEGRAL = 40.0
+# Limit of the integrator of the vector field's course error to either side, rad s.
+_MAX_COURSE_INTEGRAL = 1.0
+# Largest climb rate to correct an altitude error, up or down, m/s.
+_MAX_CLIMB_CORRECTION_MPS = 4.0
+# Largest upward acceleration that is demanded, m/s^2.
+_MAX_UPWARD_ACCELERATION_MPS2 = 8.0
+# Largest downward acceleration that is demanded, m/s^2.
+_MAX_DOWNWARD_ACCELERATION_MPS2 = 6.0
+# Largest altitude error at which its integrator changes, m.
+_MAX_INTEGRATED_HEIGHT_ERROR_M = 5.0
+# Limit of the integrator of the altitude error to either side, m s.
+_MAX_ALTITUDE_INTEGRAL = 5.0
+# Limit of the integrator of the airspeed error to either side, m.
+_MAX_SPEED_INTEGRAL_M = 60.0
 # Longest tick for which the full lead of a correction is used, s.
 FULL_LEAD_TICK_S = 1.0 / 60.0
 
@@ -101,9 +123,14 @@ def planfly_loop(
     frictions: Records,
     count: int,
 ) -> int:
-    """Fly up to ``count`` ticks with a `flight.dynamics.compiled_model.CompiledModel`, and return a status.
+    """Fly up to ``count`` ticks with a compiled model, and return a status.
 
     The status is 0 if the flight continues, otherwise a key of `flight.simulation.tick.ENDS`.
+
+    block: state, settings and path of the flight, the memory of a `flight.simulation.tick.Workspace`; updated.
+    heights: ground heights of the terrain by pixel, m.
+    frames, numbers, code, contacts, frictions: arrays of a `flight.dynamics.compiled_model.CompiledModel`: state of the
+        motion, registers, instructions, landing-gear contacts and scratch for their friction.
     """
     for _ in range(count):
         read_state(block, numbers, code)
@@ -135,6 +162,7 @@ def guide(
     gains: a `flight.guidance.gains.GAINS` record.
     memory: a `flight.guidance.inner_loops.GUIDANCE_MEMORY` record.
     commands: a `flight.dynamics.state.COMMANDS` record.
+    dt: duration of a tick, s.
     """
     course = find_on_path(estimated, pieces, memory)
     memory.speed_command = waypoints[memory.leg].airspeed
@@ -163,9 +191,13 @@ def _cross_track_bank_command(
     The command is a feed-forward of the path's curvature plus a correction of the cross-track error. The sideslip
     setpoint and the maximum ground speed for the arcs ahead are set as well.
 
+    state, estimated: true attitude, airspeed and rates, a `STATE` record, and estimated motion, a `MOTION` record.
+    pieces: straight and circular pieces of the reference path.
+    gains, memory: gains of the control law, and its `GUIDANCE_MEMORY` record, which is updated.
     course: course of the path at the aircraft, rad.
+    dt: duration of a tick, s.
     """
-    speed = max(5.0, math.hypot(estimated.velocity_east, estimated.velocity_north))
+    speed = max(_MIN_GROUND_SPEED_MPS, math.hypot(estimated.velocity_east, estimated.velocity_north))
     ground_course = math.atan2(estimated.velocity_east, estimated.velocity_north)
     course_error = wrap(ground_course - course)
     # The horizontal lift is perpendicular to the heading, but the demanded acceleration is perpendicular to the course.
@@ -199,8 +231,11 @@ def _cross_track_bank_command(
     missing_acceleration = lift_acceleration * (math.tan(bank_demand) - math.tan(bank))
     sideslip = missing_acceleration / max(1.0, gains.side_per_sideslip * _pressure_ratio(state, gains))
     memory.sideslip = -min(gains.sideslip_max, max(-gains.sideslip_max, sideslip))
-    if bank == bank_demand and abs(memory.cross_track) < 20.0:
-        memory.cross_track_integrator = min(40.0, max(-40.0, memory.cross_track_integrator + memory.cross_track * dt))
+    if bank == bank_demand and abs(memory.cross_track) < _MAX_INTEGRATED_CROSS_TRACK_M:
+        memory.cross_track_integrator = min(
+            _MAX_CROSS_TRACK_INTEGRAL,
+            max(-_MAX_CROSS_TRACK_INTEGRAL, memory.cross_track_integrator + memory.cross_track * dt),
+        )
     return bank
 
 
@@ -233,6 +268,8 @@ def _roll_offset_correction(
     turn_acceleration: acceleration to the right for the path ahead, m/s^2.
     speed: ground speed, m/s.
     crab: cosine of the angle between heading and ground course.
+    gains: gains of the control law and of the aircraft, a `GAINS` record.
+    dt: duration of a tick, s.
     """
     memory.path_bank, memory.path_bank_rate, _ = step_roll_model(
         math.atan(turn_acceleration / (GRAVITY * crab)), memory.path_bank, memory.path_bank_rate, gains, dt
@@ -259,9 +296,17 @@ def _lateral_correction(
 ) -> float:
     """Return the acceleration to the right that corrects cross-track errors and disturbances, m/s^2.
 
+    The cross-track error demands a cross-track rate, whose error demands an acceleration. The integrator and the
+    acceleration that neither lift nor ailerons explain are subtracted, each times its gain.
+
+    state: attitude, airspeed and rates of the aircraft, a `STATE` record.
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    gains: gains of the inner loops, a `GAINS` record.
+    memory: memory of the guidance between ticks, a `GUIDANCE_MEMORY` record; updated.
     speed: ground speed, m/s.
     course_error: ground course minus course of the path, rad.
     crab: cosine of the angle between heading and ground course.
+    dt: duration of a tick, s.
     """
     frequency = gains.cross_track_frequency
     rate_gain = 2.0 * gains.cross_track_damping * frequency
@@ -281,7 +326,11 @@ def _lateral_correction(
 
 @inner
 def _pressure_ratio(state: Record, gains: Record) -> float:
-    """Return the ratio of the dynamic pressure to the dynamic pressure at the reference airspeed."""
+    """Return the ratio of the dynamic pressure to the dynamic pressure at the reference airspeed.
+
+    state: attitude, airspeed and rates of the aircraft, a `STATE` record.
+    gains: gains of the control law and of the aircraft, a `GAINS` record.
+    """
     return (state.airspeed / gains.reference_airspeed) ** 2
 
 
@@ -293,8 +342,13 @@ def _unexplained_acceleration(
 
     The estimate starts at the second tick, because it needs the previous velocity.
 
+    state: attitude, airspeed and rates of the aircraft, a `STATE` record.
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    gains: gains of the inner loops, a `GAINS` record.
+    memory: `GUIDANCE_MEMORY` record; the estimate and the last velocity are stored in it.
     speed: ground speed, m/s.
     crab: cosine of the angle between heading and ground course.
+    dt: duration of a tick, s.
     """
     if memory.last_velocity_east != 0.0 or memory.last_velocity_north != 0.0:
         change_east = estimated.velocity_east - memory.last_velocity_east
@@ -314,7 +368,15 @@ def _unexplained_acceleration(
 def _l1_bank_command(
     state: Record, estimated: Record, waypoints: Records, gains: Record, memory: Record, dt: float
 ) -> float:
-    """Return the bank command of L1 (rad); begin the next leg once L1 has reached the waypoint."""
+    """Return the bank command of L1 (rad); begin the next leg once L1 has reached the waypoint.
+
+    state: attitude, airspeed and rates of the aircraft, a `STATE` record.
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    waypoints: `WAYPOINT` records of the route, (w,).
+    gains: gains of the inner loops, a `GAINS` record.
+    memory: `GUIDANCE_MEMORY` record; its leg and integrator of L1 are updated.
+    dt: duration of a tick, s.
+    """
     speed = max(0.1, math.hypot(estimated.velocity_east, estimated.velocity_north))
     damping = gains.l1_damping
     l1_distance = l1_length(speed, gains.l1_period, damping)
@@ -340,10 +402,14 @@ def _field_bank_command(
 ) -> float:
     """Return the bank command of the vector field, rad.
 
-    The command is the bank for the arc plus a PI law on the course error.
+    The command is the bank for the arc plus a PI law on the course error. The integrator is frozen at the bank limit.
 
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
     curvature: curvature of the path at the aircraft, 1/m.
+    gains: gains of the inner loops, a `GAINS` record.
+    memory: `GUIDANCE_MEMORY` record; its integrator of the course error is updated.
     course: course of the path at the aircraft, rad.
+    dt: duration of a tick, s.
     """
     speed = math.hypot(estimated.velocity_east, estimated.velocity_north)
     course_demand = field_course(
@@ -356,7 +422,9 @@ def _field_bank_command(
     )
     bank: float = min(memory.max_bank, max(-memory.max_bank, bank_demand))
     if bank == bank_demand:
-        memory.course_integrator = min(1.0, max(-1.0, memory.course_integrator + course_error * dt))
+        memory.course_integrator = min(
+            _MAX_COURSE_INTEGRAL, max(-_MAX_COURSE_INTEGRAL, memory.course_integrator + course_error * dt)
+        )
     return bank
 
 
@@ -373,9 +441,16 @@ def follow_altitude_profile(
 ) -> None:
     """Set the elevator to follow the path's altitude profile, and the throttle to hold the airspeed.
 
+    state: attitude, airspeed and rates of the aircraft, a `STATE` record.
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    nodes: altitude profile of the reference path.
+    gains: gains of the inner loops, a `GAINS` record.
+    memory: memory of the guidance between ticks, a `GUIDANCE_MEMORY` record; updated.
+    commands: `COMMANDS` record to fill.
     course: course of the path at the aircraft, rad.
+    dt: duration of a tick, s.
     """
-    airspeed = max(8.0, state.airspeed)
+    airspeed = max(_MIN_AIRSPEED_MPS, state.airspeed)
     speed_along = max(1.0, estimated.velocity_east * math.sin(course) + estimated.velocity_north * math.cos(course))
     path_altitude, slope, _ = profile_at(nodes, memory.distance)
     _, slope_ahead, slope_rate = profile_at(nodes, memory.distance + speed_along * gains.slope_lead)
@@ -385,7 +460,10 @@ def follow_altitude_profile(
     frequency = gains.height_frequency
     rate_gain = 2.0 * gains.height_damping * frequency
     climb_rate_demand = slope * speed_along
-    climb_rate_correction = min(4.0, max(-4.0, -height_error * frequency * frequency / rate_gain))
+    climb_rate_correction = min(
+        _MAX_CLIMB_CORRECTION_MPS,
+        max(-_MAX_CLIMB_CORRECTION_MPS, -height_error * frequency * frequency / rate_gain),
+    )
     memory.slope_acceleration = slope_rate * speed_along * speed_along
     acceleration_demand = memory.slope_acceleration + rate_gain * (
         climb_rate_demand + climb_rate_correction - climb_rate
@@ -393,9 +471,14 @@ def follow_altitude_profile(
     acceleration_demand -= gains.height_integral * memory.altitude_integrator
     max_acceleration = _max_upward_acceleration(state, estimated, gains, memory, commands, airspeed, rate_gain, dt)
     is_limited = acceleration_demand > max_acceleration
-    acceleration_demand = min(8.0, max(-6.0, min(acceleration_demand, max_acceleration)))
-    if not is_limited and abs(height_error) < 5.0:
-        memory.altitude_integrator = min(5.0, max(-5.0, memory.altitude_integrator + height_error * dt))
+    acceleration_demand = min(
+        _MAX_UPWARD_ACCELERATION_MPS2,
+        max(-_MAX_DOWNWARD_ACCELERATION_MPS2, min(acceleration_demand, max_acceleration)),
+    )
+    if not is_limited and abs(height_error) < _MAX_INTEGRATED_HEIGHT_ERROR_M:
+        memory.altitude_integrator = min(
+            _MAX_ALTITUDE_INTEGRAL, max(-_MAX_ALTITUDE_INTEGRAL, memory.altitude_integrator + height_error * dt)
+        )
     steer_elevator(state, gains, memory, commands, climb_rate, acceleration_demand)
     _set_throttle(estimated, gains, memory, commands, airspeed, slope_ahead, speed_along, dt)
 
@@ -419,8 +502,14 @@ def _max_upward_acceleration(
     airspeed, because a gust can stall the aircraft within a second. In a steep turn this protection starts at a higher
     airspeed, because the stall speed grows with the square root of the load factor.
 
+    state: attitude, airspeed and rates of the aircraft, a `STATE` record.
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    gains: gains of the inner loops, a `GAINS` record.
+    memory: `GUIDANCE_MEMORY` record; its filtered airspeed and energy rate are updated.
+    commands: `COMMANDS` record with the throttle of the last tick.
     airspeed: m/s.
     rate_gain: acceleration per error of the climb rate, 1/s.
+    dt: duration of a tick, s.
     """
     climb_rate = estimated.velocity_up
     if memory.last_airspeed < 0.0:
@@ -457,10 +546,17 @@ def _set_throttle(
 ) -> None:
     """Set the throttle from the trim of level flight, the slope ahead and the airspeed error.
 
-    The slope ahead gives a feed-forward, the airspeed error a PI feedback.
+    The slope ahead gives a feed-forward, the airspeed error a PI feedback. Before and in an arc that requires a lower
+    ground speed, the airspeed error is reduced. The integrator is frozen while the throttle is saturated.
 
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    gains: gains of the inner loops, a `GAINS` record.
+    memory: `GUIDANCE_MEMORY` record; its integrator of the airspeed error is updated.
+    commands: `COMMANDS` record, whose throttle is set.
+    airspeed: m/s.
     slope_ahead: slope of the altitude profile ahead, m per m.
     speed_along: ground speed along the path, m/s.
+    dt: duration of a tick, s.
     """
     airspeed_error = memory.speed_command - airspeed
     if memory.max_arc_speed > 0.0:
@@ -473,7 +569,9 @@ def _set_throttle(
     # Below the throttle at which thrust begins, which increases with airspeed, the integrator would wind up.
     idle_throttle = gains.throttle_idle * airspeed / gains.reference_airspeed
     if (throttle_demand < 1.0 or airspeed_error < 0.0) and (throttle_demand > idle_throttle or airspeed_error > 0.0):
-        memory.speed_integrator = min(60.0, max(-60.0, memory.speed_integrator + airspeed_error * dt))
+        memory.speed_integrator = min(
+            _MAX_SPEED_INTEGRAL_M, max(-_MAX_SPEED_INTEGRAL_M, memory.speed_integrator + airspeed_error * dt)
+        )
 
 
 @inner
@@ -482,6 +580,13 @@ def steer_bank(state: Record, gains: Record, memory: Record, commands: Record, b
 
     A roll model answers the bank command as a critically damped oscillator within the limits of roll rate and roll
     acceleration, so it never overshoots. `follow_roll` makes the aircraft follow the model.
+
+    state: attitude, airspeed and rates of the aircraft, a `STATE` record.
+    gains: gains of the inner loops, a `GAINS` record.
+    memory: `GUIDANCE_MEMORY` record; bank and bank rate of the roll model are updated.
+    commands: `COMMANDS` record, whose aileron and rudder are set.
+    bank: bank command, rad.
+    dt: duration of a tick, s.
     """
     bank, roll_rate, roll_acceleration = step_roll_model(bank, memory.bank, memory.bank_rate, gains, dt)
     follow_roll(state, gains, memory, commands, bank, roll_rate, roll_acceleration, dt)

@@ -475,7 +475,16 @@ class Px4(Autopilot):
         abort_limits: tuple[Floats, Floats] | None = None,
         engine_out: bool = False,
     ) -> "SimulatedReturns":
-        """Simulate RTLs; see `flight.autopilots.parts.FlyReturns`.  Raises ValueError after an engine failure."""
+        """Simulate the RTL from each of n starts to its target.
+
+        starts: positions, velocities, banks and times of the starts, `RETURN_START` records (n,).
+        targets: target of each RTL (n).
+        aircraft: point mass of the aircraft in the wind.
+        environment: terrain and kill spheres from which the clearances are measured.
+        store_positions: True to store the flown positions.
+        abort_limits: heights above ground, (n,), and distances outside spheres, (n,), m, below which an RTL is aborted.
+        engine_out: True after an engine failure, which is not simulated: raises ValueError.
+        """
         # Imported here: only simulated RTLs need the trims of JSBSim.
         from flight.autopilots.px4.rtl_point_mass import fly_returns
 

@@ -51,7 +51,10 @@ def track_error_bound(ground_speed: float, time_constant: float) -> float:
 
 @inner
 def straight_track_period(parameters: Record) -> float:
-    """Return NPFG's period on a straight track, s: NPFG_PERIOD, or more if the roll lag requires it."""
+    """Return NPFG's period on a straight track, s: NPFG_PERIOD, or more if the roll lag requires it.
+
+    parameters: PX4's parameters, a `PX4_PARAMETERS` record.
+    """
     period: float = parameters.npfg_period
     if parameters.npfg_enables_period_lower_bound > 0.0:
         period_lower_bound = (
@@ -69,6 +72,8 @@ def switch_distance(ground_speed: float, parameters: Record) -> float:
     """Return the distance before a waypoint at which guidance would turn to the next leg, m.
 
     The distance is NPFG_SW_DST_MLT times `track_error_bound`.
+
+    parameters: PX4's parameters, a `PX4_PARAMETERS` record.
     """
     time_constant = straight_track_period(parameters) * parameters.npfg_damping
     return min(
@@ -94,6 +99,7 @@ def adapted_period(
     track_feasibility: feasibility of the track's course, 0..1; see `bearing_feasibility`.
     track_proximity: 0 far from the track, 1 on the track.
     airspeed, wind_speed: m/s.
+    parameters: PX4's parameters, a `PX4_PARAMETERS` record.
     """
     # Without wind or curvature the period is that of a straight track.
     wind_factor = 2.0 * (1.0 - math.sqrt(1.0 - min(1.0, wind_speed / max(0.1, airspeed))))
@@ -250,11 +256,11 @@ def follow_leg(
 ) -> None:
     """Guide the aircraft onto the line from the leg's start to its end (`navigateWaypoints`).
 
-    An aircraft that is before the start, and further from it than the switch distance, flies straight to the start. An
-    aircraft that is past the end flies straight back to the end.
-
-    end_east, end_north: end of the leg, m.
-    Other arguments as for `guide_to_path`.
+    Before the start, and further from it than the switch distance, it flies straight to the start; past the end, to it.
+    estimated: position and velocity over the ground, a `MOTION` record.
+    end_east, end_north: end of the leg, m. Its start is in the memory.
+    wind_east, wind_north, target_airspeed: velocity of the air and airspeed to fly at, m/s.
+    parameters, memory: PX4's parameters, and the control law's memory, whose lateral acceleration is set.
     """
     leg_east, leg_north = end_east - memory.from_east, end_north - memory.from_north
     length = math.hypot(leg_east, leg_north)
@@ -314,9 +320,15 @@ def follow_loiter(
 ) -> None:
     """Guide the aircraft onto a loiter circle (`navigateLoiter`).
 
+    At the centre of the circle, where no radius leads to the aircraft, the direction of its ground speed is used.
+
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
     center_east, center_north: center of the circle, m.
     radius: m, positive to the right.
-    Other arguments as for `guide_to_path`.
+    wind_east, wind_north: velocity of the air, m/s.
+    target_airspeed: m/s.
+    parameters: PX4's parameters, a `PX4_PARAMETERS` record.
+    memory: `PX4_MEMORY` record; its lateral acceleration is set.
     """
     radial_east, radial_north = estimated.east - center_east, estimated.north - center_north
     distance = math.hypot(radial_east, radial_north)
@@ -343,6 +355,9 @@ def follow_loiter(
 
 @inner
 def roll_setpoint(lateral_acceleration: float, parameters: Record) -> float:
-    """Return the roll setpoint (rad) that gives a lateral acceleration (m/s^2), limited to FW_R_LIM."""
+    """Return the roll setpoint (rad) that gives a lateral acceleration (m/s^2), limited to FW_R_LIM.
+
+    parameters: PX4's parameters, a `PX4_PARAMETERS` record.
+    """
     roll = math.atan(lateral_acceleration / GRAVITY)
     return min(parameters.roll_limit, max(-parameters.roll_limit, roll))

@@ -123,9 +123,14 @@ def px4_loop(
     frictions: Records,
     count: int,
 ) -> int:
-    """Fly up to ``count`` ticks with a `flight.dynamics.compiled_model.CompiledModel`, and return a status.
+    """Fly up to ``count`` ticks with a compiled model, and return a status.
 
     The status is 0 if the flight continues, otherwise a key of `flight.simulation.tick.ENDS`.
+
+    block: state, settings and path of the flight, the memory of a `flight.simulation.tick.Workspace`; updated.
+    heights: ground heights of the terrain by pixel, m.
+    frames, numbers, code, contacts, frictions: arrays of a `flight.dynamics.compiled_model.CompiledModel`: state of the
+        motion, registers, instructions, landing-gear contacts and scratch for their friction.
     """
     for _ in range(count):
         read_state(block, numbers, code)
@@ -155,10 +160,15 @@ def control_as_px4(
     """Compute the commands for one tick of ``dt`` seconds, and update ``guidance`` and ``memory``.
 
     wind_east, wind_north: velocity of the air, m/s.
-    guidance: a record of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.
-    parameters: a record of `flight.autopilots.px4.parameters.PX4_PARAMETERS`.
-    memory: a record of `flight.autopilots.px4.law.PX4_MEMORY`.
-    Other arguments as for `flight.autopilots.planfly.law.guide`.
+    guidance: memory of the inner loops and progress on the path, a `GUIDANCE_MEMORY` record.
+    parameters: PX4's parameters, a `PX4_PARAMETERS` record.
+    memory: memory of the control law between ticks, a `PX4_MEMORY` record.
+    state: attitude, airspeed and rates of the aircraft, a `STATE` record.
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    pieces, nodes: course and altitude profile of the reference path, arrays of a `FlyByPath`.
+    waypoints: `WAYPOINT` records of the route, (w,).
+    gains: gains of the inner loops, a `GAINS` record.
+    commands: `COMMANDS` record to fill.
 
     PX4 does not use the path; the track is only measured against it.
     """
@@ -192,6 +202,10 @@ def update_roll_setpoint(parameters: Record, memory: Record, dt: float) -> None:
     """Move the roll setpoint towards the bank for the lateral acceleration, at a limited rate.
 
     The limit is FW_PN_R_SLEW_MAX.
+
+    parameters: PX4's parameters, a `PX4_PARAMETERS` record.
+    memory: memory of the control law between ticks, a `PX4_MEMORY` record.
+    dt: duration of a tick, s.
     """
     max_roll_step = parameters.roll_slew_rate * dt
     limited_roll = roll_setpoint(memory.lateral_acceleration, parameters)
@@ -210,6 +224,13 @@ def _end_mission(
 
     If PX4 loiters without end at the mission's end (`MissionBase::setEndOfMissionItems`), the flight ends after one lap
     of that loiter. A loiter before the last waypoint, in which PX4 corrects the altitude, does not end the flight.
+
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    last_waypoint: `WAYPOINT` record; at a loiter the flight is not ended here.
+    guidance: `GUIDANCE_MEMORY` record, whose end of the flight is set.
+    parameters: PX4's parameters, a `PX4_PARAMETERS` record.
+    memory: memory of the control law between ticks, a `PX4_MEMORY` record; updated.
+    dt: duration of a tick, s.
     """
     has_arrived = (
         memory.time_at_mission_end > 0.0 or guidance.is_finished or memory.is_loitering or memory.mission_finished
@@ -241,7 +262,16 @@ def _initialise_memory(
     memory: Record,
     eas_to_tas: float,
 ) -> None:
-    """Initialise the control law's memory for steady flight at the first waypoint."""
+    """Initialise the control law's memory for steady flight at the first waypoint.
+
+    state: attitude, airspeed and rates of the aircraft, a `STATE` record.
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    waypoints: `WAYPOINT` records of the route, (w,).
+    guidance: `GUIDANCE_MEMORY` record, which states the throttle of level flight.
+    parameters: PX4's parameters, a `PX4_PARAMETERS` record.
+    memory: `PX4_MEMORY` record to initialise.
+    eas_to_tas: ratio of true to equivalent airspeed.
+    """
     memory.is_initialised = True
     memory.from_east, memory.from_north, memory.from_up = waypoints[0].east, waypoints[0].north, waypoints[0].up
     memory.min_distance_to_end = math.inf
@@ -269,7 +299,19 @@ def _control_attitude(
     commands: Record,
     dt: float,
 ) -> None:
-    """Drive roll and pitch to their setpoints with the lags of PX4's controllers; set the throttle."""
+    """Drive roll and pitch to their setpoints with the lags of PX4's controllers; set the throttle.
+
+    The roll rate is limited by PX4's parameter (0 for no limit) and by the aircraft's roll rate and acceleration.
+
+    state: attitude, airspeed and rates of the aircraft, a `STATE` record.
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    gains: gains of the inner loops, a `GAINS` record.
+    guidance: memory of the inner loops and progress on the path, a `GUIDANCE_MEMORY` record; updated.
+    parameters: PX4's parameters, a `PX4_PARAMETERS` record.
+    memory: `PX4_MEMORY` record with the setpoints.
+    commands: `COMMANDS` record to fill.
+    dt: duration of a tick, s.
+    """
     previous_roll_rate = guidance.bank_rate
     roll_rate = (memory.roll_setpoint - guidance.bank) / (ROLL_LAG_RATIO * parameters.roll_time_constant)
     if parameters.roll_rate_max > 0.0:

@@ -22,7 +22,7 @@ import math
 
 from flight.autopilots.px4.lateral import follow_leg, follow_loiter, switch_distance
 from world.geometry import wrap
-from world.kernels import Record, Records, inner
+from world.kernels import Record, Records, inlined, inner
 
 # Delay from reaching a waypoint to the turn, s: the navigator's loop, its message to the position controller and the
 # controller's turn.  At 33 waypoints of the stored flights it was 0.13 s on average, 0.02 to 0.26.  PX4 1.17 and 1.18,
@@ -38,7 +38,10 @@ _MIN_EXIT_DISTANCE_RATIO = 1.05
 
 @inner
 def acceptance_radius_at(ground_speed: float, parameters: Record) -> float:
-    """Return the acceptance radius of a waypoint at a ground speed (m/s), m (`get_acceptance_radius`)."""
+    """Return the acceptance radius of a waypoint at a ground speed (m/s), m (`get_acceptance_radius`).
+
+    parameters: PX4's parameters, a `PX4_PARAMETERS` record.
+    """
     radius: float = parameters.acceptance_radius
     if parameters.uses_switch_distance:
         radius = max(radius, switch_distance(ground_speed, parameters))
@@ -51,6 +54,8 @@ def _altitude_acceptance_radius(target: Record, parameters: Record) -> float:
 
     The tolerance is infinite in a landing sequence (`setActiveMissionItems`), NAV_FW_ALTL_RAD before a landing, and
     otherwise NAV_FW_ALT_RAD. Follows `Navigator::get_altitude_acceptance_radius`.
+
+    parameters: PX4's parameters, a `PX4_PARAMETERS` record.
     """
     if target.ignores_altitude:
         return math.inf
@@ -64,6 +69,9 @@ def is_past_waypoint(estimated: Record, target: Record, memory: Record) -> bool:
 
     It is past the end if it has crossed the vertical plane through the end that is perpendicular to the leg. The result
     is False for a leg without length.
+
+    estimated: estimated position and velocity over the ground, a `MOTION` record.
+    memory: memory of the control law between ticks, a `PX4_MEMORY` record.
     """
     leg_east, leg_north = target.east - memory.from_east, target.north - memory.from_north
     distance_past = (estimated.east - target.east) * leg_east + (estimated.north - target.north) * leg_north
@@ -109,7 +117,11 @@ def navigate(
 
 @inner
 def find_target(waypoints: Records, memory: Record) -> int:
-    """Return the index of the target: the next waypoint that is not a gate."""
+    """Return the index of the target: the next waypoint that is not a gate.
+
+    waypoints: `WAYPOINT` records of the route, (w,).
+    memory: memory of the control law between ticks, a `PX4_MEMORY` record.
+    """
     target_index: int = memory.leg + 1
     while waypoints[target_index].is_gate:
         target_index += 1
@@ -122,10 +134,24 @@ def _is_past_gate(estimated: Record, gate: Record, target: Record) -> bool:
 
     It is past the gate if it has crossed the vertical plane through the gate that is perpendicular to the course from
     the gate to the target.
+
+    estimated: estimated position and velocity over the ground, a `MOTION` record.
     """
     normal_east, normal_north = target.east - gate.east, target.north - gate.north
     distance_past = (estimated.east - gate.east) * normal_east + (estimated.north - gate.north) * normal_north
     return distance_past >= 0.0
+
+
+@inlined
+def _update_time_since_reached(memory: Record, is_reached: bool, dt: float) -> None:
+    """Add a tick to the time since a target was reached, s; the time is 0 until the target is reached.
+
+    memory: `PX4_MEMORY` record with the time.
+    is_reached: True if the aircraft is at the target in this tick.
+    dt: duration of a tick, s.
+    """
+    has_reached = memory.time_since_reached > 0.0 or is_reached
+    memory.time_since_reached = memory.time_since_reached + dt if has_reached else 0.0
 
 
 @inner
@@ -144,8 +170,12 @@ def _navigate_waypoint(
 
     If the aircraft is too high or too low at the waypoint, it loiters there first. At the last waypoint of a mission it
     loiters without end: about the waypoint, or up to 1.16 about the position at which it reached the waypoint.
-    target_index: index of the waypoint.
-    Other arguments as for `navigate`.
+
+    estimated: position and velocity over the ground, a `MOTION` record.
+    waypoints, target_index: `WAYPOINT` records of the route, (w,), and the index of the waypoint.
+    wind_east, wind_north, target_airspeed: velocity of the air and airspeed to fly at, m/s.
+    parameters, memory: PX4's parameters, and the control law's memory, which is updated.
+    dt: duration of a tick, s.
     """
     target = waypoints[target_index]
     ground_speed = math.hypot(estimated.velocity_east, estimated.velocity_north)
@@ -176,11 +206,7 @@ def _navigate_waypoint(
     is_reached = distance <= acceptance_radius_at(ground_speed, parameters) or is_past_waypoint(
         estimated, target, memory
     )
-    memory.time_since_reached = (
-        memory.time_since_reached + dt
-        if memory.time_since_reached > 0.0 or (is_reached and is_accepted_altitude)
-        else 0.0
-    )
+    _update_time_since_reached(memory, is_reached and is_accepted_altitude, dt)
     if memory.time_since_reached <= SWITCH_DELAY_S:
         return
     if is_end:
@@ -205,8 +231,13 @@ def _navigate_loiter(
 ) -> None:
     """Fly to a loiter and around it until the loiter's end condition is met, then begin the next leg.
 
-    loiter: waypoint on the loiter.
-    Other arguments as for `navigate`.
+    A loiter to an altitude first keeps the altitude at the start of the leg until the aircraft is on the circle.
+
+    estimated: position and velocity over the ground, a `MOTION` record.
+    waypoints, loiter: `WAYPOINT` records of the route, (w,), and the one on the loiter.
+    wind_east, wind_north, target_airspeed: velocity of the air and airspeed to fly at, m/s.
+    parameters, memory: PX4's parameters, and the control law's memory, which is updated.
+    dt: duration of a tick, s.
     """
     ground_speed = math.hypot(estimated.velocity_east, estimated.velocity_north)
     distance = math.hypot(loiter.centre_east - estimated.east, loiter.centre_north - estimated.north)
@@ -230,9 +261,7 @@ def _navigate_loiter(
         return
     memory.altitude_setpoint = loiter.up
     is_at_altitude = abs(estimated.up - loiter.up) <= altitude_radius
-    memory.time_since_reached = (
-        memory.time_since_reached + dt if memory.time_since_reached > 0.0 or (is_on_rim and is_at_altitude) else 0.0
-    )
+    _update_time_since_reached(memory, is_on_rim and is_at_altitude, dt)
     exit_index = memory.leg + 2
     if math.isnan(loiter.loiter_time):
         # PX4 refuses loiters by turns; leave it at the same point as the route.
@@ -249,7 +278,11 @@ def _navigate_loiter(
 
 @inner
 def is_last_target(waypoints: Records, memory: Record) -> bool:
-    """Return True if the target is the last target of the route; waypoints on one loiter are one target."""
+    """Return True if the target is the last target of the route; waypoints on one loiter are one target.
+
+    waypoints: `WAYPOINT` records of the route, (w,).
+    memory: memory of the control law between ticks, a `PX4_MEMORY` record.
+    """
     target_index = find_target(waypoints, memory)
     target = waypoints[target_index]
     return target_index + 1 >= waypoints.shape[0] or (target.loiter_radius != 0.0 and waypoints[-1].stop == target.stop)
@@ -271,6 +304,8 @@ def _is_on_exit_course(estimated: Record, next_waypoint: Record, loiter: Record)
 
     The tolerance is `EXIT_COURSE_TOLERANCE_RAD`. The result is also True if the waypoint is so close to the loiter's
     center that the course never points to it.
+
+    estimated: estimated position and velocity over the ground, a `MOTION` record.
     """
     next_east, next_north = _setpoint_position(next_waypoint)
     if math.hypot(next_east - loiter.centre_east, next_north - loiter.centre_north) <= _MIN_EXIT_DISTANCE_RATIO * abs(
@@ -297,8 +332,12 @@ def climb_before_return(
     During the climb ``memory.from_east`` and ``from_north`` are the position at which the RTL began; after it, the
     position at which the climb ended. ``memory.from_up`` always is the altitude at which the RTL began.
 
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
     lowest_return_altitude: return altitude of an RTL that begins lower, m AMSL.
-    Other arguments as for `navigate`.
+    wind_east, wind_north: velocity of the air, m/s.
+    target_airspeed: m/s.
+    parameters: PX4's parameters, a `PX4_PARAMETERS` record.
+    memory: memory of the control law between ticks, a `PX4_MEMORY` record; updated.
     """
     if not memory.is_in_rtl:
         memory.is_in_rtl, memory.is_loitering = True, False
@@ -341,8 +380,12 @@ def _navigate_rtl(
     destination, or the altitude at the start of the RTL if that is higher. The aircraft does not descend on the way.
     Over its target it descends to RTL_DESCEND_ALT.
 
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
     rtl: waypoint of the RTL's loiter.
-    Other arguments as for `navigate`.
+    wind_east, wind_north: velocity of the air, m/s.
+    target_airspeed: m/s.
+    parameters: PX4's parameters, a `PX4_PARAMETERS` record.
+    memory: memory of the control law between ticks, a `PX4_MEMORY` record; updated.
     """
     # The target is RTL_DESCEND_ALT above the destination, but no higher than the return altitude.
     lowest_return_altitude = rtl.up + max(0.0, parameters.rtl_altitude - parameters.rtl_descend_altitude)
@@ -375,6 +418,11 @@ def begin_leg(estimated: Record, waypoints: Records, leg: int, memory: Record) -
     The line starts at the leg's first waypoint. After a loiter it starts at the loiter's center, or at the tangent
     point on the circle if the item states an exit on the tangent. After a loiter by turns, which PX4 refuses, it starts
     at the aircraft's position.
+
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    waypoints: `WAYPOINT` records of the route, (w,).
+    leg: index of the leg's first waypoint.
+    memory: memory of the control law between ticks, a `PX4_MEMORY` record; updated.
     """
     start, end = waypoints[leg], waypoints[leg + 1]
     memory.leg = leg
@@ -399,7 +447,10 @@ def begin_leg(estimated: Record, waypoints: Records, leg: int, memory: Record) -
 
 @inner
 def is_past_corner(estimated: Record, corner: Record) -> bool:
-    """Return True if an aircraft on a loiter has passed a corner of the loiter by less than 90 degrees."""
+    """Return True if an aircraft on a loiter has passed a corner of the loiter by less than 90 degrees.
+
+    estimated: estimated position and velocity over the ground, a `MOTION` record.
+    """
     corner_bearing = math.atan2(corner.east - corner.centre_east, corner.north - corner.centre_north)
     bearing = math.atan2(estimated.east - corner.centre_east, estimated.north - corner.centre_north)
     angle_past = wrap(bearing - corner_bearing) * math.copysign(1.0, corner.loiter_radius)
@@ -415,6 +466,7 @@ def foh_altitude(end_east: float, end_north: float, end_up: float, lead_distance
     end.
 
     end_east, end_north, end_up: end of the leg, m.
+    memory: memory of the control law between ticks, a `PX4_MEMORY` record.
     """
     leg_length = math.hypot(end_east - memory.from_east, end_north - memory.from_north)
     min_distance = min(memory.min_distance_to_end, leg_length)

@@ -283,8 +283,8 @@ class Px4Parameters(ParameterSet):
         return values
 
     @classmethod
-    def _is_set_on_purpose(cls, definition: Definition, value: float) -> bool:
-        """Return False for the default value of a parameter that is not simulated.
+    def _is_relevant(cls, definition: Definition, value: float) -> bool:
+        """Return True for a parameter that is simulated, or whose value differs from its default.
 
         A ground station saves every parameter, so a default value in a file does not mean that the user has set it.
         """

@@ -72,7 +72,8 @@ def fly_returns(
     """Simulate the RTL from each of n starts to its target, at FW_AIRSPD_TRIM.
 
     starts: (n,) of `flight.autopilots.simulated_returns.RETURN_START`.
-    store_positions, abort_limits: as in `flight.autopilots.parts.FlyReturns`.
+    store_positions: True to store the flown positions.
+    abort_limits: heights above ground, (n,), and distances outside spheres, (n,), m, below which an RTL is aborted.
 
     >>> from aircraft.catalog import load_aircraft
     >>> from flight.autopilots.point_mass import make_point_mass
@@ -122,7 +123,15 @@ def _fly_one(
 ) -> None:
     """Simulate one RTL with `fly_rtl`.
 
+    start: position, velocity, bank and time of the start, a `RETURN_START` record.
+    route: the start, then the loiter at the RTL's end, or the stops of a landing sequence and the landing.
+    transit_altitude: altitude to which an RTL to a landing sequence climbs first, m AMSL.
+    parameters: PX4's parameters, a `PX4_PARAMETERS` record.
+    aircraft: point mass of the aircraft in the wind.
+    environment: terrain and kill spheres from which the clearances are measured.
     limits: timeout, s, and height above ground and distance outside spheres, m, below which the RTL is aborted.
+    positions: array (t, 3), m, to fill with one position per second until it is full.
+    result: `RETURN_RESULT` record to fill.
     """
     timeout, min_clearance, min_distance = limits
     fly_rtl(
@@ -182,7 +191,15 @@ def _fill_stop(waypoint: Record, stop: LandingStart, parameters: Px4Parameters) 
 
 
 def _rtl_timeout(start: Record, target: ReturnTarget, parameters: Px4Parameters, aircraft: PointMass) -> float:
-    """Return the timeout of an RTL, s, from the distances and altitude changes between its waypoints."""
+    """Return the timeout of an RTL, s, from the distances and altitude changes between its waypoints.
+
+    Each leg is flown against the strongest wind, with one lap of the loiter at its end. Its climb or descent follows at
+    the setpoint of the climb or sink rate. The sum is multiplied by `TIMEOUT_RATIO`, and `TIMEOUT_BASE_S` is added.
+
+    start: position of the start, a `RETURN_START` record.
+    target: target of the RTL, with its landing sequence if it has one.
+    aircraft: point mass of the aircraft in the wind.
+    """
     min_ground_speed = max(5.0, aircraft.record.airspeed - aircraft.record.max_wind)
     climb_rate = min(parameters["FW_T_CLMB_R_SP"], parameters["FW_T_CLMB_MAX"])
     sink_rate = min(parameters["FW_T_SINK_R_SP"], parameters["FW_T_SINK_MAX"])
@@ -220,11 +237,11 @@ def fly_rtl(
 ) -> None:
     """Simulate an RTL for up to ``timeout`` s, and fill the `RETURN_RESULT` ``result``.
 
-    waypoints: the start, then the loiter at the RTL's end, or the stops of a landing sequence and the landing.
+    start, waypoints: `RETURN_START` record; `WAYPOINT` records of the start, then the loiter or the landing sequence.
     transit_altitude: altitude to which an RTL to a landing sequence climbs first, m AMSL.
     min_clearance, min_distance: height above ground and distance outside spheres, m, below which the RTL is aborted.
     positions: array (t, 3), m, to fill with one position per second until it is full.
-    excesses, power, field: tables of a `flight.autopilots.point_mass.PointMass`.
+    aircraft, excesses, power, field: record and tables of a `flight.autopilots.point_mass.PointMass`.
     """
     motions, states, memories = np.zeros(1, MOTION), np.zeros(1, STATE), np.zeros(1, PX4_MEMORY)
     progress_records = np.zeros(1, LOITER_PROGRESS)
@@ -279,6 +296,10 @@ def _update_arrival(
     lands: True for an RTL to a landing sequence.
     has_begun_sequence: True once the aircraft flies this sequence.
     time: time since the start, s.
+    estimated: position and velocity over the ground, a `MOTION` record.
+    waypoints: `WAYPOINT` records, (w,).
+    memory: memory of the control law between ticks, a `PX4_MEMORY` record.
+    result: `RETURN_RESULT` record, which is updated.
     """
     if lands:
         has_arrived = has_begun_sequence and memory.leg + 2 >= waypoints.shape[0]
@@ -307,9 +328,15 @@ def _steer(
 
     Return True once an RTL to a landing flies the landing sequence instead of the climb before it.
 
+    state: attitude, airspeed and rates of the aircraft, a `STATE` record.
+    estimated: position and velocity over the ground, a `MOTION` record.
+    waypoints: `WAYPOINT` records (w,): the start, then the loiter or the landing sequence.
     transit_altitude: altitude to which an RTL to a landing sequence climbs first, m AMSL.
+    parameters: PX4's parameters, a `PX4_PARAMETERS` record.
+    memory: `PX4_MEMORY` record, which receives the setpoints.
     lands: True for an RTL to a landing sequence.
     has_begun_sequence: True once the aircraft flies this sequence.
+    dt: duration of a tick, s.
     """
     wind_east, wind_north = state.wind_east, state.wind_north
     eas_to_tas = eas_to_tas_ratio(estimated.up)
@@ -342,7 +369,11 @@ def _begin_sequence(
     After a climb the leg begins at the center of the loiter in which the aircraft climbed. Without a climb PX4 has no
     previous setpoint. The leg then begins at the aircraft's position, and at the altitude of the leg's end.
 
+    estimated: position and velocity over the ground, a `MOTION` record.
+    waypoints: `WAYPOINT` records (w,): the start of the RTL, then the stops of the sequence.
     transit_altitude: altitude to which the RTL climbs first, m AMSL.
+    parameters: PX4's parameters, a `PX4_PARAMETERS` record.
+    memory: memory of the control law between ticks, a `PX4_MEMORY` record; updated.
     """
     begin, first_stop = waypoints[0], waypoints[1]
     has_climbed = begin.up < transit_altitude - parameters.altitude_acceptance_radius
@@ -356,7 +387,18 @@ def _begin_sequence(
 def _follow_setpoints(
     state: Record, parameters: Record, memory: Record, aircraft: Record, pitch: float, path_angle: float, dt: float
 ) -> tuple[float, float]:
-    """Let the bank follow its setpoint; return the pitch and path angle after a tick, rad."""
+    """Let the bank follow its setpoint; return the pitch and path angle after a tick, rad.
+
+    Bank, pitch and path angle follow as first-order lags: the bank its setpoint, within PX4's roll rate; the pitch its
+    setpoint; and the path angle the pitch minus the angle of attack.
+
+    state: `STATE` record; its roll is updated.
+    parameters: PX4's parameters, a `PX4_PARAMETERS` record.
+    memory: `PX4_MEMORY` record with the setpoints.
+    aircraft: a `POINT_MASS` record.
+    pitch, path_angle: values before the tick, rad.
+    dt: duration of a tick, s.
+    """
     roll_change = (1.0 - math.exp(-dt / (ROLL_LAG_RATIO * parameters.roll_time_constant))) * (
         memory.roll_setpoint - state.roll
     )
@@ -384,6 +426,13 @@ def _initialise_memory(
     """Set the state of the point mass, and the control law's memory as after a long steady flight.
 
     The steady flight may be a climb, in which the altitude reference is ahead of the aircraft by the lag of TECS.
+
+    start: position, velocity, bank and time of the start, a `RETURN_START` record.
+    waypoints: `WAYPOINT` records (w,) of the RTL, of which the first is the start.
+    parameters: PX4's parameters, a `PX4_PARAMETERS` record.
+    aircraft, excesses, field: record, excess power and wind field of a `PointMass`.
+    state: `STATE` record to fill.
+    memory: `PX4_MEMORY` record to fill.
     """
     initialise_state(start, aircraft, field, state)
     climb_rate, eas_to_tas = start.velocity_up, eas_to_tas_ratio(start.up)

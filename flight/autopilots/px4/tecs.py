@@ -24,6 +24,10 @@ def update_altitude_reference(parameters: Record, memory: Record, dt: float) -> 
 
     The reference climbs at most at FW_T_CLMB_R_SP and sinks at most at FW_T_SINK_R_SP.  It decelerates at
     FW_T_VERT_ACC, early enough not to overshoot the setpoint.
+
+    parameters: PX4's parameters, a `PX4_PARAMETERS` record.
+    memory: memory of the control law between ticks, a `PX4_MEMORY` record.
+    dt: duration of a tick, s.
     """
     altitude_error = memory.altitude_setpoint - memory.altitude_reference
     rate_towards_setpoint = min(
@@ -43,7 +47,13 @@ def update_altitude_reference(parameters: Record, memory: Record, dt: float) -> 
 def update_airspeed_filter(measured_tas: float, parameters: Record, memory: Record, dt: float) -> None:
     """Update the airspeed filter with a measured true airspeed, m/s (`TECSAirspeedFilter`).
 
-    The measured rate of change of the airspeed is 0, as in PX4.
+    The filter is a Kalman filter of airspeed and airspeed rate with constant gains. The measured rate of change of the
+    airspeed is 0, as in PX4.
+
+    measured_tas: m/s.
+    parameters: PX4's parameters, a `PX4_PARAMETERS` record.
+    memory: `PX4_MEMORY` record; its true airspeed (m/s) and airspeed rate (m/s^2) are updated.
+    dt: duration of a tick, s.
     """
     tas_error, tas_rate_error = measured_tas - memory.tas, -memory.tas_rate
     memory.tas += (
@@ -73,6 +83,9 @@ def update_tecs(
     estimated: a record of `flight.guidance.navigation_error.MOTION`.
     airspeed_setpoint: equivalent airspeed, m/s.
     eas_to_tas: ratio of true to equivalent airspeed.
+    parameters: PX4's parameters, a `PX4_PARAMETERS` record.
+    memory: memory of the control law between ticks, a `PX4_MEMORY` record.
+    dt: duration of a tick, s.
     """
     update_altitude_reference(parameters, memory, dt)
     update_airspeed_filter(state.airspeed, parameters, memory, dt)
@@ -114,6 +127,12 @@ def _adapt_airspeed_setpoint(
 
     Follows `adapt_airspeed_setpoint`. The airspeed limits are not rate-limited. In a bank the minimum airspeed grows as
     the square root of the load factor.
+
+    airspeed_setpoint: equivalent airspeed, m/s.
+    parameters: PX4's parameters, a `PX4_PARAMETERS` record.
+    memory: `PX4_MEMORY` record; its true airspeed setpoint (m/s) is updated.
+    eas_to_tas: ratio of true to equivalent airspeed.
+    dt: duration of a tick, s.
     """
     min_airspeed = parameters.airspeed_min / math.sqrt(max(0.1, math.cos(memory.roll_setpoint)))
     tas_min, tas_max = min_airspeed * eas_to_tas, parameters.airspeed_max * eas_to_tas
@@ -129,6 +148,7 @@ def detect_underspeed(equivalent_airspeed: float, parameters: Record) -> float:
     The ratio is 0 above the underspeed threshold and rises to 1 below it.
 
     equivalent_airspeed: m/s.
+    parameters: PX4's parameters, a `PX4_PARAMETERS` record.
     """
     ramp_width = _UNDERSPEED_FRACTION * parameters.airspeed_trim
     start_airspeed = max(0.0, parameters.airspeed_min - ramp_width)
@@ -152,9 +172,13 @@ def _calc_pitch_control(
     `TECSControl::_updateSpeedAltitudeWeights`, `_calcPitchControlSebRate`, `_calcPitchControlUpdate` and
     `_calcPitchControlOutput`.
 
+    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
+    parameters: PX4's parameters, a `PX4_PARAMETERS` record.
+    memory: memory of the control law between ticks, a `PX4_MEMORY` record; updated.
     altitude_rate_setpoint: m/s.
-    ske_rate_setpoint: rate of the kinetic energy, m^2/s^3.
-    underspeed_ratio: see `detect_underspeed`.
+    ske_rate_setpoint: rate of the specific kinetic energy, m^2/s^3.
+    underspeed_ratio: 0 in normal flight to 1 in full underspeed, in which the pitch controls only the airspeed.
+    dt: duration of a tick, s.
     """
     tas = memory.tas
     speed_weight = parameters.pitch_speed_weight * (1.0 - underspeed_ratio) + 2.0 * underspeed_ratio
@@ -201,8 +225,13 @@ def _calc_throttle_control(
     altitude_rate_setpoint: m/s.
     ske_rate_setpoint: rate of the kinetic energy, m^2/s^3.
     min_sink_rate: sink rate at idle throttle, m/s.
-    underspeed_ratio: see `detect_underspeed`.
+    underspeed_ratio: 0 in normal flight to 1 in full underspeed.
     eas_to_tas: ratio of true to equivalent airspeed.
+    state: attitude, airspeed and rates of the aircraft, a `STATE` record.
+    estimated: estimated position and velocity over the ground, a `MOTION` record.
+    parameters: PX4's parameters, a `PX4_PARAMETERS` record.
+    memory: memory of the control law between ticks, a `PX4_MEMORY` record.
+    dt: duration of a tick, s.
     """
     ste_rate_max, ste_rate_min = GRAVITY * parameters.max_climb_rate, -GRAVITY * min_sink_rate
     load_factor_correction = parameters.load_factor_correction * (1.0 / max(0.1, math.cos(state.roll)) - 1.0)

@@ -26,8 +26,12 @@ from world.wind import W20, Turbulence
 _SETTLED_CROSS_TRACK_M = 2.0
 # ... for this time, s.
 _SETTLED_TIME_S = 8.0
-# Length of the legs before and after a turn, m; the simulations end there at the latest.
+# Length of the legs before and after a turn, m.
 _LEG_LENGTH_M = 4000.0
+# Fraction of the second leg after which a simulation ends at the latest.
+_MAX_DISTANCE_FRACTION = 0.75
+# Time after which a simulation ends at the latest, s.
+_TIMEOUT_S = 120.0
 # Distance before the earliest turn at which the simulations begin, m.
 _RUN_IN_M = 200.0
 # Time step of the simulations, s.
@@ -114,6 +118,7 @@ def altitude_miss_probability(
     """
     if turbulence != "moderate":
         return 0.0
+    # Near the ground the deviation of vertical gusts is a tenth of the wind at 20 ft (MIL-F-8785C).
     gust_sigma, drift_rate = 0.1 * W20[turbulence], acceptance / _GUST_DURATION_S
     return (
         2.0 * _exceedance_probability(acceptance / _ALTITUDE_SIGMA_MODERATE_M)
@@ -162,6 +167,9 @@ def _measure_corners(
     airspeed: equivalent airspeed, m/s.
     turn_angles: rad.
     ground_speeds: m/s.
+    parameters: PX4's parameters, a `PX4_PARAMETERS` record.
+    corners: `CORNER_TRACKING` records (turns, speeds) to fill.
+    waypoints: scratch, three `WAYPOINT` records.
     """
     for i in range(turn_angles.size):
         for j in range(ground_speeds.size):
@@ -176,25 +184,26 @@ def _measure_corners(
 
 @inner
 def _fly_corner(
-    parameters: Record, airspeed: float, turn: float, speed: float, waypoints: Records
+    parameters: Record, airspeed: float, turn: float, ground_speed: float, waypoints: Records
 ) -> tuple[float, float]:
     """Simulate one corner; return the excursion and the settling distance, m.
 
     The excursion is the maximum distance from the nearer leg. The settling distance is measured along the second leg;
-    beyond it the aircraft stays close to the leg. The first leg leads north to the origin.
+    beyond it the aircraft stays within `_SETTLED_CROSS_TRACK_M` of the leg. The first leg leads north to the origin.
 
-    turn: rad, to the right.
-    speed: ground speed, m/s.
     airspeed: equivalent airspeed, m/s.
+    turn: rad, to the right.
+    ground_speed: m/s.
+    waypoints: scratch, three `WAYPOINT` records of fly-by waypoints; their positions are overwritten.
     """
-    motions, memories = np.zeros(1, MOTION), np.zeros(1, PX4_MEMORY)
-    estimated, memory = motions[0], memories[0]
+    motions, controller_states = np.zeros(1, MOTION), np.zeros(1, PX4_MEMORY)
+    estimated, controller_state = motions[0], controller_states[0]
     east, north = math.sin(turn), math.cos(turn)
     waypoints[0].north = -_LEG_LENGTH_M
     waypoints[2].east, waypoints[2].north = _LEG_LENGTH_M * east, _LEG_LENGTH_M * north
-    memory.from_north, memory.min_distance_to_end = -_LEG_LENGTH_M, math.inf
-    step_length = speed * _TIME_STEP_S
-    estimated.north = -acceptance_radius_at(speed, parameters) - _RUN_IN_M
+    controller_state.from_north, controller_state.min_distance_to_end = -_LEG_LENGTH_M, math.inf
+    step_length = ground_speed * _TIME_STEP_S
+    estimated.north = -acceptance_radius_at(ground_speed, parameters) - _RUN_IN_M
     lag = ROLL_LAG_RATIO * parameters.roll_time_constant
     decay = math.exp(-_TIME_STEP_S / lag)
     course = 0.0
@@ -203,14 +212,17 @@ def _fly_corner(
     excursion = 0.0
     settled_distance = 0.0
     distance_along = -1.0
-    while distance_along < 0.75 * _LEG_LENGTH_M and time < 120.0:
-        estimated.velocity_east, estimated.velocity_north = speed * math.sin(course), speed * math.cos(course)
-        navigate(estimated, waypoints, 0.0, 0.0, airspeed, parameters, memory, _TIME_STEP_S)
-        acceleration_demand = GRAVITY * math.tan(roll_setpoint(memory.lateral_acceleration, parameters))
+    while distance_along < _MAX_DISTANCE_FRACTION * _LEG_LENGTH_M and time < _TIMEOUT_S:
+        estimated.velocity_east, estimated.velocity_north = (
+            ground_speed * math.sin(course),
+            ground_speed * math.cos(course),
+        )
+        navigate(estimated, waypoints, 0.0, 0.0, airspeed, parameters, controller_state, _TIME_STEP_S)
+        acceleration_demand = GRAVITY * math.tan(roll_setpoint(controller_state.lateral_acceleration, parameters))
         # The exact solution of the lag, and the displacement on the mean course.
         course_change = (
             acceleration_demand * _TIME_STEP_S + (lateral_acceleration - acceleration_demand) * lag * (1.0 - decay)
-        ) / speed
+        ) / ground_speed
         lateral_acceleration = acceleration_demand + (lateral_acceleration - acceleration_demand) * decay
         estimated.east += step_length * math.sin(course + 0.5 * course_change)
         estimated.north += step_length * math.cos(course + 0.5 * course_change)
@@ -223,11 +235,11 @@ def _fly_corner(
             abs(estimated.east * north - estimated.north * east) if distance_along > 0.0 else corner_distance
         )
         excursion = max(excursion, min(first_leg_distance, second_leg_distance))
-        if memory.leg == 1 and second_leg_distance > _SETTLED_CROSS_TRACK_M:
+        if controller_state.leg == 1 and second_leg_distance > _SETTLED_CROSS_TRACK_M:
             settled_distance = max(0.0, distance_along)
-        if memory.leg == 1 and distance_along > settled_distance + _SETTLED_TIME_S * speed:
+        if controller_state.leg == 1 and distance_along > settled_distance + _SETTLED_TIME_S * ground_speed:
             break
     # Compiled code frees an array after its last use, and a record that views it does not keep it alive.
-    if motions.size + memories.size != 2:
+    if motions.size + controller_states.size != 2:
         return math.nan, math.nan
     return excursion, settled_distance

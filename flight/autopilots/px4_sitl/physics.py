@@ -71,6 +71,9 @@ def earth_field(lat_deg: float, lon_deg: float) -> tuple[float, float, float]:
 def atmosphere(amsl: float) -> tuple[float, float, float]:
     """Return pressure (Pa), temperature (K) and density (kg/m^3) of the standard atmosphere (ISO 2533).
 
+    At sea level it has 288.15 K and 101325 Pa. The temperature falls by 6.5 K per km, and 287.05287 J/(kg K) is the gas
+    constant of air; the formula is valid up to 11 km.
+
     amsl: m.
 
     >>> [round(value, 3) for value in atmosphere(1000.0)]

@@ -152,21 +152,22 @@ def rail_end(state: Record, wind: tuple[float, float, float]) -> RailEnd:
     )
 
 
-def motion_on_rail(end: RailEnd, time: float, push_duration: float, origin: tuple[float, float, float]) -> BodyMotion:
-    """Return the aircraft's motion on the rail ``push_duration`` s after the push along the rail began.
-
-    With ``push_duration`` 0 or less the aircraft is at rest at the start of the rail. After the push it stays at the
-    end of the rail.
+def motion_on_rail(
+    end: RailEnd, time: float, time_since_launch: float, origin: tuple[float, float, float]
+) -> BodyMotion:
+    """Return the aircraft's motion on the launch rail, along which it accelerates uniformly.
 
     time: time since the start of the exchange, s.
+    time_since_launch: time since the acceleration began, s; at 0 or less the aircraft rests at the start of the rail,
+        and after `end.push_time` it stays at the end of the rail.
     origin: latitude and longitude (rad) and altitude (m) from which positions are measured.
     """
-    push_duration = min(max(0.0, push_duration), end.push_time)
+    time_on_rail = min(max(0.0, time_since_launch), end.push_time)
     cos_incline, sin_incline = math.cos(end.incline), math.sin(end.incline)
     direction_north, direction_east = cos_incline * math.cos(end.course), cos_incline * math.sin(end.course)
-    acceleration = end.push_acceleration if 0.0 < push_duration < end.push_time else 0.0
-    speed = end.push_acceleration * push_duration
-    remaining_distance = 0.5 * end.push_acceleration * (end.push_time**2 - push_duration**2)
+    acceleration = end.push_acceleration if 0.0 < time_on_rail < end.push_time else 0.0
+    speed = end.push_acceleration * time_on_rail
+    remaining_distance = 0.5 * end.push_acceleration * (end.push_time**2 - time_on_rail**2)
     lat = end.lat - remaining_distance * direction_north / _EARTH_RADIUS_M
     lon = end.lon - remaining_distance * direction_east / (_EARTH_RADIUS_M * math.cos(end.lat))
     north, east = offset_on_sphere(lat, lon, origin[0], origin[1])
@@ -281,10 +282,10 @@ class Lockstep(ABC):
         current, factor = self._current
         return self._volts, current() * factor
 
-    def hold(self, rail: RailEnd, push_duration: float = 0.0) -> None:
-        """Run one frame with the aircraft on the rail, ``push_duration`` s after the push began."""
+    def hold(self, rail: RailEnd, time_since_launch: float = 0.0) -> None:
+        """Run one frame with the aircraft on the rail, ``time_since_launch`` s after the acceleration began."""
         self._workspace.commands[:] = self._receive_commands()
-        motion = motion_on_rail(rail, self._next_time(), push_duration, self._home)
+        motion = motion_on_rail(rail, self._next_time(), time_since_launch, self._home)
         north, east, up, velocity_north, velocity_east, velocity_up = self.error
         self._send_motion(
             motion._replace(

@@ -140,6 +140,7 @@ def update_endless_loiter(true: Record, corner: Record, memory: Record, dt: floa
     corner: a corner of the circle, of `flight.guidance.lateral_reference_laws.WAYPOINT`.
     memory: a record of `flight.guidance.inner_loops.GUIDANCE_MEMORY`; `loiter_time` is the time on the loiter, s, and
         `loiter_angle` the angle flown around its center, rad.
+    dt: duration of a tick, s.
     """
     offset_east, offset_north = true.east - corner.centre_east, true.north - corner.centre_north
     distance = max(0.1, math.hypot(offset_east, offset_north))
@@ -162,6 +163,8 @@ def distances_from_route_end(true: Record, waypoints: Records) -> tuple[float, f
     """Return the distance to the right of the last leg, and the distance past its end, m.
 
     Both are negative on the other side.
+
+    waypoints: `WAYPOINT` records of the route, (w,).
     """
     start, end = waypoints[waypoints.shape[0] - 2], waypoints[waypoints.shape[0] - 1]
     length = math.hypot(end.east - start.east, end.north - start.north)

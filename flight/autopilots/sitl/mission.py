@@ -147,7 +147,13 @@ def _route_items(route: Route, origin: GeoOrigin) -> list[MissionItem]:
 
 
 def _make_waypoint(seq: int, point: Floats, acceptance: float, origin: GeoOrigin) -> MissionItem:
-    """Return a plain waypoint with a number at a point of the route."""
+    """Return a plain waypoint with a number at a point of the route.
+
+    seq: number of the item.
+    point: east, north and altitude, (3,) m.
+    acceptance: acceptance radius, m.
+    origin: geographic position of east 0 and north 0.
+    """
     lat, lon = to_geo(origin, point[0], point[1])
     position = (round_to_grid(float(lat)), round_to_grid(float(lon)), float(point[2]))
     return MissionItem(seq, int(Command.NAV_WAYPOINT), int(Frame.GLOBAL), (0.0, acceptance, 0.0, 0.0), *position)

@@ -121,7 +121,7 @@ class ColumnLog:
         return self.table.columns[source][0].column or quantity
 
     def unit(self, quantity: str) -> str:
-        """Return the unit of the first entry of a quantity."""
+        """Return the unit of the first column that is mapped to a quantity."""
         return self.table.columns[quantity][0].unit
 
     def frame(self, quantity: str) -> str:

@@ -95,7 +95,7 @@ def judged_airspace(setup: FlightSetup) -> Airspace:
     fence_fault, mission_zones = "", tuple[Zone, ...]()
     try:
         stated_zones = fence_zones(setup.mission.fences, setup.scenario.origin, "the mission")
-        unites = setup.autopilot.checks.unites_inclusions
+        unites = setup.autopilot.checks.any_inclusion_suffices
         mission_zones = unite_inclusions(stated_zones) if unites else stated_zones
     # ValueError: a union of zones may have more corners than a zone may have.
     except (MissionError, ValueError) as error:
@@ -171,8 +171,9 @@ def leg_performance(limits: Limits, winds: Sequence[Wind] = ()) -> LegPerformanc
 def find_leg_winds(setup: FlightSetup, route: Route) -> tuple[Wind, ...]:
     """Return each leg's wind from a forecast, at the middle of the leg; () without a forecast.
 
-    The wind is taken at the time when the aircraft reaches the middle of the leg, at the route's airspeeds and without
-    loiters.
+    The wind is taken at the time when the aircraft reaches the middle of the leg, without loiters. For this time the
+    legs before are flown at the ground speed in their wind, and the first half of the leg at its airspeed. In a head
+    wind that leaves less than 1 m/s of ground speed, the airspeed replaces the ground speed.
     """
     if setup.scenario.wind.field is None:
         return ()

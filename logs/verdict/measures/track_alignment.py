@@ -495,11 +495,13 @@ def _takeoff_end_row(track: Track, procedures: GroundPhases) -> int:
     return int(np.argmax(is_above)) if is_above.any() else len(track) - 1
 
 
-def ground_phase_rows(track: Track, procedures: GroundPhases) -> Flags:
-    """Return a mask (t,): True for each row in a flown take-off or on the landing leg.
+def takeoff_and_approach_rows(track: Track, procedures: GroundPhases) -> Flags:
+    """Return a mask (t,): True for the rows of the take-off, and for all rows from the start of the approach leg.
+
+    A take-off or an approach that the flight does not simulate has no rows. The example's flight has neither:
 
     >>> from logs.recording.example_log import example_log
-    >>> bool(ground_phase_rows(example_log().track, GroundPhases()).any())
+    >>> bool(takeoff_and_approach_rows(example_log().track, GroundPhases()).any())
     False
     """
     is_ground_phase = np.arange(len(track)) < _takeoff_end_row(track, procedures)

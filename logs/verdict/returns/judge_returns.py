@@ -807,21 +807,27 @@ def _recheck_in_jsbsim(
 ) -> tuple[list[SimulatedReturn], list[float]]:
     """Fly doubtful returns in JSBSim, the most doubtful first, and correct the point-mass results.
 
-    A return is doubtful if the error of the point mass may change its outcome.  Doubtful returns that begin in a turn,
-    or that exceed `max_flights`, are not flown in JSBSim.  They get the correction of the nearest flown return in the
-    same series of doubtful returns, if JSBSim made that return worse.
+    A return is doubtful if the error of the point mass may change its outcome.  Doubtful returns that begin in a turn
+    or too slowly, that end with a landing, or that exceed `max_flights`, are not flown in JSBSim.  They get the
+    correction of the nearest flown return in the same run of consecutive doubtful returns, if JSBSim made that return
+    worse.
+
+    starts: starts of the returns, in the order of `returns`.
+    results: point-mass results of the returns, records of the autopilot's simulation.
+    fly_again: function that flies a return in JSBSim, see `FlyAgain`.
+    max_flights: maximum number of JSBSim flights.
 
     Returns the corrected returns, and for each flown return the difference in clearance (JSBSim minus point mass, m).
     """
     limit_ratios = [limit_ratio(ret) for ret in returns]
-    reachable = [
+    candidates = [
         k
         for k, row in enumerate(starts.rows)
         if limit_ratios[k] < 1.0 and returns[k].target.landing is None and can_start_in_jsbsim(world, row)
     ]
     offsets: dict[int, tuple[float, float]] = {}
     differences = []
-    for k in sorted(reachable, key=lambda k: limit_ratios[k])[:max_flights]:
+    for k in sorted(candidates, key=lambda k: limit_ratios[k])[:max_flights]:
         jsbsim_minima = fly_again(world, starts.rows[k])
         if jsbsim_minima is None:
             continue

@@ -15,7 +15,7 @@ from logs.verdict.measures.energy import leg_energies, predicted_energy
 from logs.verdict.measures.ground_paths import first_landing_leg, landing_item, takeoff_item
 from logs.verdict.measures.path_moves import path_moves
 from logs.verdict.measures.route_requirements import RouteRequirements, find_leg_winds, route_requirements
-from logs.verdict.measures.track_alignment import ground_phase_rows
+from logs.verdict.measures.track_alignment import takeoff_and_approach_rows
 from logs.verdict.tolerances import GROUND_LEG_CLEARANCE_M
 from world.arrays import Flags, Floats
 from world.geometry import leg_courses
@@ -163,7 +163,7 @@ def _low_and_slow_rows(setup: FlightSetup, track: Track, rows: NDArray[np.intp])
     rows: rows of the track, (n,).
     """
     procedures, terrain = setup.ground_phases, setup.scenario.terrain
-    is_ground_phase = ground_phase_rows(track, procedures)[rows]
+    is_ground_phase = takeoff_and_approach_rows(track, procedures)[rows]
     position = np.asarray(track.position[rows], dtype=np.float64)
     if terrain is None or not procedures:
         return is_ground_phase, is_ground_phase.copy()

@@ -208,7 +208,11 @@ def _zone_source(requirements: RouteRequirements, zone_number: int) -> str:
 
 
 def _event_text(requirements: RouteRequirements, visit: Record, event: str) -> str:
-    """Describe the time, position and leg of an event ("entry", "exit" or "at") of a visit to a zone."""
+    """Describe the time, position and leg of an event of a visit to a zone.
+
+    event: "entry" or "exit" of the violation, or "at" for its deepest point or, without a violation, for the point
+        that is closest to one.
+    """
     leg = place_text(requirements.leg(int(visit[f"{event}_leg"])))
     time, east, north, up = (visit[f"{event}_{name}"] for name in ("time", "east", "north", "up"))
     return f"{time:.1f} s, east {east:.0f} m, north {north:.0f} m, {up:.0f} m AMSL ({leg})"

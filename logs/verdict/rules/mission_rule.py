@@ -359,7 +359,7 @@ def _home_fence_violation(setup: FlightSetup) -> str:
     if mission.home is None or not mission.fences:
         return ""
     origin = GeoOrigin(mission.home.lat_deg, mission.home.lon_deg)
-    problem = fence_problem(mission.fences, origin, 0.0, 0.0, unites_inclusions=checks.unites_inclusions)
+    problem = fence_problem(mission.fences, origin, 0.0, 0.0, any_inclusion_suffices=checks.any_inclusion_suffices)
     return "" if problem is None else problem[0]
 
 
@@ -577,7 +577,7 @@ def _check_fence(setup: FlightSetup) -> Iterator[_Remark]:
     if not setup.mission.fences:
         yield True, None, "the mission has no geofence"
         return
-    if setup.autopilot.checks.unites_inclusions:
+    if setup.autopilot.checks.any_inclusion_suffices:
         # The fence rule judges the flight against the union of the inclusion zones.
         return
     origin, route = setup.scenario.origin, setup.route

@@ -427,7 +427,7 @@ def _flown_facts(requirements: RouteRequirements, leg: int, measure: SlopeMeasur
     if measure.slope is not None:
         facts.append(("slope", f"flown {math.degrees(measure.slope.value):+.2f}°"))
     if measure.height_error is not None:
-        line = "the leg's height over the ground" if follows_ground(requirements, leg) else "the leg"
+        line = "the leg's height above ground" if follows_ground(requirements, leg) else "the leg"
         facts.append(("height", f"altitude within {abs(measure.height_error):.1f} m of {line}"))
     facts += [
         (name, f"{_throttle_text(requirements, name)} for {duration:.0f} s")
@@ -493,7 +493,7 @@ def _flown_faults(
             faults["slope"] = message(f"flown at {flown_slope:+.1f}° instead of {math.degrees(planned_slope):+.1f}°")
     if measure.height_error is not None and abs(measure.height_error) > _height_error_limit(measure):
         side = "above" if measure.height_error > 0.0 else "below"
-        line = "its height over the ground" if follows_ground(requirements, leg) else "the leg"
+        line = "its height above ground" if follows_ground(requirements, leg) else "the leg"
         limit_text = f" (at most {_height_error_limit(measure):.0f} m)"
         faults["height"] = message(f"{abs(measure.height_error):.0f} m {side} {line}", limit_text)
     has_ability = not performance_faults and measure.ability is not None and measure.ability.exceeds(planned_slope)

@@ -39,7 +39,7 @@ from logs.verdict.tolerances import (
     MIN_PHOTO_HEIGHT_ERROR_M,
     PHOTO_COVERAGE_FRACTION,
     PHOTO_HEIGHT_FRACTION,
-    PHOTO_OVERLAP_FRACTION,
+    PHOTO_OVERLAP_TOLERANCE,
     PHOTO_STEP_M,
     PLAN_TOLERANCE_RAD,
     TURN_AROUND_RADII,
@@ -75,7 +75,7 @@ def survey_findings(
 
 
 def _overlap_findings(requirements: RouteRequirements, aligned: AlignedTrack | None, survey: Survey) -> list[Finding]:
-    """Judge the minimum front and side overlap of a survey's photos.
+    """Judge the smallest measured front and side overlap of a survey's photos against the required overlaps.
 
     An overlap that is not measured or not required has no finding.  Return [] if the survey's camera is unknown.
     """
@@ -90,7 +90,7 @@ def _overlap_findings(requirements: RouteRequirements, aligned: AlignedTrack | N
     for check, overlap, required, line in overlaps:
         if overlap is None or required is None:
             continue
-        limit = required - PHOTO_OVERLAP_FRACTION
+        limit = required - PHOTO_OVERLAP_TOLERANCE
         ok = overlap >= limit
         text = overlap_text(measure, check)
         faults = [] if ok else [message(text)]
@@ -401,7 +401,7 @@ RULE = Rule(
             "MIN_PHOTO_HEIGHT_ERROR_M",
             "MAX_PHOTO_COURSE_ERROR_RAD",
         ),
-        *("PHOTO_STEP_M", "PHOTO_OVERLAP_FRACTION", "TURN_AROUND_RADII", "CLEARANCE_TOLERANCE_M"),
+        *("PHOTO_STEP_M", "PHOTO_OVERLAP_TOLERANCE", "TURN_AROUND_RADII", "CLEARANCE_TOLERANCE_M"),
     ),
     judge=survey_findings,
     log=LogNeeds(("attitude",), needs_planned_heights=True, needs_full_leg=True),

@@ -107,7 +107,7 @@ def compare_logs(first: FlightLog, second: FlightLog, *, names: tuple[str, str])
 
 
 def _list_tolerance_notes(names: tuple[str, str], verdicts: tuple[Verdict, Verdict]) -> Iterator[str]:
-    """Yield a note for each rule whose smallest margin is beyond the limit, but within the tolerance."""
+    """Yield a note for each rule whose smallest margin is negative, but within the tolerance."""
     for name, verdict in zip(names, verdicts, strict=True):
         for rule, finding in verdict.closest.items():
             if finding.tolerance_note:

@@ -13,7 +13,7 @@ from flight.mission_files.formats import mission_text
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track, control_limits, saturated_rows
 from logs.verdict.measures.path_sweeps import passages
-from logs.verdict.measures.track_alignment import ground_phase_rows
+from logs.verdict.measures.track_alignment import takeoff_and_approach_rows
 from logs.views.report.text import NOTHING, number, quantity
 from planner.plan import GIVEN_WAYPOINTS
 from world.arrays import Floats
@@ -134,7 +134,7 @@ def flight_sentence(setup: FlightSetup, track: Track | None) -> str:
     seconds = float(track.time[-1] - track.time[0])
     distance = float(path_length(track.position)) / 1000.0
     heights_above_ground = ground_clearance(setup, track)
-    is_ground_phase = ground_phase_rows(track, setup.ground_phases)
+    is_ground_phase = takeoff_and_approach_rows(track, setup.ground_phases)
     lowest_text = (
         NOTHING
         if heights_above_ground is None

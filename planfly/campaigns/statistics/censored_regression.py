@@ -318,7 +318,10 @@ class Outcomes:
         return Outcomes(self.terms, self.failed, np.zeros_like(self.margin))
 
     def margins_given_pass(self) -> "Outcomes":
-        """Return the outcomes of the passed flights with a known margin, conditional on having passed."""
+        """Return the outcomes of the passed flights with a known margin, conditional on having passed.
+
+        The margin of an outcome is NaN if unknown, and positive if the flight passed.
+        """
         has_margin = self.margin > 0.0
         return Outcomes(self.terms[has_margin], self.failed[has_margin], self.margin[has_margin], given_passed=True)
 

@@ -10,11 +10,18 @@ WATCHED = {"BATT_MONITOR": 4.0, "BATT_LOW_VOLT": 14.0, "BATT_CRT_MAH": 500.0}
 
 
 def does(
-    name: str, *, has_fence: bool = False, has_landing: bool = False, ends_landed: bool = False, **values: float
+    name: str,
+    *,
+    has_fence: bool = False,
+    has_landing_sequence: bool = False,
+    ends_with_landing: bool = False,
+    **values: float,
 ) -> str:
     """What it does on this cause; "" where the cause is none."""
     made = ArduPilotParameters.defaults().changed(**values)
-    causes = failsafe_causes(made, has_fence=has_fence, has_landing=has_landing, ends_landed=ends_landed)
+    causes = failsafe_causes(
+        made, has_fence=has_fence, has_landing_sequence=has_landing_sequence, ends_with_landing=ends_with_landing
+    )
     return next((cause.action for cause in causes if cause.name == name), "")
 
 
@@ -62,7 +69,7 @@ def test_a_low_battery(action: int, done: str, without: str) -> None:
     """Landing on rotors falls through to a landing, for an aeroplane without them; that to a return without one."""
     values = {"BATT_FS_LOW_ACT": float(action), "BATT_FS_CRT_ACT": float(action), **WATCHED}
     for name in ("battery low", "battery critical"):
-        assert does(name, **values, has_landing=True) == done
+        assert does(name, **values, has_landing_sequence=True) == done
         assert does(name, **values) == without
 
 
@@ -97,7 +104,7 @@ def test_a_broken_fence(action: int, done: str) -> None:
 
 
 def test_a_mission_that_ends_on_the_ground_does_not_return() -> None:
-    assert (does("the mission's end"), does("the mission's end", ends_landed=True)) == ("return", "landed")
+    assert (does("the mission's end"), does("the mission's end", ends_with_landing=True)) == ("return", "landed")
 
 
 def test_a_lost_station() -> None:
