@@ -574,6 +574,6 @@ def _make_px4_mission(logged: LoggedItemGroup, source: str, origin: str) -> Logg
 
     Return None if the mission is complete but has fewer than two items.
     """
-    mission = Mission(None, renumber_px4_items(logged.items), source=f"{source}: {origin}")
+    mission = Mission(home=None, items=renumber_px4_items(logged.items), source=f"{source}: {origin}")
     end = max(logged.total, mission.items[-1].seq)
     return without_gaps(LoggedMission(logged.time, mission, origin), logged.total, end)

@@ -150,7 +150,7 @@ def _make_routes(gpx: gpxpy.gpx.GPX, source: str) -> list[LoggedMission]:
             for number, point in enumerate(route.points, 1)
         )
         if len(items) > 1:
-            mission = Mission(None, items, source=f"{source}: route {route.name or ''}".rstrip())
+            mission = Mission(home=None, items=items, source=f"{source}: route {route.name or ''}".rstrip())
             missions.append(LoggedMission(0.0, mission, "route", has_altitudes))
     return missions
 
@@ -293,7 +293,11 @@ def _make_task(lines: list[str], source: str) -> tuple[LoggedMission, ...]:
     )
     if len(items) < 2:
         return ()
-    return (LoggedMission(0.0, Mission(None, items, source=f"{source}: declared task"), "declared task", False),)
+    return (
+        LoggedMission(
+            0.0, Mission(home=None, items=items, source=f"{source}: declared task"), "declared task", with_heights=False
+        ),
+    )
 
 
 # ----------------------------------------------------------------------

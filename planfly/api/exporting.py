@@ -349,7 +349,7 @@ def _read_mission(path: Path, options: MissionOptions, *, needs_world: bool, nee
         airspeed=setup.airspeed,
         aircraft=Path(setup.aircraft).name,
     )
-    source = _with_returns(source, setup, None) if needs_returns else source
+    source = _with_returns(source, setup, track=None) if needs_returns else source
     if not is_plan:
         return _with_zones(source, setup.scenario)
     mission, notes = add_plan_fence(setup)

@@ -80,7 +80,9 @@ def plan(
     check_arguments(seed=options["seed"], budget=options["budget"], seconds=options["seconds"])
     world = _with_budget(load_scenario_with_options(scenario, options), options["budget"])
     if waypoints is None:
-        return _search_and_write(world, scenario, None, options, out, overwrite)
+        return _search_and_write(
+            world, scenario, flown_plan_and_leg=None, options=options, out=out, overwrite=overwrite
+        )
     path, target = (
         _check_waypoints(world, waypoints, options),
         _find_plan_target(world, scenario, options, out, overwrite),

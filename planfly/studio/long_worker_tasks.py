@@ -56,7 +56,7 @@ def run_returns_task(payload: tuple[EditContext, Mission], advance: Advance) -> 
         raise MissionError(f"{mission.source}: {reason}", field=missing_input)
     world = make_return_world(setup)
     flight = fly_and_judge(
-        setup, None, lambda done, total, remark: advance(0.5 * done, total, remark), reference="never"
+        setup, log=None, advance=lambda done, total, remark: advance(0.5 * done, total, remark), reference="never"
     )
     interval = max(1.0, (float(flight.track.time[-1]) if len(flight.track) else 0.0) / _MAX_RETURNS)
     starts = return_starts(setup, flight.track, interval)

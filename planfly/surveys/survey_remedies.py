@@ -310,7 +310,7 @@ class _Trials:
             return None
         mission, requirements, distances = self._setup.mission, route_requirements(self._setup), []
         for survey in self._surveys:
-            measure = measure_overlap(requirements, None, survey)
+            measure = measure_overlap(requirements, aligned=None, survey=survey)
             distance = math.floor((None if measure is None else measure.needed_photo_spacing) or 0.0)
             first_line, *_ = survey.lines
             if 1.0 <= distance < first_line.photo:

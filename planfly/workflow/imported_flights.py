@@ -224,7 +224,7 @@ def _with_wind_of_log(scenario: Scenario, flight: LoggedFlight, options: LogOpti
     if wind is None:
         source_text = "from the scenario, because the log contains no wind" if options.get("scenario") else ""
         return scenario, source_text
-    windy_scenario = with_wind(scenario, wind.speed, wind.from_course, None)
+    windy_scenario = with_wind(scenario, wind.speed, wind.from_course, turbulence=None)
     course_text = f"{round(math.degrees(wind.from_course)) % 360:03d}°"
     return windy_scenario, f"from {course_text}, according to {wind.source} of the log"
 
@@ -440,7 +440,7 @@ def fly_draws(
     for number, draw in enumerate(draws, 1):
         # The aircraft of a draw may have no steady flight at the start, or lose it at once.
         with contextlib.suppress(StartError, LogError):
-            flights.append(_refly_followed_legs(setup, legs, aircraft, draw.turbulence, None, draw))
+            flights.append(_refly_followed_legs(setup, legs, aircraft, draw.turbulence, advance=None, draw=draw))
         advance(number, len(draws), f"flight {number} of {len(draws)}")
     if not flights:
         name = setup.scenario.name
@@ -504,7 +504,9 @@ def _refly_followed_legs(
     draw: variations of aircraft, wind and start of one sampled flight, or None.
     Raises LogError if the model flies none of the legs.
     """
-    scenario = with_wind(with_flight(setup.scenario, aircraft=aircraft), None, None, turbulence)
+    scenario = with_wind(
+        with_flight(setup.scenario, aircraft=aircraft), speed=None, from_course=None, turbulence=turbulence
+    )
     if draw is not None:
         wind = scenario.wind
         north = -wind.speed * math.cos(wind.from_course) + draw.wind[0]

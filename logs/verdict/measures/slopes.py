@@ -106,7 +106,7 @@ def leg_course(requirements: RouteRequirements, aligned: AlignedTrack, leg: int)
             requirements.courses[leg] + math.atan(cross_slope),
             _angle_tolerance(COURSE_ERROR_FLOOR_RAD, residual, distance),
             distance,
-            True,
+            is_fitted=True,
         )
     # The course of a short leg is the mean between its turns, over at least one second.
     span_start, span_end = straight_span(requirements, leg, 0.0)
@@ -124,7 +124,10 @@ def leg_course(requirements: RouteRequirements, aligned: AlignedTrack, leg: int)
         first, last = rows_around.start, rows_around.stop - 1
     # The course column is unwrapped, so a full circle shows as a course change of 360 degrees.
     return LegFit(
-        float(aligned.course[first : last + 1].mean()), ROUGH_COURSE_ERROR_RAD, float(np.ptp(distance_along)), False
+        float(aligned.course[first : last + 1].mean()),
+        ROUGH_COURSE_ERROR_RAD,
+        float(np.ptp(distance_along)),
+        is_fitted=False,
     )
 
 
@@ -144,7 +147,9 @@ def leg_slope(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) 
     if is_inside.sum() >= 20 and np.ptp(distance_along[is_inside]) >= MIN_SLOPE_STRETCH_M:
         slope, residual = fit_line(distance_along[is_inside], position[is_inside, 2])
         distance = float(np.ptp(distance_along[is_inside]))
-        return LegFit(math.atan(slope), _angle_tolerance(SLOPE_ERROR_FLOOR_RAD, residual, distance), distance, True)
+        return LegFit(
+            math.atan(slope), _angle_tolerance(SLOPE_ERROR_FLOOR_RAD, residual, distance), distance, is_fitted=True
+        )
     time = aligned.track.time[rows]
     if time[-1] - time[0] < 1.0:
         return None
@@ -159,7 +164,7 @@ def leg_slope(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) 
     if distance_run.size < 2 or np.ptp(distance_run) < 1.0:
         return None
     slope, _ = fit_line(distance_run, position[is_in_window, 2])
-    return LegFit(math.atan(slope), ROUGH_SLOPE_ERROR_RAD, float(np.ptp(distance_run)), False)
+    return LegFit(math.atan(slope), ROUGH_SLOPE_ERROR_RAD, float(np.ptp(distance_run)), is_fitted=False)
 
 
 def _angle_tolerance(floor: float, residual: float, distance: float) -> float:

@@ -91,7 +91,15 @@ def flown_starts(setup: FlightSetup, track: Track, interval: float) -> ReturnSta
     times = track.time[start_rows]
     records = _start_records(times, track.position[start_rows], velocity, np.nan_to_num(roll))
     height_loss = _height_losses(setup, time, track.position[usable_rows], times)
-    return ReturnStarts(times, records, energy, True, is_low_start, height_loss, int(is_slow.sum()))
+    return ReturnStarts(
+        times,
+        records,
+        energy,
+        is_flown=True,
+        is_low=is_low_start,
+        height_loss=height_loss,
+        grounded_count=int(is_slow.sum()),
+    )
 
 
 def _empty_starts(*, is_flown: bool) -> ReturnStarts:
@@ -174,7 +182,14 @@ def planned_starts(setup: FlightSetup, interval: float, requirements: RouteRequi
     is_low = np.zeros(len(times), dtype=np.bool_)
     path_times, _, _, path_position = _sample_positions(moves, min(interval, _PATH_INTERVAL_S))
     height_loss = _height_losses(setup, path_times, path_position, times)
-    return ReturnStarts(times, _start_records(times, position, velocity, bank), energy, False, is_low, height_loss)
+    return ReturnStarts(
+        times,
+        _start_records(times, position, velocity, bank),
+        energy,
+        is_flown=False,
+        is_low=is_low,
+        height_loss=height_loss,
+    )
 
 
 def planned_positions(setup: FlightSetup, interval: float) -> tuple[Floats, Floats]:
@@ -232,7 +247,14 @@ def flown_end(track: Track) -> ReturnStarts:
     roll = np.nan_to_num(track.attitude[row, ROLL].astype(np.float64))
     records = _start_records(track.time[row], track.position[row], _ground_velocities(track, row), roll)
     is_low = np.zeros(1, dtype=np.bool_)
-    return ReturnStarts(track.time[row], records, track.energy[row].astype(np.float64), True, is_low, np.zeros(1))
+    return ReturnStarts(
+        track.time[row],
+        records,
+        track.energy[row].astype(np.float64),
+        is_flown=True,
+        is_low=is_low,
+        height_loss=np.zeros(1),
+    )
 
 
 def planned_end(requirements: RouteRequirements) -> ReturnStarts:
@@ -247,7 +269,9 @@ def planned_end(requirements: RouteRequirements) -> ReturnStarts:
     time = requirements.path.times[-1:]
     energy = np.array([predicted_energy(requirements)[0]])
     records = _start_records(time, requirements.points[-1:], velocity, np.zeros(1))
-    return ReturnStarts(time, records, energy, False, np.zeros(1, dtype=np.bool_), np.zeros(1))
+    return ReturnStarts(
+        time, records, energy, is_flown=False, is_low=np.zeros(1, dtype=np.bool_), height_loss=np.zeros(1)
+    )
 
 
 def _ground_speeds(setup: FlightSetup) -> Floats:

@@ -226,13 +226,15 @@ def _find_landing(requirements: RouteRequirements) -> _Landing | None:
     setup, ground = requirements.setup, requirements.ground_phases
     approach = (setup.ground_phases if ground is None else ground.procedures).approach
     if approach is not None:
-        return _Landing(approach.leg, approach.item, (float(approach.point[0]), float(approach.point[1])), True)
+        return _Landing(
+            approach.leg, approach.item, (float(approach.point[0]), float(approach.point[1])), is_judged_here=True
+        )
     landing = landing_item(requirements)
     if landing is None or (setup.imported_log is None and not has_ground_paths(requirements)):
         return None
     waypoint, item = landing
     position = setup.route.positions[waypoint]
-    return _Landing(waypoint - 1, item.seq, (float(position[0]), float(position[1])), False)
+    return _Landing(waypoint - 1, item.seq, (float(position[0]), float(position[1])), is_judged_here=False)
 
 
 def _fields_by_leg(

@@ -64,7 +64,7 @@ def return_findings(
             requirements, partial(planned_starts, requirements.setup, requirements=requirements)
         )
         end_findings = _automatic_return_findings(requirements, planned_end(requirements))
-        return [*_rtl_findings(requirements, None, "not flown yet"), *end_findings, *required_findings]
+        return [*_rtl_findings(requirements, ok=None, outcome="not flown yet"), *end_findings, *required_findings]
     if requirements.setup.imported_log is None:
         return []
     has_passed_end = aligned is not None and bool(aligned.passed[-1])
