@@ -240,7 +240,10 @@ def _unwrap_midnight(time: np.ndarray) -> np.ndarray:
 
 
 def _parse_midnight(lines: list[str]) -> float:
-    """Return the UTC midnight before the flight, s since 1970; NaN if the file states no valid date."""
+    """Return the UTC midnight before the flight, s since 1970; NaN if no line has a valid date.
+
+    The file's years have two digits: 80 to 99 are 1980 to 1999.
+    """
     for line in lines:
         match = _DATE.match(line)
         if match:

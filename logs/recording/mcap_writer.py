@@ -601,12 +601,12 @@ def _message_entries(other_messages: list[MessageRecords]) -> Entries:
     entries: Entries = np.zeros(sum(len(messages.log_times) for messages in other_messages), dtype=ENTRY)
     first, start = 0, 0
     for messages in other_messages:
-        part = entries[first : first + len(messages.log_times)]
-        part["source"] = messages.offsets[:-1] + start
-        part["length"] = np.diff(messages.offsets)
-        part["channel"] = messages.channel
-        part["log_time"] = messages.log_times
-        first += len(part)
+        added_entries = entries[first : first + len(messages.log_times)]
+        added_entries["source"] = messages.offsets[:-1] + start
+        added_entries["length"] = np.diff(messages.offsets)
+        added_entries["channel"] = messages.channel
+        added_entries["log_time"] = messages.log_times
+        first += len(added_entries)
         start += len(messages.blob)
     return entries[np.argsort(entries["log_time"], kind="stable")]
 

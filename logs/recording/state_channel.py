@@ -248,14 +248,14 @@ def encode_rows(rows: NDArray[np.record], first_row: int, channel: int) -> State
     return records
 
 
-def join_records(parts: list[StateRecords], kind: np.dtype[np.void]) -> StateRecords:
-    """Join arrays of one structured type.
+def join_records(arrays: list[StateRecords], kind: np.dtype[np.void]) -> StateRecords:
+    """Join arrays of one structured type, which is `kind`.
 
     They are joined as bytes, because numpy would compare the structured types name by name, which takes longer.
     """
-    if not parts:
+    if not arrays:
         return np.zeros(0, dtype=kind)
-    return np.concatenate([np.ascontiguousarray(part).view(np.uint8) for part in parts]).view(kind)
+    return np.concatenate([np.ascontiguousarray(records).view(np.uint8) for records in arrays]).view(kind)
 
 
 def decode_rows(records: StateRecords) -> Track:

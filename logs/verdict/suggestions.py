@@ -251,7 +251,10 @@ def suggest_gentler_landing(
 
 
 def _gentler_arc(requirements: RouteRequirements, leg: int) -> tuple[Suggestion, ...]:
-    """Suggest gentler legs around a fly-by arc that is too steep at a leg's end; () for any other arc."""
+    """Suggest gentler legs around a fly-by arc that is too steep at a leg's end.
+
+    Return () if no arc at the leg is too steep, or if no leg has the arc's slope direction.
+    """
     arc = steep_arc(requirements, leg)
     if arc is None:
         return ()
@@ -474,7 +477,7 @@ def _round_to_meter(length: float) -> float:
 def suggest_wider_berth(
     requirements: RouteRequirements, aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
-    """Suggest passing a missile at a greater distance, outside its sphere; return () for another place."""
+    """Suggest passing a missile at a greater distance, outside its sphere; return () if none applies."""
     missile = finding.place.index
     if missile is None or finding.place.kind != "missile":
         return ()

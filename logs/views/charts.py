@@ -1,7 +1,7 @@
 """A chart as plain data: panels of lines, bands, bars and dots with names, units and roles.
 
 Two renderers draw a chart: `logs.views.drawing` with matplotlib, for PNG, SVG and paper, and the script of the page
-with plotly.js, from `chart_json`.  A role is a word ("missile", "planned") that `logs.theme` gives a look.
+with plotly.js, from `chart_json`.  A role is a word ("missile", "planned") whose style is in `logs.theme`.
 """
 
 import math
@@ -30,7 +30,7 @@ class Layer:
     kind: "band" is filled from `lower_edge` up to `y`, "area" is the inside of closed outlines, "dashes" are short
         horizontal strokes, "rings" mark failures.
     name: name in legend and read-out; "" leaves the layer out of both.
-    role: meaning of the layer; `logs.theme` assigns its look.
+    role: meaning of the layer; `logs.theme` assigns its style.
     x, y: (n,) in the panel's units; NaN separates parts of a line or an outline.
     lower_edge: (n,) lower edge of a band.
     dashed: True for the second of two lines of one role.

@@ -250,7 +250,7 @@ def _draw_threats(axes: Any, projection: Projection, setup: FlightSetup, failed:
     vertical = np.where(angles < math.pi, top_height, math.sin(_ELEVATION)) * np.sin(angles)
     shape = np.column_stack([np.cos(angles), vertical])
     threat_styles: tuple[tuple[str, Floats, dict[str, Any]], ...] = (
-        ("missile", threats.kill_radius, {"facecolor": theme.rgba("missile", theme.LOOKS["missile"].fill)}),
+        ("missile", threats.kill_radius, {"facecolor": theme.rgba("missile", theme.ROLE_STYLES["missile"].fill)}),
         ("radar", threats.detection_radius, {"facecolor": "none", "linestyle": (0, (4, 2.5))}),
     )
     for kind, radii, style in threat_styles:
@@ -322,7 +322,13 @@ def _draw_paths(
     failed: Failures,
     placer: LabelPlacer,
 ) -> list[Any]:
-    """Draw route, track, waypoints and their failures; return the handles for the legend."""
+    """Draw route, track and waypoints, and mark those that fail; return the handles for the legend.
+
+    Vertical lines lead from the waypoints to the ground if the terrain is known.
+
+    route: waypoints, m, (w, 3).
+    placer: keeps labels off the drawn path.
+    """
     _, samples = route_samples(route, max(float(route_distance(route)[-1]) / 600.0, 1.0))
     if terrain is not None:
         ground = terrain.height(route[:, 0], route[:, 1])
@@ -376,7 +382,12 @@ def _draw_paths(
 def _draw_path(
     axes: Any, projection: Projection, terrain: Terrain | None, points: Floats, colour: str, width: float, order: float
 ) -> None:
-    """Draw a path, thin and dashed where the ground hides it."""
+    """Draw a path, thin and dashed where the ground hides it.
+
+    points: positions on the path, m, (n, 3).
+    width: line width, points.
+    order: matplotlib's zorder.
+    """
     projected = projection.project(points)
     is_hidden = _find_hidden_points(projection, terrain, points)
     visible_part = np.where(is_hidden[:, None], np.nan, projected[:, :2])
@@ -390,7 +401,11 @@ def _draw_path(
 def _draw_labels(
     setup: FlightSetup, projection: Projection, route: Floats, failed: Failures, placer: LabelPlacer
 ) -> None:
-    """Label start, destination, waypoints and threats, as far as the labels fit."""
+    """Label start, destination, waypoints and threats; labels without a free place are left out.
+
+    If there are too many waypoints, only every n-th and the failed ones are numbered.  Entered threats get the best
+    places.
+    """
     corners, stops = projection.project(route), setup.route.stops.tolist()
     last = len(route) - 1
 

@@ -35,7 +35,7 @@ _COMMANDS = {
 
 
 def read_column_motion(path: Path) -> MotionLog:
-    """Read the motion of an aircraft by a table of columns.
+    """Read the motion of an aircraft from a data file, as a table of columns describes it.
 
     path: a table of columns, or a data file with a table next to it.
 

@@ -543,7 +543,9 @@ def judge_returns(
     max_flights: int = MAX_JSBSIM_FLIGHTS,
     advance: Callable[[float, float], None] = lambda done, total: None,
 ) -> Returns:
-    """Simulate and judge the return from each start.
+    """Simulate and judge the return from each start, once for each ending (loiter or landing) to be judged.
+
+    A return from a low start that only sinks to the ground is left out, but counted in `omitted_count`.
 
     interval: time between starts, s.
     fly_again: function that flies an uncertain return again in JSBSim; None for no such flights.
@@ -634,11 +636,12 @@ def simulate_judged_returns(
     min_heights: Floats,
     min_sphere_distances: Floats | None = None,
 ) -> tuple[Records, tuple[Floats, ...]]:
-    """Simulate returns for judging; the required height does not apply in a landing sequence.
+    """Simulate returns for judging, without the clearance on approaches to a landing.
 
     After the first item of a landing sequence, a return flies the mission's approach, which descends to the landing.
     The clearance of a return that becomes too low on the approach is therefore measured only up to the first item.
 
+    starts, targets: start and target of each return, n of each.
     min_heights: required heights above ground, m, (n,).
     min_sphere_distances: required distances outside spheres, m, (n,), to abort a return that is too close or too low;
         None to simulate every return to its end.

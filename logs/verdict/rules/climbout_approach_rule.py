@@ -531,7 +531,12 @@ def _clearance_text(obstacles: _Obstacles) -> str:
 def _path_finding(
     rule: str, place: Place, obstacles: _Obstacles, ok: bool | None, outcome: Message, check: str = ""
 ) -> Finding:
-    """Make the finding on a climb-out or an approach, with `outcome` as its reason."""
+    """Make the finding on the clearance of a climb-out or an approach above ground.
+
+    ok: None if undecided.
+    outcome: message with the reason; it is a fault unless the finding passes.
+    check: see `logs.verdict.findings.Finding`.
+    """
     return make_finding(
         rule,
         place,

@@ -299,6 +299,9 @@ def _flown_finding(
     """Judge the usable fraction of a flown photo line.
 
     A line is not judged if it was not flown, or if its usable fraction depends on unknown ground.
+
+    aligned: flown track; None for a flight with too few rows.
+    number: number of the line in its survey.
     """
     name = _line_text(requirements, survey, line, number)
     measure = None if aligned is None else measure_line(requirements, aligned, survey, line)
