@@ -341,7 +341,7 @@ def _suggest_end_loiter(
     is_waypoint = commands.get(-1 if end.item is None else end.item) == Command.NAV_WAYPOINT
     if finding.place != end or not is_waypoint or not judges_return_after_last_item(setup):
         return ()
-    return ((Change("end loiter", end, None, float(Command.NAV_LOITER_UNLIM), ""),),)
+    return ((Change("end loiter", end, current=None, wanted=float(Command.NAV_LOITER_UNLIM), unit=""),),)
 
 
 RULE = Rule(
