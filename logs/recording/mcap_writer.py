@@ -557,6 +557,7 @@ def _index_messages(
                 continue
             index.offset = position - chunk.index_start
             length = index.messages * _INDEX_ENTRY
+            # The last argument of `_write_integer` is the size of the integer, bytes.
             index_records[position] = _INDEX_OPCODE
             position = _write_integer(index_records, position + 1, 6 + length, 8)
             position = _write_integer(index_records, position, channel, 2)

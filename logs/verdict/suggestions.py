@@ -516,7 +516,10 @@ def _suggest_home_on_ground(setup: FlightSetup) -> tuple[Suggestion, ...]:
 
 
 def _suggest_launch_from_ground(requirements: RouteRequirements) -> tuple[Suggestion, ...]:
-    """Suggest to set home on the ground and to raise the legs that are then too low; or ()."""
+    """Suggest setting home on the ground, and raising the legs that are then too low.
+
+    Return () if home is on the ground already or if the terrain is unknown.
+    """
     suggestions, setup = _suggest_home_on_ground(requirements.setup), requirements.setup
     terrain = setup.scenario.terrain
     if not suggestions or terrain is None:
@@ -692,7 +695,7 @@ def _suggest_landing_against_wind(
 def suggest_staying_inside(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
-    """Suggest lower altitudes, then a path further inside the area; () for a path inside."""
+    """Suggest lower altitudes, then a path further inside the area; return () for a path that stays inside."""
     if finding.margin is None or not finding.margin < 0.0:
         return ()
     inset = _round_to_meter(-finding.margin + SUGGESTION_LENGTH_MARGIN_M)

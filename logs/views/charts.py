@@ -193,15 +193,15 @@ def join_with_gaps(parts: Sequence[Floats]) -> tuple[Floats, Floats]:
     return points[:, 0], points[:, 1]
 
 
-def make_saturation_band(is_saturated: NDArray[np.bool_], along: Floats, span: tuple[float, float]) -> Layer:
+def make_saturation_band(is_saturated: NDArray[np.bool_], axis_positions: Floats, span: tuple[float, float]) -> Layer:
     """Return a layer that shades the parts of a long axis in which a control is at its limit.
 
     is_saturated: True at rows where the control is at its limit, (t,).
-    along: position of each row along the axis, (t,).
+    axis_positions: position of each row along the axis, (t,).
     span: lower and upper edge of the shaded bands.
     """
     edges = np.flatnonzero(np.diff(np.concatenate([[False], is_saturated, [False]]).astype(np.int8)))
-    starts, band_ends = along[edges[::2]], along[edges[1::2] - 1]
+    starts, band_ends = axis_positions[edges[::2]], axis_positions[edges[1::2] - 1]
     gap = np.full(len(starts), np.nan)
     x = np.column_stack([starts, band_ends, band_ends]).ravel()
     y = np.column_stack([np.full(len(starts), span[1]), np.full(len(starts), span[1]), gap]).ravel()

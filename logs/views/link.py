@@ -99,7 +99,7 @@ def compute_scenario_link(setup: FlightSetup, track: Track | None) -> DrawnLink 
 
 def link_chart(setup: FlightSetup, drawn: DrawnLink) -> Chart:
     """Chart the link's margin, diffraction loss, Fresnel clearance and distance over time."""
-    along, points = drawn.along, drawn.along.points
+    link_along_path, points = drawn.along, drawn.along.points
     name, role = ("flown", "flown") if drawn.is_flown else ("planned path", "planned")
 
     def make_panel(
@@ -110,7 +110,7 @@ def link_chart(setup: FlightSetup, drawn: DrawnLink) -> Chart:
         limits: names and values of the limit lines.
         note: note on values that are not shown.
         """
-        return Panel(title, unit, (series(name, role, along.time, values),), limits=limits, note=note)
+        return Panel(title, unit, (series(name, role, link_along_path.time, values),), limits=limits, note=note)
 
     clearance = np.clip(points.fresnel_clearance, -_MAX_SHOWN_CLEARANCE, _MAX_SHOWN_CLEARANCE)
     zone_limits = (("line of sight", 0.0), (f"{100.0 * _CLEAR_FRACTION:.0f} % of the first zone", _CLEAR_FRACTION))

@@ -279,7 +279,7 @@ class _ReturnsRequest(NamedTuple):
 def _check_request(
     every: float, suggest: bool, out: str | Path | None, sitl: str | Path | None, points: int, *, overwrite: bool
 ) -> _ReturnsRequest:
-    """Check the options of `returns`, and convert them.
+    """Check the options of `returns`, which describes them, and convert them to a request.
 
     Raises PlanflyError for a folder that is a file or is not empty, and for a program that is not ArduPlane.
     """

@@ -506,7 +506,7 @@ def _fly_round(
     stored_flights: _StoredFlights,
     progress: "_ProgressReport",
 ) -> None:
-    """Fly the missing flights of a round, and write each to the table as soon as it is done."""
+    """Fly the flights of a round that are not in the table, and write each to the table as soon as it is done."""
     remaining_requests = iter(missing_requests)
     requested_by_request: dict[FlightRequest, RequestedFlight] = {}
 

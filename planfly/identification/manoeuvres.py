@@ -52,7 +52,7 @@ def make_identification_mission(
     def add_item(
         command: int, frame: int, params: tuple[float, float, float, float], lat: float, lon: float, altitude: float
     ) -> None:
-        """Append a mission item with the next number, with rounded position and altitude."""
+        """Append a mission item with the next number, its position rounded as in a mission file (deg, m)."""
         number = len(items) + 1
         items.append(
             MissionItem(number, command, frame, params, round_to_grid(lat), round_to_grid(lon), round(altitude, 2))

@@ -256,7 +256,7 @@ def _format_reactions(numbers: BaseModel, values: Floats, base_properties: list[
 
 
 def _format_motor_functions(motor: Motor) -> dict[str, str]:
-    """Return the content of each JSBSim function ``motor/NAME`` by NAME, in order of computation."""
+    """Return the XML content of each JSBSim function ``motor/NAME`` by NAME, in order of computation."""
     shared = {
         "rho-kg_m3": "<product> <p> atmosphere/rho-slugs_ft3 </p> <v> 515.3788183931961 </v> </product>",
         "airspeed-mps": "<product> <p> velocities/vt-fps </p> <v> 0.3048 </v> </product>",

@@ -37,6 +37,8 @@ def play_to_stations(
 
     speed: multiple of real time.
     wait: maximum time to wait for the first station, s; FlightError is raised if none answers.
+    should_stop: polled continuously; the replay ends when it returns True.
+    on_message: called with each message of the replay.
     """
     link = Link(access)
     snapshots = SnapshotMaker(log.setup, LocalMap.around(log.setup))
@@ -54,17 +56,17 @@ def play_to_stations(
         if not link.peers:
             addresses = ",".join(f"{host}:{port}" for host, port in access.to)
             raise FlightError.of_argument("to", addresses, f"no ground station has answered within {wait:g} s")
-        start_time, k = link.clock(), 0
+        start_time, row = link.clock(), 0
         player.announce(f"replay of {log.source} at {speed:g}x")
-        while k < len(rows) - 1 and not should_stop():
+        while row < len(rows) - 1 and not should_stop():
             log_time = (link.clock() - start_time) * speed
-            k = min(len(rows) - 1, int(np.searchsorted(track.time, log_time, side="right")))
-            snapshot = snapshots.snapshot(rows[k])
+            row = min(len(rows) - 1, int(np.searchsorted(track.time, log_time, side="right")))
+            snapshot = snapshots.snapshot(rows[row])
             if snapshot.is_finite:
                 status.snapshot = snapshot
                 status.current = max(0, int(items[min(int(snapshot.leg) + 1, len(items) - 1)]))
             player.step(0.01)
-        if log.ended == "completed" and k == len(rows) - 1:
+        if log.ended == "completed" and row == len(rows) - 1:
             status.mission_state = COMPLETE
         status.armed = status.flying = False
         player.announce(f"replay ended: {log.ended or CUT_SHORT}")

@@ -255,10 +255,12 @@ def fly_by_program(
 def _judge_flown_return(
     world: ReturnWorld, simulated_return: SimulatedReturn, start: Record, track: Track, end_reason: str
 ) -> SimulatedReturn | None:
-    """Judge a return flown by the program.
+    """Judge a return that the autopilot program flew, by the same rules as a simulated return.
 
     simulated_return: simulation of the same return; its required height and its energy at the start are used.
-    start: state at the start of the return.
+    start: position and velocity at the start of the return.
+    track: flown track, which begins before the start.
+    end_reason: reason why the flight ended, such as "ground contact".
     Returns None if the flight did not reach the start.
     """
     path = positions_from_start(track, start)

@@ -44,7 +44,7 @@ _WORKERS = Workers(count=1)
 def run_returns_task(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any]:
     """Fly a mission, and judge returns to launch from points along the flight.
 
-    Returns the results of the returns as page data.
+    Returns state, headline and result lines as page data.  Raises MissionError without a home or terrain.
 
     payload: editing context, and mission.
     """

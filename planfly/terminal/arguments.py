@@ -38,7 +38,10 @@ def number_parser(keyword: str) -> Callable[[str], Any]:
 
 
 def parse_wind(text: str) -> tuple[float, float]:
-    """Parse SPEED,FROM: speed (m/s) of a steady wind, and direction (degrees) from which the wind blows."""
+    """Parse SPEED,FROM: speed (m/s) of a steady wind, and direction (degrees) from which the wind blows.
+
+    Raises argparse.ArgumentTypeError for other text, as all parsers of this module.
+    """
     try:
         speed, from_deg = (float(part) for part in text.split(","))
     except ValueError:
@@ -141,9 +144,9 @@ def parse_threat(text: str) -> tuple[float, float, float, float]:
 
 
 def parse_problems(text: str) -> tuple[int, ...]:
-    """Parse threat counts separated by commas, such as "7,15".
+    """Parse threat counts separated by commas, such as "7,15", and return them sorted without duplicates.
 
-    Only the four counts of the paper are allowed.
+    Only the four counts of the paper's problems are allowed: 7, 15, 30 and 60.
     """
     parts = [part.strip() for part in text.split(",")]
     numbers = sorted({int(part) for part in parts if part.isdecimal()})

@@ -432,6 +432,10 @@ def fly_draws(
     A draw is a sampled variant of the aircraft in a sampled wind.  A draw is left out if its aircraft cannot start or
     flies none of the legs.
 
+    setup, track: setup and track of the logged flight.
+    aircraft: name or folder of the aircraft that is varied.
+    advance: called after each draw with the number of draws done, their total and a text.
+
     Raises LogError for a flight that followed no part of its mission, or if no draw flies.
     """
     setup = start_after_takeoff(setup, track)

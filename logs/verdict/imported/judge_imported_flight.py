@@ -55,7 +55,9 @@ def imported_lines(
 ) -> tuple[str, ...]:
     """Return the lines of the summary on an imported flight, the headline first.
 
-    own_answer: answer of the verdict at its own level, with the headline.
+    For a flight that was not imported, the headline is the only line.
+
+    own_answer: answer of the verdict at the level "flown", with the headline.
     flown_stretches: legs flown in each judged stretch of the log.
     """
     imported_log = setup.imported_log
