@@ -374,7 +374,7 @@ def _write_integer(buffer: Bytes, position: int, value: int, size: int) -> int:
 
 @inner
 def _write_varint(buffer: Bytes, position: int, value: int) -> int:
-    """Write a value as a protobuf varint, and return the position after it."""
+    """Write a value as a protobuf varint, seven bits in each byte, and return the position after it."""
     while value > 127:
         buffer[position] = (value & 127) | 128
         value >>= 7

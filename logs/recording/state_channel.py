@@ -76,6 +76,7 @@ def repeated_submessages(field_number: int, names: Sequence[str], values: Floats
 
 def length_delimited(field_number: int, data: bytes) -> bytes:
     """Encode the bytes of a submessage as the field `field_number` of its parent message."""
+    # The size is a varint: seven bits in each byte, and the highest bit set in all bytes but the last.
     size, head = len(data), bytearray([field_number << 3 | _LENGTH_DELIMITED])
     while size > 127:
         head.append(size & 127 | 128)

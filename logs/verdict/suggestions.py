@@ -505,7 +505,7 @@ def home_height(setup: FlightSetup) -> float:
 
 
 def _suggest_home_on_ground(setup: FlightSetup) -> tuple[Suggestion, ...]:
-    """Suggest to set a home far above or below the ground on the ground; otherwise return ()."""
+    """Suggest setting home on the ground if it is far above or below the ground; otherwise return ()."""
     home, height = setup.mission.home, home_height(setup)
     # The height is NaN if it is unknown.  If the file has no home line, its first item was probably taken for home, and
     # another altitude of this item would not help.
@@ -537,7 +537,7 @@ def _suggest_launch_from_ground(requirements: RouteRequirements) -> tuple[Sugges
 
 
 def _suggest_other_frame(setup: FlightSetup, frame: Frame) -> tuple[Suggestion, ...]:
-    """Suggest another altitude frame for items that fit the terrain only in it; () without any.
+    """Suggest another altitude frame if items fit the terrain only in that frame; otherwise return ().
 
     frame: GLOBAL_RELATIVE_ALT for items below the ground, GLOBAL for items that are too high above home.
     """
@@ -549,7 +549,7 @@ def _suggest_other_frame(setup: FlightSetup, frame: Frame) -> tuple[Suggestion, 
 
 
 def _suggest_lower_reading(setup: FlightSetup) -> tuple[Suggestion, ...]:
-    """Suggest to read altitudes as lower: with home on the ground, or as AMSL."""
+    """Suggest two corrections that lower a path: home set on the ground, and heights above home read as AMSL."""
     home_on_ground = _suggest_home_on_ground(setup) if home_height(setup) > 0.0 else ()
     return (*home_on_ground, *_suggest_other_frame(setup, Frame.GLOBAL))
 
@@ -670,7 +670,7 @@ def suggest_better_launch(
 def suggest_other_landing_course(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
-    """Suggest to land from the other end after a failed landing in a tailwind; otherwise ()."""
+    """Suggest landing from the other end after a failed landing in a tailwind; otherwise return ()."""
     ground = requirements.ground_phases
     approach = None if ground is None else ground.procedures.approach
     if finding.ok is not False or approach is None:
@@ -681,7 +681,7 @@ def suggest_other_landing_course(
 def _suggest_landing_against_wind(
     requirements: RouteRequirements, place: Place, course: float, altitude: float
 ) -> tuple[Suggestion, ...]:
-    """Suggest to land from the other end if the landing course (rad) has a tailwind; otherwise ().
+    """Suggest landing from the other end if the landing course (rad) has a tailwind; otherwise return ().
 
     altitude: altitude of the landing point, m AMSL.
     """

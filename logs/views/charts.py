@@ -208,14 +208,14 @@ def make_saturation_band(is_saturated: NDArray[np.bool_], axis_positions: Floats
     return Layer("band", "held at its limit", "held", x, y, np.full(len(x), span[0]), quiet=True)
 
 
-def make_leg_marks(legs: NDArray[Any], along: Floats) -> tuple[tuple[float, str], ...]:
+def make_leg_marks(legs: NDArray[Any], axis_positions: Floats) -> tuple[tuple[float, str], ...]:
     """Return a mark at the start of each leg: its position along an axis, and the leg's name.
 
     legs: number of each row's leg in messages, (t,).
-    along: position of each row along the axis, (t,).
+    axis_positions: position of each row along the axis, (t,).
     """
     starts = [0, *(np.flatnonzero(np.diff(legs)) + 1).tolist()]
-    return tuple((float(along[row]), f"leg {legs[row]}") for row in starts)
+    return tuple((float(axis_positions[row]), f"leg {legs[row]}") for row in starts)
 
 
 def find_outline_rows(values: ArrayLike, count: int) -> Indices:

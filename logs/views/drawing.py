@@ -264,14 +264,14 @@ def draw_chart(chart: Chart) -> Figure:
     return figure
 
 
-def _compute_panel_extent(chart: Chart, k: int, right_margin: float) -> tuple[float, float]:
-    """Return the left edge and the width of panel number `k` as fractions of the picture's width."""
+def _compute_panel_extent(chart: Chart, panel_number: int, right_margin: float) -> tuple[float, float]:
+    """Return the left edge and the width of a panel as fractions of the picture's width."""
     total_width = WIDTH - _LEFT - right_margin
     if not chart.widths:
         return _LEFT / WIDTH, total_width / WIDTH
     gap = 0.75 * (len(chart.widths) - 1)
-    width_before = sum(chart.widths[:k])
-    return (_LEFT + width_before * (total_width - gap) + 0.75 * k) / WIDTH, chart.widths[k] * (
+    width_before = sum(chart.widths[:panel_number])
+    return (_LEFT + width_before * (total_width - gap) + 0.75 * panel_number) / WIDTH, chart.widths[panel_number] * (
         total_width - gap
     ) / WIDTH
 

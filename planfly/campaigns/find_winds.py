@@ -390,6 +390,7 @@ class _Search:
 
     def result_in_calm_air(self, rows: Sequence[FlightRow]) -> WindsResult:
         """Return the result of a search that ends after its flights in calm air.  rows: these flights."""
+        # In each direction, the boundary and both ends of its interval are calm air.
         boundaries = (WindBoundary(0.0, 0.0, 0.0, is_beyond_search=False),) * self.goal.directions
         self.flown = [(0, 0.0, False)] * len(rows)
         self.undecided = [(number, row.undecided_text) for number, row in enumerate(rows) if row.undecided_text]

@@ -80,6 +80,7 @@ def _lay_out_waypoints(
     repeats, max_rates: see `make_identification_mission`.
     """
     cruise = aircraft.airspeed
+    # Slow and fast legs are flown at a distance from the airspeed limits.
     slow_speed = aircraft.airspeed_min + 0.15 * (cruise - aircraft.airspeed_min)
     fast_speed = cruise + 0.6 * (aircraft.airspeed_max - cruise)
     medium_speed = 0.5 * (slow_speed + cruise)

@@ -65,12 +65,12 @@ def play_to_stations(
             if snapshot.is_finite:
                 status.snapshot = snapshot
                 status.current = max(0, int(items[min(int(snapshot.leg) + 1, len(items) - 1)]))
-            player.step(0.01)
+            player.step(pause=0.01)
         if log.ended == "completed" and row == len(rows) - 1:
             status.mission_state = COMPLETE
         status.armed = status.flying = False
         player.announce(f"replay ended: {log.ended or CUT_SHORT}")
-        player.continue_sending(1.5, should_stop)
+        player.continue_sending(seconds=1.5, should_stop=should_stop)
     finally:
         link.close()
 
@@ -97,13 +97,13 @@ class _Player:
         """Call stations until one answers, or for ``timeout`` seconds."""
         end = self._link.clock() + timeout
         while not self._link.peers and self._link.clock() < end and not should_stop():
-            self.step(0.05)
+            self.step(pause=0.05)
 
     def continue_sending(self, seconds: float, should_stop: ShouldStop) -> None:
         """Send the last snapshot for a number of seconds."""
         end = self._link.clock() + seconds
         while self._link.clock() < end and not should_stop():
-            self.step(0.02)
+            self.step(pause=0.02)
 
     def step(self, pause: float) -> None:
         """Handle messages from the stations, send the messages that are due, and sleep for `pause` seconds."""

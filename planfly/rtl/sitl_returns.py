@@ -218,6 +218,7 @@ def _is_lead_in_clear(world: ReturnWorld, row: Record) -> bool:
         return True
     velocity = np.array([float(row[f"velocity_{name}"]) for name in ("east", "north", "up")])
     start_position = np.array([float(row[name]) for name in ("east", "north", "up")])
+    # 26 points on the lead-in, from the start backwards.
     seconds_before = np.linspace(0.0, LEAD_IN_LENGTH_M / max(1.0, math.hypot(*velocity[:2])), 26)
     path = start_position - seconds_before[:, None] * velocity
     return bool((path[:, 2] - world.scenario.terrain.height(path[:, 0], path[:, 1])).min() > _MIN_LEAD_IN_HEIGHT_M)
@@ -342,6 +343,7 @@ def _flown_target(world: ReturnWorld, simulated_target: ReturnTarget, position: 
     position: path points, (t, 3) m.
     """
     end_point = position[-1, :2]
+    # The last course is the course over the last five seconds.
     earlier_point = position[max(0, len(position) - 5 * _ROWS_PER_SECOND), :2]
     course = math.atan2(*(end_point - earlier_point))
     best_target, best_rank = simulated_target, math.inf

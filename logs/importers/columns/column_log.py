@@ -466,7 +466,7 @@ class ColumnLog:
         """Return the times and values of the rows in which the value changes.
 
         They are the measurements of a column that is written more often than it is measured.  Raises LogError if the
-        value changes more often than the stated rate.
+        value changes more often than the rate that the table states for the column.
         """
         is_changed: Flags = np.concatenate([[True], np.diff(values) != 0.0]) & np.isfinite(values)
         rate = is_changed.sum() / max(1e-9, float(np.ptp(time)))

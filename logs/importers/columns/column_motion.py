@@ -205,6 +205,8 @@ def _find_airspeed_ratio(ratio: Samples, height: Samples, time: Floats) -> Float
     if len(ratio.time):
         return np.asarray(np.interp(time, ratio.time, ratio.values[:, 0]))
     altitude = np.interp(time, height.time, height.values[:, 0]) if len(height.time) else np.zeros(len(time))
+    # The air density of the standard atmosphere decreases with (1 - 2.25577e-5 h)^4.25588, and the ratio is the inverse
+    # square root of the density relative to sea level.
     return np.asarray((1.0 - 2.25577e-5 * np.clip(altitude, -500.0, 9000.0)) ** -2.12794)
 
 

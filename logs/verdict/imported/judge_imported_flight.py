@@ -226,6 +226,7 @@ def damage_text(damage: Damage) -> str:
 
 def _start_time_text(imported_log: ImportedLog) -> str:
     """Return a clause on the date and time at the log's time 0; "" without a plausible date."""
+    # A date before 1970 or after 2099 (4.1e9 s) shows that the log's clock was not set.
     if not isfinite(imported_log.utc_start) or not 0.0 <= imported_log.utc_start < 4.1e9:
         return ""
     return f", time 0 s is {datetime.fromtimestamp(imported_log.utc_start, UTC):%Y-%m-%d %H:%M:%S} UTC"

@@ -66,7 +66,8 @@ def acceptance_condition(requirements: RouteRequirements, waypoint: int) -> Acce
         return AcceptanceCondition(
             setup.autopilot.turns.distance(turn, float(requirements.points[waypoint, 2])), "autopilot", tolerance
         )
-    return AcceptanceCondition(path_radius, "fly-over" if setup.route.fly_over[waypoint] else "fly-by path", 0.0)
+    source = "fly-over" if setup.route.fly_over[waypoint] else "fly-by path"
+    return AcceptanceCondition(path_radius, source, tolerance=0.0)
 
 
 def position_error(setup: FlightSetup) -> float:

@@ -99,6 +99,7 @@ def leg_course(requirements: RouteRequirements, aligned: AlignedTrack, leg: int)
     distance_along, lateral_offset = project_onto_leg(requirements, leg, aligned.track.position[rows])
     span_start, span_end = straight_span(requirements, leg, TURN_EXCLUSION_M)
     is_inside = (distance_along >= span_start) & (distance_along <= span_end)
+    # A fit needs at least 20 rows.
     if is_inside.sum() >= 20 and np.ptp(distance_along[is_inside]) >= MIN_COURSE_STRETCH_M:
         cross_slope, residual = fit_line(distance_along[is_inside], lateral_offset[is_inside])
         distance = float(np.ptp(distance_along[is_inside]))
@@ -144,6 +145,7 @@ def leg_slope(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) 
     distance_along, _ = project_onto_leg(requirements, leg, position)
     span_start, span_end = straight_span(requirements, leg, TURN_EXCLUSION_M, excludes_blends=True)
     is_inside = (distance_along >= span_start) & (distance_along <= span_end)
+    # A fit needs at least 20 rows.
     if is_inside.sum() >= 20 and np.ptp(distance_along[is_inside]) >= MIN_SLOPE_STRETCH_M:
         slope, residual = fit_line(distance_along[is_inside], position[is_inside, 2])
         distance = float(np.ptp(distance_along[is_inside]))
@@ -376,6 +378,7 @@ def measure_ability(requirements: RouteRequirements, aligned: AlignedTrack, leg:
     altitude = track.position[rows, 2][is_measured]
     top_altitude = float(altitude.max())
     excess_speed = np.sqrt((air_velocity[is_measured] ** 2).sum(axis=1)) - commanded_speed
+    # The altitude is in units of 100 m, so that both regressors are of similar size.
     rate_fit = _fit_plane_at_origin(
         climb_rate, excess_speed, 0.01 * (altitude - top_altitude), duration / ABILITY_SAMPLE_INTERVAL_S
     )

@@ -226,6 +226,7 @@ class _AltitudeSearch:
         self._world, self._present_values = world, present_values
         self.current = next(iter(present_values.values()))
         ground_heights = world.environment.heights[np.isfinite(world.environment.heights)]
+        # Up to the height that clears all ground; without terrain, up to 500 m more than at present.
         max_altitude = (
             float(ground_heights.max()) - world.home.up + world.limit + 2.0 * MARGIN
             if world.environment.known
@@ -360,7 +361,7 @@ def _search_in_rounds(
 def _rally_candidates(
     world: ReturnWorld, starts: ReturnStarts, spacing: float, max_distance: float
 ) -> list[ReturnPoint]:
-    """Return candidate rally points on a grid near the path, at two altitudes, clear of spheres.
+    """Return candidate rally points on a grid near the path, at two altitudes 200 m apart, clear of spheres.
 
     spacing: grid spacing, m, increased if there are too many candidates.
     max_distance: maximum distance from the path, m.
@@ -410,6 +411,7 @@ def _highest_ground(world: ReturnWorld, east: float, north: float) -> float:
     """
     if world.scenario.terrain is None:
         return world.home.up
+    # The center, and 16 points on each of three circles.
     angles = np.arange(16) * (math.pi / 8.0)
     radii = np.concatenate([np.zeros(1), *(np.full(16, fraction * _LOITER_RADIUS_M) for fraction in (0.33, 0.67, 1.0))])
     directions = np.concatenate([np.zeros(1), angles, angles, angles])

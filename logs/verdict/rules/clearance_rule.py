@@ -439,10 +439,11 @@ def _placed_message(requirements: RouteRequirements, leg: int, text: str) -> Mes
     return message(f"{place_text_within(requirements.leg(leg))} {text}", placed=True)
 
 
-def _time_and_place_text(aligned: AlignedTrack, k: int, fraction: float) -> str:
-    """Describe time and position of the aircraft at a fraction (0 to 1) of track segment `k`."""
-    time = aligned.track.time
-    return f"at {time[k] + fraction * (time[k + 1] - time[k]):.1f} s, {aligned.position_text(k, fraction)}"
+def _time_and_place_text(aligned: AlignedTrack, segment: int, fraction: float) -> str:
+    """Describe time and position of the aircraft at a fraction (0 to 1) of a segment of the track."""
+    times = aligned.track.time
+    time = times[segment] + fraction * (times[segment + 1] - times[segment])
+    return f"at {time:.1f} s, {aligned.position_text(segment, fraction)}"
 
 
 RULE = Rule(

@@ -208,7 +208,7 @@ def _find_launch(requirements: RouteRequirements) -> _Launch:
     course_text = f"on the launch course {round(math.degrees(stated_launch.course)) % 360}°"
     if abs(float(wrap(stated_launch.course - first_leg.course))) <= PLAN_TOLERANCE_RAD:
         return first_leg._replace(course_text=course_text)
-    return _Launch(stated_launch.course, math.inf, 0.0, course_text)
+    return _Launch(stated_launch.course, leg_length=math.inf, slope=0.0, course_text=course_text)
 
 
 class _Climb(NamedTuple):
@@ -286,7 +286,7 @@ def _find_obstacles(requirements: RouteRequirements, path: GroundPath) -> _Obsta
     terrain, end = requirements.setup.scenario.terrain, float(path.distance[-1])
     entered_hazard = first_hazard_on_path(requirements, path)
     if terrain is None or end <= LAUNCH_RUN_M:
-        return _Obstacles(math.inf, 0.0, entered_hazard)
+        return _Obstacles(clearance=math.inf, distance=0.0, entered_hazard=entered_hazard)
     return _Obstacles(*min_path_clearance(terrain, path.between(LAUNCH_RUN_M, end)), entered_hazard)
 
 

@@ -297,9 +297,9 @@ def _add_element(parent: ElementTree.Element, name: str, text: str = "") -> Elem
     return element
 
 
-def _format_coordinates(line: MapLine, k: int) -> str:
+def _format_coordinates(line: MapLine, index: int) -> str:
     """Return longitude, latitude and altitude of a point in the syntax of KML."""
-    return f"{line.lon_deg[k]:.8f},{line.lat_deg[k]:.8f},{line.amsl[k]:.3f}"
+    return f"{line.lon_deg[index]:.8f},{line.lat_deg[index]:.8f},{line.amsl[index]:.3f}"
 
 
 def gpx_text(title: str, lines: list[MapLine], zones: Sequence[MapZone] = ()) -> str:
