@@ -225,6 +225,8 @@ def _parse_fixes(lines: list[str]) -> tuple[list[tuple[float, float, float, floa
         if match is None:
             unreadable += 1
             continue
+        # The fields are four for the latitude, four for the longitude, the validity ("A" for a 3-D fix), and pressure
+        # and GNSS altitude.
         hour, minute, second, *fields = match.groups()
         lat, lon = _parse_degrees(*fields[:4]), _parse_degrees(*fields[4:8])
         gnss = float(fields[10]) if fields[8] == "A" else math.nan

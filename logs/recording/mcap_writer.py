@@ -390,6 +390,7 @@ def _write_message_header(buffer: Bytes, position: int, size: int, channel: int,
     size: size of the message, bytes.
     log_time: ns since 1970; it is also the publish time.
     """
+    # The opcode, the length of the record, its channel, sequence number 0, log time and publish time.
     buffer[position] = MESSAGE_OPCODE
     position = _write_integer(buffer, position + 1, MESSAGE_HEADER + size, 8)
     position = _write_integer(buffer, position, channel, 2)

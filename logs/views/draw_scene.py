@@ -213,6 +213,7 @@ def _draw_ground(axes: Any, projection: Projection, grid: GroundGrid | None, bou
     up_north, up_east = np.gradient(
         np.nan_to_num(grid.heights, nan=float(np.nanmin(grid.heights))), grid.north, grid.east
     )
+    # The cosine between the ground's normal and the direction to the light, (-0.5, 0.5, 0.8) of length sqrt(1.14).
     slope_e, slope_n = projection.stretch * up_east, projection.stretch * up_north
     brightness = (0.5 * slope_e - 0.5 * slope_n + 0.8) / np.sqrt(1.14 * (1.0 + slope_e**2 + slope_n**2))
     min_height, max_height = float(np.nanmin(grid.heights)), float(np.nanmax(grid.heights))

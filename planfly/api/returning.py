@@ -352,7 +352,11 @@ def _judge_flight(setup: FlightSetup, track: Track, request: _ReturnsRequest, en
 def _suggest_remedies(
     world: ReturnWorld, starts: ReturnStarts, result: ReturnsResult, every: float
 ) -> tuple[RemedyTrial, ...]:
-    """Fly the returns again with each possible remedy, and return the remedies that help."""
+    """Simulate the returns again with each possible remedy, and return the remedies that help.
+
+    starts: starts of the returns in `result`.
+    every: time between the starts of two returns, s.
+    """
     # Remedies do not help a return that sinks to the ground in a take-off or a landing.
     judged_times = [judged_return.time for judged_return in result.returns.each]
     airborne_starts = starts.subset(np.flatnonzero(np.isin(starts.time, judged_times)))

@@ -655,7 +655,7 @@ def missing_height(measure: OverlapMeasure) -> float:
 
 
 def _with_gates(setup: FlightSetup, surveys: Sequence[Survey]) -> Mission:
-    """Return a setup's mission with gates (CONDITION_GATE) at the ends of lines that have leads.
+    """Return a setup's mission with gates (CONDITION_GATE) at the ends of photo lines with turn-around distances.
 
     The mission is unchanged for an autopilot without gates.
     """

@@ -204,13 +204,13 @@ def guess_column_table(paths: Sequence[Path], target: Path) -> str:
     """
     file_names = [Path(os.path.relpath(path, target.parent)).as_posix() for path in paths]
     files = {name: read_data_file(path) for name, path in zip(file_names, paths, strict=True)}
-    times = [clock for file, data in files.items() for clock in _find_clocks(data, file)]
+    all_clocks = [clock for file, data in files.items() for clock in _find_clocks(data, file)]
     clocks: list[_Clock] = []
-    for clock in sorted(times, key=lambda clock: -clock.length):
+    for clock in sorted(all_clocks, key=lambda clock: -clock.length):
         # Of several columns of times in a group, use the one with the most time in common with the longest group.
         clocks_of_group = [
             other
-            for other in times
+            for other in all_clocks
             if (other.file, other.prefix, other.length) == (clock.file, clock.prefix, clock.length)
         ]
         best = max(clocks_of_group, key=lambda candidate: candidate.overlap(clocks[0]) if clocks else 0.0)

@@ -141,7 +141,11 @@ def _line_rows(
 def measure_line(
     requirements: RouteRequirements, aligned: AlignedTrack, survey: Survey, line: PhotoLine
 ) -> LineMeasure | None:
-    """Measure a photo line on a flown track; return None if it was not reached or has one row."""
+    """Measure a photo line on a flown track; return None if it was not reached or has only one row.
+
+    The conditions of a usable photo are applied one after another.  A step of the line is lost by the first condition
+    that it does not meet.
+    """
     rows = _line_rows(requirements, aligned, survey, line)
     if rows is None:
         return None

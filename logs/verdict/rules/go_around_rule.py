@@ -489,9 +489,9 @@ def _next_sufficient_height(
     Heights are tried in steps of `_HEIGHT_STEP_M` up to `_MAX_HEIGHT_M`.
     worst_distance: abort point to try first, as a distance before the landing point, m.
     """
-    first = _HEIGHT_STEP_M * math.ceil(landing.climb_height / _HEIGHT_STEP_M + 1e-9)
+    lowest_height = _HEIGHT_STEP_M * math.ceil(landing.climb_height / _HEIGHT_STEP_M + 1e-9)
     distances = [worst_distance, *_abort_distances(landing).tolist()]
-    for height in np.arange(first, _MAX_HEIGHT_M + 1.0, _HEIGHT_STEP_M).tolist():
+    for height in np.arange(lowest_height, _MAX_HEIGHT_M + 1.0, _HEIGHT_STEP_M).tolist():
         for distance in distances:
             go_arounds = _simulate_go_arounds(requirements, terrain, world, landing, height, [distance])
             if not all(go_around.is_clear and not go_around.unknown_part_text for go_around in go_arounds):
