@@ -323,13 +323,7 @@ def _draw_paths(
     failed: Failures,
     placer: LabelPlacer,
 ) -> list[Any]:
-    """Draw route, track and waypoints, and mark those that fail; return the handles for the legend.
-
-    Vertical lines lead from the waypoints to the ground if the terrain is known.
-
-    route: waypoints, m, (w, 3).
-    placer: keeps labels off the drawn path.
-    """
+    """Draw route (w, 3), track, waypoints with poles to the ground, and failures; return handles for the legend."""
     _, samples = route_samples(route, max(float(route_distance(route)[-1]) / 600.0, 1.0))
     if terrain is not None:
         ground = terrain.height(route[:, 0], route[:, 1])

@@ -131,8 +131,7 @@ def flight_records(
         velocity=velocity,
         wind=wind,
         airspeed=airspeed,
-        # 1.225 kg/m^3 is the density of the standard atmosphere at sea level.
-        density=1.225 / np.square(ratio),
+        density=1.225 / np.square(ratio),  # 1.225 kg/m^3 in the standard atmosphere at sea level
         height=height,
         controls=controls,
         current=battery[:, 1],

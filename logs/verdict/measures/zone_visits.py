@@ -364,8 +364,7 @@ def _bisect_move(
 
     in_order: True to bisect until each part is on one side of the limit, and add the parts in order of time; False to
         bisect until no part can be deeper than the known depth.
-    parts: scratch records; `parts[0]` is the whole move, whose end must not change, because the next move begins there.
-        The records after it are a stack of the parts that are still to be decided.
+    parts: scratch records: the move, whose end must not change (the next move begins there), and a stack of its parts.
     """
     exclusion = records.zones[z].exclusion
     # Largest change of the height relative to the altitude band over the whole move.

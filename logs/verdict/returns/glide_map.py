@@ -446,14 +446,9 @@ def _settle_cells(
     """Fill `min_altitude`, `destination` and `next_step` by settling cells in order of altitude.
 
     This is the search of Dijkstra, against the direction of flight; see the head of this module.
-    Destinations have their altitude in `min_altitude`, all other cells inf.
-
-    floor, sphere_bottoms, sphere_tops: see `GlideMap`.
-    step_records, crossed_cells: see `glide_steps`.
+    floor, sphere_bottoms, sphere_tops: see `GlideMap`.  step_records, crossed_cells: see `glide_steps`.
     slopes: glide slope of each step at altitudes from `slopes_first_altitude`, every `altitude_step`, m per m.
-    cell: side of a cell, m.
-    first_altitude: lower end of the lowest band, m AMSL.
-    band: height of a band, m.
+    cell, band: side of a cell, and height of a band, m.  first_altitude: lower end of the lowest band, m AMSL.
     band_heads: first cell of each band, (b,); -1 for an empty band.
     links: previous and next cell of each cell in its band, (cells, 2); -1 for none.
     """

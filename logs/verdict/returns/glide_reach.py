@@ -89,6 +89,10 @@ def cell_position(grid: GlideMap, cell: int) -> tuple[float, float, float]:
     return (*grid.cell_center(row, column), float(grid.ground[row, column]))
 
 
+# The starts are of dtype `flight.autopilots.simulated_returns.RETURN_START`.  spheres, radii: centres, m, (s, 3), and
+# radii, m, (s,), of the kill spheres.  floor: lowest altitude allowed in each cell, m.  min_altitude, destination,
+# next_step: see `GlideAltitudes`; step_records: step of each index in `next_step`, in cells.  aircraft, excess_table,
+# field: point mass, its excess power by throttle and airspeed, and the wind field.
 @compiled
 def _fill_altitudes_left(
     starts: Records,
@@ -106,18 +110,7 @@ def _fill_altitudes_left(
     altitude_left: Floats,
     reached_cells: Codes,
 ) -> None:
-    """Simulate the turn to a glide from each start to either side, and write the better result.
-
-    The results are written to `altitude_left`, m, and `reached_cells`; see `remaining_glide_altitudes`.
-
-    starts: (n,) of dtype `flight.autopilots.simulated_returns.RETURN_START`.
-    spheres, radii: centres, m, (s, 3), and radii, m, (s,), of the threats' kill spheres.
-    floor: lowest altitude allowed in each cell of the map, m, (rows, columns).
-    min_altitude, destination, next_step: see `logs.verdict.returns.glide_map.GlideAltitudes`.
-    step_records: step of each index in `next_step`, in cells.
-    glider: glide and grid, `_GLIDER`.
-    aircraft, excess_table, field: point mass, its excess power by throttle and airspeed, and the wind field.
-    """
+    """Fill `altitude_left` (m) and `reached_cells` for each start, by simulating a left and a right turn to a glide."""
     state_array = np.zeros(1, _TURN_STATE)
     state = state_array[0]
     max_speed = aircraft.first_airspeed + (excess_table.shape[1] - 1) * aircraft.airspeed_step
