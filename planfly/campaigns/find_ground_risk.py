@@ -216,7 +216,7 @@ def _return_paths(setup: FlightSetup, track: Track, interval: float, *, glide: b
     """Return the paths of the returns from a track; a mission without home has no returns.
 
     interval: time between the starts of two returns, s.
-    glide: True to simulate also glides, which are returns after an engine failure.
+    glide: True to simulate also returns after an engine failure; the paths of those that reach the ground are returned.
     """
     no_returns = _ReturnPaths(np.zeros(0), [], [], [], [])
     if setup.mission.home is None:

@@ -505,6 +505,7 @@ def _refly_followed_legs(
     """Simulate followed legs with the model of an aircraft, and compare the flight with the log.
 
     aircraft, turbulence: replace the aircraft and the turbulence of the setup unless None.
+    advance: called with the distance flown, the total (m) and a text; None to report nothing.
     draw: variations of aircraft, wind and start of one sampled flight, or None.
     Raises LogError if the model flies none of the legs.
     """
@@ -513,6 +514,7 @@ def _refly_followed_legs(
     )
     if draw is not None:
         wind = scenario.wind
+        # The wind blows from `from_course`; the drawn wind is a velocity towards north and east.
         north = -wind.speed * math.cos(wind.from_course) + draw.wind[0]
         east = -wind.speed * math.sin(wind.from_course) + draw.wind[1]
         scenario = with_wind(scenario, math.hypot(north, east), math.atan2(-east, -north) % (2.0 * math.pi), turbulence)

@@ -385,6 +385,7 @@ def measure_ability(requirements: RouteRequirements, aligned: AlignedTrack, leg:
     if rate_fit is None:
         return None
     tailwind, crosswind = requirements.wind_on(leg).components_on_course(float(requirements.courses[leg]), top_altitude)
+    # The slope at the fitted climb rate, and the slope at a climb rate that is one standard error higher.
     slopes = [
         ground_slope(math.asin(min(1.0, max(-1.0, value / commanded_speed))), commanded_speed, tailwind, crosswind)
         for value in (rate_fit[0], rate_fit[0] + rate_fit[1])
