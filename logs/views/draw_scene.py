@@ -271,7 +271,8 @@ def _draw_threats(axes: Any, projection: Projection, setup: FlightSetup, failed:
 def _draw_zones(axes: Any, projection: Projection, setup: FlightSetup) -> list[Any]:
     """Draw the walls of the zones, and return their legend handles.
 
-    A wall reaches from the floor of the zone, or the ground, to its ceiling.  Without a ceiling it ends above the path.
+    A wall reaches from the floor of the zone, or the ground, to its ceiling.  Without a ceiling it ends
+    50 m above the path's highest point.
     """
     zones, route = setup.scenario.zones, setup.route.positions
     min_altitude, max_altitude = float(route[:, 2].min()), float(route[:, 2].max()) + 50.0

@@ -235,6 +235,7 @@ def _format_reactions(numbers: BaseModel, values: Floats, base_properties: list[
     functions = _format_motor_functions(motor)
     functions["battery-power-w"] = f"<product> <p> {DRIVE_POWER} </p> {functions['battery-power-w']} </product>"
     body = "\n".join(f'<function name="motor/{name}"> {text} </function>' for name, text in functions.items())
+    # JSBSim wants the moment in lbf ft and the force in lbf: the factors convert from N m and N.
     torque = """<moment name="torque" frame="BODY">
   <function> <product> <p> motor/torque-n_m </p> <v> -0.7375621492772654 </v> </product> </function>
   <direction> <x> 1 </x> <y> 0 </y> <z> 0 </z> </direction>

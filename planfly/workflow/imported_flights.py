@@ -565,4 +565,5 @@ def _followed_legs(setup: FlightSetup, track: Track) -> list[FlownLegs]:
         raise LogError(
             f"{name}: the flight followed no leg of its mission, so there is nothing to fly again", file=name
         )
+    # The difference is the number of legs, negated.
     return sorted(stretch_legs, key=lambda legs: legs.first - legs.last)

@@ -240,8 +240,8 @@ def _read_controls(log: ColumnLog) -> tuple[Samples, tuple[bool, bool, bool], bo
 def _read_surface(log: ColumnLog, name: str, halves: tuple[str, ...]) -> tuple[Series, str] | None:
     """Return a surface's deflections and their unit, or None if the table lacks them.
 
-    They come from the surface's own column, or else from the columns of its left and right half.  Raises LogError if
-    one half is an angle and the other a fraction.
+    They come from the surface's own column, or else from the columns of its left and right half: as their mean, or for
+    ailerons as half their difference.  Raises LogError if one half is an angle and the other a fraction.
     """
     if log.has(name):
         return log.series(name), log.unit(name)

@@ -111,7 +111,7 @@ def _return_limits(world: ReturnWorld, starts: ReturnStarts, margin: float = MAR
 
 def meets_return_limits(world: ReturnWorld, starts: ReturnStarts) -> Flags:
     """Return a mask (n,): True for each start whose simulated RTL keeps all limits, without `MARGIN`."""
-    return _rtls_meet_criterion(world, starts, _return_limits(world, starts, 0.0), _meets_all_limits)
+    return _rtls_meet_criterion(world, starts, _return_limits(world, starts, margin=0.0), _meets_all_limits)
 
 
 def _clears_ground(_world: ReturnWorld, results: Records, limits: _ReturnLimits) -> Flags:
@@ -199,15 +199,15 @@ def suggest_parameters(world: ReturnWorld, starts: ReturnStarts) -> list[Remedy]
     lowest_values: dict[str, float] = {}
     for present_values in world.autopilot.returns.trials.altitudes:
         search = _AltitudeSearch(world, present_values)
-        ground_altitude = search.lowest(0.0, _clears_ground, trial)
+        ground_altitude = search.lowest(min_altitude=0.0, criterion=_clears_ground, trial=trial)
         if ground_altitude is not None and ground_altitude > search.current:
             lowest_values = lowest_values or search.values(ground_altitude)
             remedies.append(Remedy(search.values(ground_altitude)))
         safe_altitude = search.lowest(ground_altitude or 0.0, _meets_all_limits, trial)
         if safe_altitude is None:
             # No height keeps the margin on all returns: take the lowest height with which they are safe.
-            trial_without_margin = _ReturnTrial(starts, _return_limits(world, starts, 0.0))
-            safe_altitude = search.lowest(0.0, _meets_all_limits, trial_without_margin)
+            trial_without_margin = _ReturnTrial(starts, _return_limits(world, starts, margin=0.0))
+            safe_altitude = search.lowest(min_altitude=0.0, criterion=_meets_all_limits, trial=trial_without_margin)
         if safe_altitude is not None and safe_altitude not in (ground_altitude, search.current):
             remedies.append(Remedy(search.values(safe_altitude)))
         if safe_altitude is not None:
