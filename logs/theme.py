@@ -1,6 +1,6 @@
 """Define the colours, line widths and dashes of all pictures, pages and scenes; no other file states any.
 
-A role ("missile", "planned") has one look, in a light and a dark variant.  PNG and SVG files use the light variant.
+A role ("missile", "planned") has one style, in a light and a dark variant.  PNG and SVG files use the light variant.
 Pages switch between both by the reader's preference.  Scenes of Foxglove and Rerun are black and use the dark variant.
 Charts name roles, never colours.
 
@@ -25,7 +25,7 @@ _BROWN = "#7a1f1f"
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class RoleStyle:
     """Style in which a role is drawn.
 
     light, dark: colour on light and on dark ground, "#rrggbb".
@@ -53,102 +53,102 @@ class Look:
     halo: bool = False
 
 
-_MISSILE = Look(_VERMILLION, "#ff8033")
-_RADAR = Look(_GREEN, "#2fc79a", dash=(5.0, 3.0), fill=0.05)
-_PLANNED = Look(_SKY, _SKY, width=3.6, halo=True)
-_FLOWN = Look("#000000", "#f4f4f4", width=1.1)
-_FAIL = Look(_PURPLE, "#e87cc4", width=2.2, size=12.0)
-_ZONE = Look(_BROWN, "#e89090", fill=0.14, hatch="////")
-_SECOND = Look(_BLUE, "#7cc0f5", width=1.8)
+_MISSILE = RoleStyle(_VERMILLION, "#ff8033")
+_RADAR = RoleStyle(_GREEN, "#2fc79a", dash=(5.0, 3.0), fill=0.05)
+_PLANNED = RoleStyle(_SKY, _SKY, width=3.6, halo=True)
+_FLOWN = RoleStyle("#000000", "#f4f4f4", width=1.1)
+_FAIL = RoleStyle(_PURPLE, "#e87cc4", width=2.2, size=12.0)
+_ZONE = RoleStyle(_BROWN, "#e89090", fill=0.14, hatch="////")
+_SECOND = RoleStyle(_BLUE, "#7cc0f5", width=1.8)
 _GREY = "#6b6b6b"
 _PALE_GREY = "#a9adb5"
 # Looks of the path by the outcome of a return, and by the destination in reach without an engine.
-_SAFE = Look(_GREEN, "#2fc79a", width=4.4, halo=True)
-_WRONG = Look(_PURPLE, "#e87cc4", width=4.4, dash=(5.0, 1.0), halo=True)
-_SHORT = Look(_ORANGE, "#ffb938", width=4.4, dash=(9.0, 2.0), halo=True)
+_SAFE = RoleStyle(_GREEN, "#2fc79a", width=4.4, halo=True)
+_WRONG = RoleStyle(_PURPLE, "#e87cc4", width=4.4, dash=(5.0, 1.0), halo=True)
+_SHORT = RoleStyle(_ORANGE, "#ffb938", width=4.4, dash=(9.0, 2.0), halo=True)
 _SPARE = 1.8  # width of a line of altitude to spare
-_NOT_KNOWN = Look(_GREY, _PALE_GREY, width=4.4, dash=(2.0, 3.0), halo=True)
+_NOT_KNOWN = RoleStyle(_GREY, _PALE_GREY, width=4.4, dash=(2.0, 3.0), halo=True)
 
 # Looks of the data, by role.
-LOOKS = {
+ROLE_STYLES = {
     "missile": _MISSILE,
-    "missile-reach": Look(_MISSILE.light, _MISSILE.dark, width=0.0, fill=0.3),
+    "missile-reach": RoleStyle(_MISSILE.light, _MISSILE.dark, width=0.0, fill=0.3),
     "radar": _RADAR,
-    "limit": Look(_VIOLET, "#b9a2ec", width=1.4, dash=(6.0, 2.5)),
-    "steady-limit": Look(_VIOLET, "#b9a2ec", width=1.8),
+    "limit": RoleStyle(_VIOLET, "#b9a2ec", width=1.4, dash=(6.0, 2.5)),
+    "steady-limit": RoleStyle(_VIOLET, "#b9a2ec", width=1.8),
     "planned": _PLANNED,
-    "planned-leg": Look("#1d1d1f", "#e8e8ea", width=0.8, size=7.0, face="planned"),
-    "searched": Look("#555555", "#a9adb5", width=1.2, dash=(6.0, 2.0, 1.5, 2.0)),
+    "planned-leg": RoleStyle("#1d1d1f", "#e8e8ea", width=0.8, size=7.0, face="planned"),
+    "searched": RoleStyle("#555555", "#a9adb5", width=1.2, dash=(6.0, 2.0, 1.5, 2.0)),
     "flown": _FLOWN,
-    "moment": Look(_FLOWN.light, _FLOWN.dark, size=2.4, fill=0.3),
-    "commanded": Look(_ORANGE, "#ffb938", width=2.0),
+    "moment": RoleStyle(_FLOWN.light, _FLOWN.dark, size=2.4, fill=0.3),
+    "commanded": RoleStyle(_ORANGE, "#ffb938", width=2.0),
     "second": _SECOND,
-    "other": Look(_VERMILLION, "#ff8033", width=1.4, dash=(5.0, 2.0)),
-    "band": Look(_VERMILLION, "#ff8033", width=0.0, fill=0.25),
-    "difference": Look(_GREY, _PALE_GREY, width=1.0, fill=0.25),
-    "waypoint": Look(_BLUE, "#7cc0f5", width=1.0, size=4.6, face="paper"),
-    "waypoint-small": Look(_BLUE, "#7cc0f5", width=0.5, size=1.6, face="paper"),
-    "start": Look("#000000", "#000000", width=1.0, size=9.0, face="highlight", marker="triangle"),
-    "destination": Look("#000000", "#000000", width=1.0, size=13.0, face="highlight", marker="star"),
-    "unit": Look("#333333", "#e8e8ea", width=0.8, size=3.5, marker="cross"),
+    "other": RoleStyle(_VERMILLION, "#ff8033", width=1.4, dash=(5.0, 2.0)),
+    "band": RoleStyle(_VERMILLION, "#ff8033", width=0.0, fill=0.25),
+    "difference": RoleStyle(_GREY, _PALE_GREY, width=1.0, fill=0.25),
+    "waypoint": RoleStyle(_BLUE, "#7cc0f5", width=1.0, size=4.6, face="paper"),
+    "waypoint-small": RoleStyle(_BLUE, "#7cc0f5", width=0.5, size=1.6, face="paper"),
+    "start": RoleStyle("#000000", "#000000", width=1.0, size=9.0, face="highlight", marker="triangle"),
+    "destination": RoleStyle("#000000", "#000000", width=1.0, size=13.0, face="highlight", marker="star"),
+    "unit": RoleStyle("#333333", "#e8e8ea", width=0.8, size=3.5, marker="cross"),
     "fail": _FAIL,
-    "failing-leg": Look(_FAIL.light, _FAIL.dark, width=9.5, fill=0.9),
-    "inside": Look(_FAIL.light, _FAIL.dark, width=3.6),
-    "entered": Look(_FAIL.light, _FAIL.dark, width=1.8, fill=0.16),
-    "held": Look(_FAIL.light, _FAIL.dark, width=0.0, fill=0.25),
+    "failing-leg": RoleStyle(_FAIL.light, _FAIL.dark, width=9.5, fill=0.9),
+    "inside": RoleStyle(_FAIL.light, _FAIL.dark, width=3.6),
+    "entered": RoleStyle(_FAIL.light, _FAIL.dark, width=1.8, fill=0.16),
+    "held": RoleStyle(_FAIL.light, _FAIL.dark, width=0.0, fill=0.25),
     "zone": _ZONE,
-    "stay-in": Look(_ZONE.light, _ZONE.dark, width=2.2),
-    "terrain": Look("#cdbf9f", "#6e6447", width=0.9, fill=1.0, edge="contour"),
-    "contour": Look("#6b5a3a", "#c9b994", width=0.6),
-    "clearance": Look("#f8dfa6", "#4d3d1d", width=0.0, fill=1.0, edge="commanded", hatch="////"),
-    "area": Look("#555555", "#a9adb5", width=0.9, dash=(8.0, 3.0)),
-    "pole": Look("#555555", "#a9adb5", width=0.7),
-    "level-ground": Look("#8b8b92", "#7d838d", width=0.8, fill=0.1),
-    "aircraft": Look("#c8102e", "#ff5a6e", width=2.0),
+    "stay-in": RoleStyle(_ZONE.light, _ZONE.dark, width=2.2),
+    "terrain": RoleStyle("#cdbf9f", "#6e6447", width=0.9, fill=1.0, edge="contour"),
+    "contour": RoleStyle("#6b5a3a", "#c9b994", width=0.6),
+    "clearance": RoleStyle("#f8dfa6", "#4d3d1d", width=0.0, fill=1.0, edge="commanded", hatch="////"),
+    "area": RoleStyle("#555555", "#a9adb5", width=0.9, dash=(8.0, 3.0)),
+    "pole": RoleStyle("#555555", "#a9adb5", width=0.7),
+    "level-ground": RoleStyle("#8b8b92", "#7d838d", width=0.8, fill=0.1),
+    "aircraft": RoleStyle("#c8102e", "#ff5a6e", width=2.0),
     "return-safe": _SAFE,
     "return-ground": _WRONG,
-    "return-threat": Look(_MISSILE.light, _MISSILE.dark, width=4.4, dash=(3.0, 1.5), halo=True),
-    "return-zone": Look(_BROWN, "#e89090", width=4.4, dash=(9.0, 2.0, 2.0, 2.0), halo=True),
-    "return-lost": Look(_BLUE, "#7cc0f5", width=4.4, dash=(6.0, 2.0, 2.0, 2.0), halo=True),
-    "return-energy": Look(_BLUE, "#7cc0f5", width=4.4, dash=(2.0, 1.5), halo=True),
+    "return-threat": RoleStyle(_MISSILE.light, _MISSILE.dark, width=4.4, dash=(3.0, 1.5), halo=True),
+    "return-zone": RoleStyle(_BROWN, "#e89090", width=4.4, dash=(9.0, 2.0, 2.0, 2.0), halo=True),
+    "return-lost": RoleStyle(_BLUE, "#7cc0f5", width=4.4, dash=(6.0, 2.0, 2.0, 2.0), halo=True),
+    "return-energy": RoleStyle(_BLUE, "#7cc0f5", width=4.4, dash=(2.0, 1.5), halo=True),
     "return-low": _SHORT,
     "return-unknown": _NOT_KNOWN,
-    "return-power": Look(_BLUE, "#7cc0f5", width=4.4, dash=(6.0, 3.0), halo=True),
-    "return-used": Look(_BLUE, "#7cc0f5", width=4.4, dash=(2.0, 3.0), halo=True),
-    "return-unsure": Look(_GREY, _PALE_GREY, width=4.4, dash=(6.0, 3.0), halo=True),
-    "return-way": Look("#1d1d1f", "#f4f4f4", width=1.5, dash=(9.0, 2.0), halo=True),
+    "return-power": RoleStyle(_BLUE, "#7cc0f5", width=4.4, dash=(6.0, 3.0), halo=True),
+    "return-used": RoleStyle(_BLUE, "#7cc0f5", width=4.4, dash=(2.0, 3.0), halo=True),
+    "return-unsure": RoleStyle(_GREY, _PALE_GREY, width=4.4, dash=(6.0, 3.0), halo=True),
+    "return-way": RoleStyle("#1d1d1f", "#f4f4f4", width=1.5, dash=(9.0, 2.0), halo=True),
     "reach-home": _SAFE,
-    "reach-site": Look(_BLUE, "#7cc0f5", width=4.4, dash=(14.0, 2.0), halo=True),
+    "reach-site": RoleStyle(_BLUE, "#7cc0f5", width=4.4, dash=(14.0, 2.0), halo=True),
     "reach-flat": _SHORT,
     "reach-nothing": _WRONG,
     "reach-unknown": _NOT_KNOWN,
-    "left-home": Look(_GREEN, "#2fc79a", width=_SPARE),
-    "left-site": Look(_BLUE, "#7cc0f5", width=2.4 * _SPARE),
-    "left-flat": Look(_ORANGE, "#ffb938", width=_SPARE, dash=(4.0, 1.5)),
-    "glide-near": Look(_BLUE, "#7cc0f5", width=0.0, fill=0.58),
-    "glide-middle": Look(_BLUE, "#7cc0f5", width=0.0, fill=0.4),
-    "glide-far": Look(_BLUE, "#7cc0f5", width=0.0, fill=0.22),
-    "landable": Look(_YELLOW, _YELLOW, width=0.0, fill=0.45, hatch="..."),
-    "coverage-weak": Look(_ORANGE, "#ffb938", width=0.0, fill=0.32),
-    "coverage-lost": Look(_PURPLE, "#e87cc4", width=0.0, fill=0.22, hatch="\\\\"),
-    "coverage-ground": Look(_GREY, _PALE_GREY, width=0.0, fill=0.45, hatch="xxx"),
-    "flight-geography": Look(_GREEN, "#2fc79a", width=1.8, fill=0.06, halo=True),
-    "contingency-volume": Look(_ORANGE, "#ffb938", width=2.2, dash=(8.0, 2.0), fill=0.06, halo=True),
-    "ground-risk-buffer": Look(_VERMILLION, "#ff8033", width=2.4, dash=(4.0, 1.5), fill=0.06, halo=True),
-    "population-0": Look(_VIOLET, "#b9a2ec", width=0.0, fill=0.04),
-    "population-1": Look(_VIOLET, "#b9a2ec", width=0.0, fill=0.14),
-    "population-2": Look(_VIOLET, "#b9a2ec", width=0.0, fill=0.28),
-    "population-3": Look(_VIOLET, "#b9a2ec", width=0.0, fill=0.44),
-    "population-4": Look(_VIOLET, "#b9a2ec", width=0.0, fill=0.62),
-    "population-5": Look(_VIOLET, "#b9a2ec", width=0.0, fill=0.85),
-    "front-other": Look(_GREY, _PALE_GREY, width=0.9, size=4.0, halo=True),
-    "front-shortest": Look(_BLUE, "#7cc0f5", width=2.2, size=7.0, halo=True),
-    "front-unseen": Look(_PURPLE, "#e87cc4", width=2.2, dash=(8.0, 2.0), size=7.0, marker="triangle", halo=True),
-    "front-high": Look(_ORANGE, "#ffb938", width=2.2, dash=(4.0, 1.5), size=9.0, marker="star", halo=True),
-    "front-sparing": Look(
+    "left-home": RoleStyle(_GREEN, "#2fc79a", width=_SPARE),
+    "left-site": RoleStyle(_BLUE, "#7cc0f5", width=2.4 * _SPARE),
+    "left-flat": RoleStyle(_ORANGE, "#ffb938", width=_SPARE, dash=(4.0, 1.5)),
+    "glide-near": RoleStyle(_BLUE, "#7cc0f5", width=0.0, fill=0.58),
+    "glide-middle": RoleStyle(_BLUE, "#7cc0f5", width=0.0, fill=0.4),
+    "glide-far": RoleStyle(_BLUE, "#7cc0f5", width=0.0, fill=0.22),
+    "landable": RoleStyle(_YELLOW, _YELLOW, width=0.0, fill=0.45, hatch="..."),
+    "coverage-weak": RoleStyle(_ORANGE, "#ffb938", width=0.0, fill=0.32),
+    "coverage-lost": RoleStyle(_PURPLE, "#e87cc4", width=0.0, fill=0.22, hatch="\\\\"),
+    "coverage-ground": RoleStyle(_GREY, _PALE_GREY, width=0.0, fill=0.45, hatch="xxx"),
+    "flight-geography": RoleStyle(_GREEN, "#2fc79a", width=1.8, fill=0.06, halo=True),
+    "contingency-volume": RoleStyle(_ORANGE, "#ffb938", width=2.2, dash=(8.0, 2.0), fill=0.06, halo=True),
+    "ground-risk-buffer": RoleStyle(_VERMILLION, "#ff8033", width=2.4, dash=(4.0, 1.5), fill=0.06, halo=True),
+    "population-0": RoleStyle(_VIOLET, "#b9a2ec", width=0.0, fill=0.04),
+    "population-1": RoleStyle(_VIOLET, "#b9a2ec", width=0.0, fill=0.14),
+    "population-2": RoleStyle(_VIOLET, "#b9a2ec", width=0.0, fill=0.28),
+    "population-3": RoleStyle(_VIOLET, "#b9a2ec", width=0.0, fill=0.44),
+    "population-4": RoleStyle(_VIOLET, "#b9a2ec", width=0.0, fill=0.62),
+    "population-5": RoleStyle(_VIOLET, "#b9a2ec", width=0.0, fill=0.85),
+    "front-other": RoleStyle(_GREY, _PALE_GREY, width=0.9, size=4.0, halo=True),
+    "front-shortest": RoleStyle(_BLUE, "#7cc0f5", width=2.2, size=7.0, halo=True),
+    "front-unseen": RoleStyle(_PURPLE, "#e87cc4", width=2.2, dash=(8.0, 2.0), size=7.0, marker="triangle", halo=True),
+    "front-high": RoleStyle(_ORANGE, "#ffb938", width=2.2, dash=(4.0, 1.5), size=9.0, marker="star", halo=True),
+    "front-sparing": RoleStyle(
         _FLOWN.light, _FLOWN.dark, width=2.2, dash=(8.0, 1.5, 1.5, 1.5), size=7.0, marker="cross", halo=True
     ),
-    "comes-down": Look("#333333", "#e8e8ea", width=1.0, size=3.4, face="paper"),
+    "comes-down": RoleStyle("#333333", "#e8e8ea", width=1.0, size=3.4, face="paper"),
 }
 
 # Colours of axes and page, by use: light and dark.
@@ -200,8 +200,8 @@ def colour(name: str, *, dark: bool = False) -> str:
     >>> colour("flown"), colour("paper", dark=True)
     ('#000000', '#16181c')
     """
-    look = LOOKS.get(name)
-    light, night = (look.light, look.dark) if look is not None else PAGE[name]
+    role_style = ROLE_STYLES.get(name)
+    light, night = (role_style.light, role_style.dark) if role_style is not None else PAGE[name]
     return night if dark else light
 
 
@@ -233,7 +233,14 @@ def palette_colours() -> tuple[str, ...]:
     True
     """
     return tuple(
-        dict.fromkeys([*(look.light for look in LOOKS.values()), colour("paper"), colour("ink"), colour("highlight")])
+        dict.fromkeys(
+            [
+                *(role_style.light for role_style in ROLE_STYLES.values()),
+                colour("paper"),
+                colour("ink"),
+                colour("highlight"),
+            ]
+        )
     )
 
 
@@ -247,7 +254,7 @@ def css_variables() -> str:
     """
     rules = []
     for dark in (False, True):
-        names = {name: colour(name, dark=dark) for name in (*PAGE, *LOOKS)}
+        names = {name: colour(name, dark=dark) for name in (*PAGE, *ROLE_STYLES)}
         names |= {f"ground-{k}": text for k, text in enumerate(GROUND_DARK if dark else GROUND)}
         values = " ".join(f"--{name}: {text};" for name, text in names.items())
         rules.append(f":root {{ color-scheme: {'dark' if dark else 'light'}; {values} }}")
@@ -268,7 +275,7 @@ def replace_colours_by_css_variables(svg: str) -> str:
     'fill: var(--ink); stroke: #123456'
     """
     variable_by_colour = {text: f"ground-{k}" for k, text in reversed(list(enumerate(GROUND)))}
-    variable_by_colour |= {colour(name): name for name in reversed((*PAGE, *LOOKS))}
+    variable_by_colour |= {colour(name): name for name in reversed((*PAGE, *ROLE_STYLES))}
 
     def replace_colour(match: re.Match[str]) -> str:
         """Return the variable of a matched colour; a colour without a variable is kept."""
@@ -294,13 +301,13 @@ def page_styles() -> dict[str, dict[str, object]]:
     """
     return {
         name: {
-            "width": round(_PIXELS * look.width, 2),
-            "dash": ",".join(f"{_PIXELS * part:g}px" for part in look.dash) or "solid",
-            "fill": look.fill,
-            "size": round(_PIXELS * look.size, 2),
-            "face": look.face or name,
-            "edge": look.edge or name,
-            "symbol": _SYMBOLS[look.marker],
+            "width": round(_PIXELS * role_style.width, 2),
+            "dash": ",".join(f"{_PIXELS * part:g}px" for part in role_style.dash) or "solid",
+            "fill": role_style.fill,
+            "size": round(_PIXELS * role_style.size, 2),
+            "face": role_style.face or name,
+            "edge": role_style.edge or name,
+            "symbol": _SYMBOLS[role_style.marker],
         }
-        for name, look in LOOKS.items()
+        for name, role_style in ROLE_STYLES.items()
     }

@@ -304,7 +304,10 @@ __all__ = ["__version__", *_HOMES]
 
 
 def __getattr__(name: str) -> Any:
-    """Return a public name, loading its module at the first use, because ``planfly --help`` needs no such module."""
+    """Return a public name of the package, whose module is loaded only at the first use.
+
+    ``planfly --help`` is faster without these modules.  Raises AttributeError for an unknown name.
+    """
     if name in _HOMES:
         from importlib import import_module
 

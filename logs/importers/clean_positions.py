@@ -274,10 +274,10 @@ def _is_in_large_group(time: Floats) -> Flags:
 
 
 def _remove_forward_jumps(time: Floats, values: Floats) -> tuple[Floats, tuple[tuple[float, float], ...]]:
-    """Remove forward clock jumps: long pauses in which a moving vehicle hardly changed its position.
+    """Remove forward clock jumps: long time steps over which a moving vehicle hardly changed its position.
 
     values: latitude and longitude (deg) and altitude (m), (n, 3).
-    Returns the shifted times, s, and the shifts as in `CleanPositions.shifts`.
+    Returns the shifted times, s, and the shifts as in `CleanPositions.shifts`.  Fewer than 20 rows stay unchanged.
     """
     shifts: list[tuple[float, float]] = []
     if time.size < 20:

@@ -350,7 +350,7 @@ def _walk_messages(
     lengths: length of each message type, bytes, (256,), updated by the FMT messages.
     counts: number of messages of each type, (256,), which is updated.
     header_bytes: length of a message's header, bytes.  fmt_type: message type of FMT messages.
-    max_trailing_bytes: largest number of bytes at the end that need not be a message.
+    max_trailing_bytes: bytes at the end that need not be a message.  is_requested: mask of the types to find, (256,).
     """
     starts, kinds = np.empty(1024, np.int64), np.empty(1024, np.uint8)
     found_count, data_end = 0, data.size

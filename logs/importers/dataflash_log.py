@@ -335,6 +335,7 @@ class _Reader:
         if position is None or not len(position.time):
             return np.ones(len(time))
         order = np.argsort(position.time, kind="stable")
+        # Limit implausible altitudes to the range of the standard atmosphere.
         altitudes = np.clip(np.interp(time, position.time[order], position.values[order, 2]), -500.0, 20_000.0)
         return np.array([eas_to_tas_ratio(float(altitude)) for altitude in altitudes])
 

@@ -338,6 +338,7 @@ def _interpolate_at(series: LogSeries | None, name: str, time: Floats, positions
     interpolated = np.full((time.size, width), math.nan)
     if series is None:
         return interpolated
+    # Values of 1e7 and more are garbage.
     is_valid = (
         np.isfinite(series.time) & np.isfinite(series.values).all(axis=1) & (np.abs(series.values) < 1e7).all(axis=1)
     )

@@ -83,7 +83,7 @@ def combine_items(rows: Iterable[LoggedItem]) -> list[LoggedItemGroup]:
     return combined
 
 
-def _starts_new_mission(following: MissionItem | None, items: Mapping[int, MissionItem]) -> bool:
+def _starts_new_mission(next_item: MissionItem | None, items: Mapping[int, MissionItem]) -> bool:
     """Return True if an item 0 starts a new mission, judged by the item that follows it.
 
     The result is True if the following item is item 1, is not in the mission so far, or differs from the mission's
@@ -91,9 +91,9 @@ def _starts_new_mission(following: MissionItem | None, items: Mapping[int, Missi
 
     items: items of the mission so far, by number.
     """
-    if following is None or following.seq == 0:
+    if next_item is None or next_item.seq == 0:
         return False
-    return following.seq == 1 or following.seq not in items or not _is_same_item(items[following.seq], following)
+    return next_item.seq == 1 or next_item.seq not in items or not _is_same_item(items[next_item.seq], next_item)
 
 
 def _is_same_mission(first: LoggedItemGroup, second: LoggedItemGroup) -> bool:
@@ -147,6 +147,7 @@ def make_logged_mission(logged: LoggedItemGroup, source: str, origin: str) -> Lo
         problem = item_problem(item)
         if problem is not None:
             warnings.append(f"item {item.seq}: left out: {problem}")
+        # Item 0, a waypoint (command 16), is home.
         elif item.seq == 0 and item.command == 16:
             if item.has_position:
                 home = Home(item.lat_deg, item.lon_deg, item.alt)
@@ -304,6 +305,7 @@ def describe_px4_mode(custom_mode: int) -> tuple[str, bool]:
     >>> describe_px4_mode(4 << 24 | 4 << 16)
     ('MISSION', True)
     """
+    # PX4 has the main mode in the third byte, and the sub-mode in the fourth.
     main, sub = custom_mode >> 16 & 0xFF, custom_mode >> 24 & 0xFF
     name = _PX4_SUB.get(sub) if main == _PX4_AUTO else _PX4_MAIN.get(main)
     return name or "UNKNOWN", (main, sub) == (_PX4_AUTO, _PX4_AUTO_MISSION)

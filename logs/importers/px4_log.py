@@ -469,6 +469,7 @@ class Topics:
         """Return the name and the release of the program."""
         info = self._log.msg_info_dict
         name, release = str(info.get("sys_name", "PX4")), info.get("ver_sw_release")
+        # The bytes of the release are, from the highest: major, minor and patch number, and kind of release.
         if isinstance(release, int):
             return f"{name} v{release >> 24 & 0xFF}.{release >> 16 & 0xFF}.{release >> 8 & 0xFF}"
         return name

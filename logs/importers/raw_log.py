@@ -211,7 +211,7 @@ def example_raw_log(lat: float = 46.0, lon: float = 8.0, up: float = EXAMPLE_ALT
         },
         heights=(HeightSource("GPS.Alt", "amsl", make_series("GPS", height + 0.5)),),
         datum="amsl",
-        modes=(ModeChange(20.0, "AUTO", True),),
+        modes=(ModeChange(20.0, "AUTO", automatic=True),),
         missions=(LoggedMission(20.0, Mission(home, items, source="example.BIN"), "CMD"),),
         parameters={
             "WP_RADIUS": 60.0,

@@ -139,6 +139,7 @@ class TelemetryReader:
     def _read_message_number(self, position: int) -> int:
         """Return the message number of the packet in the record at a position."""
         packet = position + _STAMP.size
+        # MAVLink 1 has the number in byte 5, MAVLink 2 in bytes 7 to 9.
         if self.data[packet] == _V1:
             return self.data[packet + 5]
         return self.data[packet + 7] | self.data[packet + 8] << 8 | self.data[packet + 9] << 16
@@ -393,8 +394,8 @@ class VehicleMessages:
                 else None
             )
         if positions is not None:
+            # Sent in 1e-7 degrees, mm and cm/s.  Round to 1e-7 degrees, the resolution of the message.
             scaled = positions.values * np.array([1e-7, 1e-7, 1e-3, 0.01, 0.01, -0.01])
-            # Round to 1e-7 degrees, the resolution of the message.
             scaled[:, :2] = np.round(scaled[:, :2], 7)
             yield "position", LogSeries(positions.source, positions.time, scaled[:, :3])
             yield "velocity", LogSeries(positions.source, positions.time, scaled[:, 3:])
@@ -441,6 +442,7 @@ class VehicleMessages:
         """Return the battery's current (A) and the energy used (Wh), (n, 2); None if neither was measured."""
         table = self._read_measured_table("BATTERY_STATUS", ("current_battery", "energy_consumed"))
         if table is not None and np.any(table.values[:, 1] > 0.0):
+            # The current is sent in units of 10 mA, and the energy in hectojoules, of which 36 are 1 Wh.
             current = np.maximum(table.values[:, 0] * 0.01, 0.0)
             return LogSeries(table.source, table.time, np.stack([current, table.values[:, 1] / 36.0], axis=1))
         battery = self.battery()
@@ -574,6 +576,6 @@ def _make_px4_mission(logged: LoggedItemGroup, source: str, origin: str) -> Logg
 
     Return None if the mission is complete but has fewer than two items.
     """
-    mission = Mission(None, renumber_px4_items(logged.items), source=f"{source}: {origin}")
+    mission = Mission(home=None, items=renumber_px4_items(logged.items), source=f"{source}: {origin}")
     end = max(logged.total, mission.items[-1].seq)
     return without_gaps(LoggedMission(logged.time, mission, origin), logged.total, end)

@@ -150,7 +150,7 @@ def _make_routes(gpx: gpxpy.gpx.GPX, source: str) -> list[LoggedMission]:
             for number, point in enumerate(route.points, 1)
         )
         if len(items) > 1:
-            mission = Mission(None, items, source=f"{source}: route {route.name or ''}".rstrip())
+            mission = Mission(home=None, items=items, source=f"{source}: route {route.name or ''}".rstrip())
             missions.append(LoggedMission(0.0, mission, "route", has_altitudes))
     return missions
 
@@ -225,6 +225,8 @@ def _parse_fixes(lines: list[str]) -> tuple[list[tuple[float, float, float, floa
         if match is None:
             unreadable += 1
             continue
+        # The fields are four for the latitude, four for the longitude, the validity ("A" for a 3-D fix), and pressure
+        # and GNSS altitude.
         hour, minute, second, *fields = match.groups()
         lat, lon = _parse_degrees(*fields[:4]), _parse_degrees(*fields[4:8])
         gnss = float(fields[10]) if fields[8] == "A" else math.nan
@@ -240,7 +242,10 @@ def _unwrap_midnight(time: np.ndarray) -> np.ndarray:
 
 
 def _parse_midnight(lines: list[str]) -> float:
-    """Return the UTC midnight before the flight, s since 1970; NaN if the file states no valid date."""
+    """Return the UTC midnight before the flight, s since 1970; NaN if no line has a valid date.
+
+    The file's years have two digits: 80 to 99 are 1980 to 1999.
+    """
     for line in lines:
         match = _DATE.match(line)
         if match:
@@ -293,7 +298,11 @@ def _make_task(lines: list[str], source: str) -> tuple[LoggedMission, ...]:
     )
     if len(items) < 2:
         return ()
-    return (LoggedMission(0.0, Mission(None, items, source=f"{source}: declared task"), "declared task", False),)
+    return (
+        LoggedMission(
+            0.0, Mission(home=None, items=items, source=f"{source}: declared task"), "declared task", with_heights=False
+        ),
+    )
 
 
 # ----------------------------------------------------------------------

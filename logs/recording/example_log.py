@@ -100,7 +100,7 @@ def _mission(scenario: Scenario) -> Mission:
         MissionItem(k + 1, int(Command.NAV_WAYPOINT), 0, (0.0, 0.0, 0.0, 0.0), float(lat[k]), float(lon[k]), float(up))
         for k, up in enumerate(_WAYPOINTS[:, 2])
     )
-    return Mission(None, items, source="example")
+    return Mission(home=None, items=items, source="example")
 
 
 def _envelope() -> Envelope:

@@ -294,6 +294,7 @@ def zones_scene(time_ns: int, scenario: Scenario, waypoints: Floats) -> bytes:
     """
     entity = _entity(time_ns, "zones")
     min_altitude = float(waypoints[:, 2].min())
+    # Zones without a ceiling end 50 m above the path.
     max_altitude = float(waypoints[:, 2].max()) + 50.0
     for zone in scenario.zones:
         walls = zone_walls(zone, scenario.terrain, min_altitude, max_altitude)

@@ -280,6 +280,7 @@ def aircraft_cloud(time_ns: int) -> bytes:
 
 def threats_cloud(time_ns: int, threats: Threats) -> bytes:
     """Encode the spheres of missiles and radars as evenly distributed points."""
+    # A Fibonacci lattice: equal steps in height, each turned by the golden angle.
     k = np.arange(_SPHERE_POINTS) + 0.5
     height, angle = 1.0 - 2.0 * k / _SPHERE_POINTS, math.pi * (1.0 + math.sqrt(5.0)) * k
     sphere = np.stack(

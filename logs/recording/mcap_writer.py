@@ -374,7 +374,7 @@ def _write_integer(buffer: Bytes, position: int, value: int, size: int) -> int:
 
 @inner
 def _write_varint(buffer: Bytes, position: int, value: int) -> int:
-    """Write a value as a protobuf varint, and return the position after it."""
+    """Write a value as a protobuf varint, seven bits in each byte, and return the position after it."""
     while value > 127:
         buffer[position] = (value & 127) | 128
         value >>= 7
@@ -390,6 +390,7 @@ def _write_message_header(buffer: Bytes, position: int, size: int, channel: int,
     size: size of the message, bytes.
     log_time: ns since 1970; it is also the publish time.
     """
+    # The opcode, the length of the record, its channel, sequence number 0, log time and publish time.
     buffer[position] = MESSAGE_OPCODE
     position = _write_integer(buffer, position + 1, MESSAGE_HEADER + size, 8)
     position = _write_integer(buffer, position, channel, 2)
@@ -557,6 +558,7 @@ def _index_messages(
                 continue
             index.offset = position - chunk.index_start
             length = index.messages * _INDEX_ENTRY
+            # The last argument of `_write_integer` is the size of the integer, bytes.
             index_records[position] = _INDEX_OPCODE
             position = _write_integer(index_records, position + 1, 6 + length, 8)
             position = _write_integer(index_records, position, channel, 2)
@@ -601,12 +603,12 @@ def _message_entries(other_messages: list[MessageRecords]) -> Entries:
     entries: Entries = np.zeros(sum(len(messages.log_times) for messages in other_messages), dtype=ENTRY)
     first, start = 0, 0
     for messages in other_messages:
-        part = entries[first : first + len(messages.log_times)]
-        part["source"] = messages.offsets[:-1] + start
-        part["length"] = np.diff(messages.offsets)
-        part["channel"] = messages.channel
-        part["log_time"] = messages.log_times
-        first += len(part)
+        added_entries = entries[first : first + len(messages.log_times)]
+        added_entries["source"] = messages.offsets[:-1] + start
+        added_entries["length"] = np.diff(messages.offsets)
+        added_entries["channel"] = messages.channel
+        added_entries["log_time"] = messages.log_times
+        first += len(added_entries)
         start += len(messages.blob)
     return entries[np.argsort(entries["log_time"], kind="stable")]
 

@@ -254,7 +254,10 @@ class _MessageCollector:
             position = end
 
     def _add_channel(self, channel: Channel) -> None:
-        """Register a channel, and prepare to read state rows if it is the state channel."""
+        """Register a channel, and prepare to read the track's rows if it is the state channel.
+
+        Raises ValueError for a second state channel.
+        """
         if channel.id in self._channels:
             return
         self._channels[channel.id] = (channel.topic, self._schemas.get(channel.schema_id, ""))

@@ -441,7 +441,9 @@ def _chunk_contents(layout: Layout) -> Iterator[ChunkContent]:
 
 
 def thin_track(track: Track, every: int) -> Track:
-    """Return the rows that a `Recorder` with the same `every` records: every n-th row, and the last row.
+    """Return the rows that a `Recorder` with this stride records: every n-th row, and the last row.
+
+    every: stride n; the whole track for 1 or less.
 
     >>> from logs.recording.example_log import example_log
     >>> thin_track(example_log().track, 100).time

@@ -73,7 +73,7 @@ _MEDIA_TYPES: Final = {
 
 
 def heights_name(part: int) -> str:
-    """Return the name of a part of the terrain's heights; parts are numbered from 0."""
+    """Return the attachment name of one part of the terrain's heights; parts are numbered from 0."""
     return f"terrain-{part:03d}.heights"
 
 
@@ -261,7 +261,7 @@ class _ForecastFile(SetupModel):
 
 
 def pack_forecast(wind: Wind) -> dict[str, bytes]:
-    """Encode the forecast of a wind as attachments, bytes by name; {} for a stated wind."""
+    """Encode the weather forecast of a wind as attachments, bytes by name; {} for a wind without forecast."""
     if wind.forecast is None:
         return {}
     numbers = np.empty(0) if wind.field is None else wind.field.packed()

@@ -76,6 +76,7 @@ def repeated_submessages(field_number: int, names: Sequence[str], values: Floats
 
 def length_delimited(field_number: int, data: bytes) -> bytes:
     """Encode the bytes of a submessage as the field `field_number` of its parent message."""
+    # The size is a varint: seven bits in each byte, and the highest bit set in all bytes but the last.
     size, head = len(data), bytearray([field_number << 3 | _LENGTH_DELIMITED])
     while size > 127:
         head.append(size & 127 | 128)
@@ -248,14 +249,14 @@ def encode_rows(rows: NDArray[np.record], first_row: int, channel: int) -> State
     return records
 
 
-def join_records(parts: list[StateRecords], kind: np.dtype[np.void]) -> StateRecords:
-    """Join arrays of one structured type.
+def join_records(arrays: list[StateRecords], kind: np.dtype[np.void]) -> StateRecords:
+    """Join arrays of one structured type, which is `kind`.
 
     They are joined as bytes, because numpy would compare the structured types name by name, which takes longer.
     """
-    if not parts:
+    if not arrays:
         return np.zeros(0, dtype=kind)
-    return np.concatenate([np.ascontiguousarray(part).view(np.uint8) for part in parts]).view(kind)
+    return np.concatenate([np.ascontiguousarray(records).view(np.uint8) for records in arrays]).view(kind)
 
 
 def decode_rows(records: StateRecords) -> Track:

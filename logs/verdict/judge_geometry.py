@@ -44,7 +44,7 @@ def judge_geometry(setup: FlightSetup, requirements: RouteRequirements | None = 
     requirements = requirements or route_requirements(setup)
     findings = (
         *mission_findings(setup),
-        *with_suggestions(requirements, None, geometric_findings(requirements)),
+        *with_suggestions(requirements, aligned=None, findings=geometric_findings(requirements)),
         *([_infeasible_finding(setup.plan)] if setup.plan is not None and setup.plan.failures else []),
     )
     complete = setup.plan is None or not setup.plan.failures
@@ -84,15 +84,26 @@ def judge_unflown(requirements: RouteRequirements, end_reason: str, *, log_compl
     )
     route_findings = geometric_findings(requirements)
     passes = not any(finding.ok is False for finding in route_findings)
-    findings = (*with_suggestions(requirements, None, route_findings), end_finding)
+    findings = (*with_suggestions(requirements, aligned=None, findings=route_findings), end_finding)
     notes = setup_notes(setup, findings)
     levels = (
         LevelAnswer("geometry", passes, headline(route_findings, passes, notes)),
-        LevelAnswer(setup.autopilot.answer_name, False, headline(findings, False, notes)),
+        LevelAnswer(
+            setup.autopilot.answer_name, flyable=False, headline=headline(findings, flyable=False, setup_notes=notes)
+        ),
     )
     conditions = judging_conditions(setup)
     lines = summary_lines(findings, setup, "geometric", levels, conditions)
-    return Verdict(findings, False, False, lines, "geometric", levels, notes=setup.notes, conditions=conditions)
+    return Verdict(
+        findings,
+        flyable=False,
+        complete=False,
+        lines=lines,
+        level="geometric",
+        levels=levels,
+        notes=setup.notes,
+        conditions=conditions,
+    )
 
 
 # Statements that a plan exceeds a limit, by rule.
@@ -152,7 +163,7 @@ def judge_plan_only(plan: Plan, conditions: Conditions | None = None) -> Verdict
         )
     findings.append(_infeasible_finding(plan))
     lines = _plan_lines(findings, plan, conditions)
-    return Verdict(tuple(findings), False, False, lines, "plan", conditions=conditions)
+    return Verdict(tuple(findings), flyable=False, complete=False, lines=lines, level="plan", conditions=conditions)
 
 
 def _infeasible_finding(plan: Plan) -> Finding:
@@ -169,7 +180,7 @@ def _infeasible_finding(plan: Plan) -> Finding:
 def _plan_lines(findings: list[Finding], plan: Plan, conditions: Conditions | None) -> tuple[str, ...]:
     """Return the summary lines of a run without a feasible plan, the headline first."""
     failed = [finding for finding in findings if finding.ok is False and finding.rule != "completion"]
-    headline_text, further_lines = headline(findings, False), []
+    headline_text, further_lines = headline(findings, flyable=False), []
     if failed:
         text = ", ".join(f"{finding.rule} ({finding.reason})" for finding in failed)
         headline_text = f"not flyable: no feasible plan was found: {text}"

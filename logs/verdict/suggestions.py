@@ -107,9 +107,9 @@ def suggest_passing_zone(
                     Change(
                         direction,
                         finding.place,
-                        None,
-                        float(math.ceil(shift + extra_depth + SUGGESTION_LENGTH_MARGIN_M)),
-                        "m",
+                        current=None,
+                        wanted=float(math.ceil(shift + extra_depth + SUGGESTION_LENGTH_MARGIN_M)),
+                        unit="m",
                     ),
                 )
         if smallest_shift is not None:
@@ -174,11 +174,11 @@ def suggest_gentler_slope(
         return ()
     if finding.check == UNKNOWN_AIRCRAFT:
         quantity: ChangeKind = "full throttle" if requirements.slopes[leg] > 0.0 else "no throttle"
-        flight = (Change(quantity, finding.place, None, MIN_EVIDENCE_FLIGHT_S, "s"),)
+        flight = (Change(quantity, finding.place, current=None, wanted=MIN_EVIDENCE_FLIGHT_S, unit="s"),)
         if quantity == "no throttle" or not requirements.setup.envelope.climb_guessed:
             return (flight,)
         slope_deg = math.degrees(float(requirements.slopes[leg]))
-        return (Change("stated climb", finding.place, None, round(slope_deg, 1), "°"),), flight
+        return (Change("stated climb", finding.place, current=None, wanted=round(slope_deg, 1), unit="°"),), flight
     limit, source = slope_limit(requirements, leg)
     planned_slope = abs(float(requirements.slopes[leg]))
     height_change = abs(float(requirements.points[leg + 1, 2] - requirements.points[leg, 2]))
@@ -223,7 +223,7 @@ def suggest_gentler_landing(
     passes, or if the limit permits no descent.
     """
     if finding.check == UNKNOWN_AIRCRAFT:
-        return ((Change("no throttle", finding.place, None, MIN_EVIDENCE_FLIGHT_S, "s"),),)
+        return ((Change("no throttle", finding.place, current=None, wanted=MIN_EVIDENCE_FLIGHT_S, unit="s"),),)
     ground = requirements.setup.route.landing_ground
     if finding.ok is not False or not finding.place.index or ground is None:
         return ()
@@ -236,7 +236,7 @@ def suggest_gentler_landing(
     height = altitude - ground
     step = float(math.ceil(height - length * math.tan(max_slope)))
     longer_length = float(math.ceil(height / math.tan(max_slope)))
-    lower = Change("descent", requirements.waypoint(leg), None, step, "m")
+    lower = Change("descent", requirements.waypoint(leg), current=None, wanted=step, unit="m")
     further = Change("length", requirements.leg(leg), length, longer_length, "m")
     alternatives: list[_SizedSuggestion] = [
         (step / height, (lower,)),
@@ -251,7 +251,10 @@ def suggest_gentler_landing(
 
 
 def _gentler_arc(requirements: RouteRequirements, leg: int) -> tuple[Suggestion, ...]:
-    """Suggest gentler legs around a fly-by arc that is too steep at a leg's end; () for any other arc."""
+    """Suggest gentler legs around a fly-by arc that is too steep at a leg's end.
+
+    Return () if no arc at the leg is too steep, or if no leg has the arc's slope direction.
+    """
     arc = steep_arc(requirements, leg)
     if arc is None:
         return ()
@@ -262,7 +265,7 @@ def _gentler_arc(requirements: RouteRequirements, leg: int) -> tuple[Suggestion,
         # A leg of the opposite slope makes the arc flatter, so it is not changed.
         if height_change * arc.tangent > 0.0:
             requested_height_change = math.copysign(math.floor(abs(height_change)), height_change)
-            changes.append(Change("rise", requirements.leg(k), None, requested_height_change, "m"))
+            changes.append(Change("rise", requirements.leg(k), current=None, wanted=requested_height_change, unit="m"))
     return (tuple(changes),) if changes else ()
 
 
@@ -480,7 +483,7 @@ def _round_to_meter(length: float) -> float:
 def suggest_wider_berth(
     requirements: RouteRequirements, aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
-    """Suggest passing a missile at a greater distance, outside its sphere; return () for another place."""
+    """Suggest passing a missile at a greater distance, outside its sphere; return () if none applies."""
     missile = finding.place.index
     if missile is None or finding.place.kind != "missile":
         return ()
@@ -491,7 +494,7 @@ def suggest_wider_berth(
     if aligned is not None and len(aligned.track) > 1:
         min_distance = min(min_distance, path_spheres(aligned.track.position, aligned.track.time, *spheres).closest[0])
     extra_distance = _round_to_meter(threats.kill_radius[missile] - min_distance + SUGGESTION_LENGTH_MARGIN_M)
-    return ((Change("distance", finding.place, None, extra_distance, "m"),),)
+    return ((Change("distance", finding.place, current=None, wanted=extra_distance, unit="m"),),)
 
 
 def home_height(setup: FlightSetup) -> float:
@@ -508,7 +511,7 @@ def home_height(setup: FlightSetup) -> float:
 
 
 def _suggest_home_on_ground(setup: FlightSetup) -> tuple[Suggestion, ...]:
-    """Suggest to set a home far above or below the ground on the ground; otherwise return ()."""
+    """Suggest setting home on the ground if it is far above or below the ground; otherwise return ()."""
     home, height = setup.mission.home, home_height(setup)
     # The height is NaN if it is unknown.  If the file has no home line, its first item was probably taken for home, and
     # another altitude of this item would not help.
@@ -519,7 +522,10 @@ def _suggest_home_on_ground(setup: FlightSetup) -> tuple[Suggestion, ...]:
 
 
 def _suggest_launch_from_ground(requirements: RouteRequirements) -> tuple[Suggestion, ...]:
-    """Suggest to set home on the ground and to raise the legs that are then too low; or ()."""
+    """Suggest setting home on the ground, and raising the legs that are then too low.
+
+    Return () if home is on the ground already or if the terrain is unknown.
+    """
     suggestions, setup = _suggest_home_on_ground(requirements.setup), requirements.setup
     terrain = setup.scenario.terrain
     if not suggestions or terrain is None:
@@ -530,12 +536,14 @@ def _suggest_launch_from_ground(requirements: RouteRequirements) -> tuple[Sugges
         (height,), _ = path_clearance(terrain.heights, terrain.to_pixel.record, np.ascontiguousarray(ends))
         shortfall = setup.limits.min_clearance - height + SUGGESTION_LENGTH_MARGIN_M
         if shortfall > SUGGESTION_LENGTH_MARGIN_M:
-            raised.append(Change("height", requirements.leg(leg), None, _round_to_meter(shortfall), "m"))
+            raised.append(
+                Change("height", requirements.leg(leg), current=None, wanted=_round_to_meter(shortfall), unit="m")
+            )
     return ((*suggestions[0], *raised),)
 
 
 def _suggest_other_frame(setup: FlightSetup, frame: Frame) -> tuple[Suggestion, ...]:
-    """Suggest another altitude frame for items that fit the terrain only in it; () without any.
+    """Suggest another altitude frame if items fit the terrain only in that frame; otherwise return ().
 
     frame: GLOBAL_RELATIVE_ALT for items below the ground, GLOBAL for items that are too high above home.
     """
@@ -547,7 +555,7 @@ def _suggest_other_frame(setup: FlightSetup, frame: Frame) -> tuple[Suggestion, 
 
 
 def _suggest_lower_reading(setup: FlightSetup) -> tuple[Suggestion, ...]:
-    """Suggest to read altitudes as lower: with home on the ground, or as AMSL."""
+    """Suggest two corrections that lower a path: home set on the ground, and heights above home read as AMSL."""
     home_on_ground = _suggest_home_on_ground(setup) if home_height(setup) > 0.0 else ()
     return (*home_on_ground, *_suggest_other_frame(setup, Frame.GLOBAL))
 
@@ -576,13 +584,15 @@ def suggest_flying_higher(
         remaining_shortfall = shortfall - depth
         if remaining_shortfall <= SUGGESTION_LENGTH_MARGIN_M or not home_on_ground:
             return home_on_ground
-        raised = Change("height", finding.place, None, _round_to_meter(remaining_shortfall), "m")
+        raised = Change("height", finding.place, current=None, wanted=_round_to_meter(remaining_shortfall), unit="m")
         return ((*home_on_ground[0], raised),)
     suggestions = list(_suggest_other_frame(setup, Frame.GLOBAL_RELATIVE_ALT))
     if finding.place.index in setup.route.rtl_legs:
         return (*suggestions, *_suggest_higher_return(requirements, shortfall))
     if shortfall > SUGGESTION_LENGTH_MARGIN_M:
-        suggestions.append((Change("height", finding.place, None, _round_to_meter(shortfall), "m"),))
+        suggestions.append(
+            (Change("height", finding.place, current=None, wanted=_round_to_meter(shortfall), unit="m"),)
+        )
     following = _follow_ground(requirements, finding)
     if following:
         # A change that lets several legs follow the ground is tried before single legs are raised.
@@ -647,7 +657,9 @@ def _follow_ground(requirements: RouteRequirements, finding: Finding) -> Suggest
         heights = places[:, 2] - ground
         if followed_leg == leg or float(heights.min()) < limit:
             height = _round_to_meter(max(float(heights[-1]), limit + HEIGHT_ERROR_LIMIT_M))
-            changes.append(Change("terrain height", requirements.leg(followed_leg), None, height, "m"))
+            changes.append(
+                Change("terrain height", requirements.leg(followed_leg), current=None, wanted=height, unit="m")
+            )
     return tuple(changes) if any(change.place.index == leg for change in changes) else ()
 
 
@@ -659,7 +671,10 @@ def suggest_flying_lower(
     if finding.place.kind != "leg" or finding.limit is None or not heights or not max(heights) > finding.limit:
         return ()
     excess = _round_to_meter(max(heights) - finding.limit + SUGGESTION_LENGTH_MARGIN_M)
-    return (*_suggest_lower_reading(requirements.setup), (Change("descent", finding.place, None, excess, "m"),))
+    return (
+        *_suggest_lower_reading(requirements.setup),
+        (Change("descent", finding.place, current=None, wanted=excess, unit="m"),),
+    )
 
 
 def suggest_better_launch(
@@ -692,7 +707,7 @@ def suggest_better_launch(
 def suggest_other_landing_course(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
-    """Suggest to land from the other end after a failed landing in a tailwind; otherwise ()."""
+    """Suggest landing from the other end after a failed landing in a tailwind; otherwise return ()."""
     ground = requirements.ground_phases
     approach = None if ground is None else ground.procedures.approach
     if finding.ok is not False or approach is None:
@@ -703,7 +718,7 @@ def suggest_other_landing_course(
 def _suggest_landing_against_wind(
     requirements: RouteRequirements, place: Place, course: float, altitude: float
 ) -> tuple[Suggestion, ...]:
-    """Suggest to land from the other end if the landing course (rad) has a tailwind; otherwise ().
+    """Suggest landing from the other end if the landing course (rad) has a tailwind; otherwise return ().
 
     altitude: altitude of the landing point, m AMSL.
     """
@@ -717,11 +732,14 @@ def _suggest_landing_against_wind(
 def suggest_staying_inside(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
-    """Suggest lower altitudes, then a path further inside the area; () for a path inside."""
+    """Suggest lower altitudes, then a path further inside the area; return () for a path that stays inside."""
     if finding.margin is None or not finding.margin < 0.0:
         return ()
     inset = _round_to_meter(-finding.margin + SUGGESTION_LENGTH_MARGIN_M)
-    return (*_suggest_lower_reading(requirements.setup), (Change("inset", FLIGHT, None, inset, "m"),))
+    return (
+        *_suggest_lower_reading(requirements.setup),
+        (Change("inset", FLIGHT, current=None, wanted=inset, unit="m"),),
+    )
 
 
 def suggest_using_less_energy(
@@ -746,8 +764,10 @@ def suggest_using_less_energy(
     if ratio <= 1.0:
         return ()
     storage: ChangeKind = "battery" if envelope.volts or not envelope.power_level.size else "tank"
-    shorter_flight = Change("duration", FLIGHT, None, float(math.ceil(100.0 * (1.0 - 1.0 / ratio))), "%")
-    larger_storage = Change(storage, FLIGHT, None, math.ceil(100.0 * ratio) / 100.0, "1")
+    shorter_flight = Change(
+        "duration", FLIGHT, current=None, wanted=float(math.ceil(100.0 * (1.0 - 1.0 / ratio))), unit="%"
+    )
+    larger_storage = Change(storage, FLIGHT, current=None, wanted=math.ceil(100.0 * ratio) / 100.0, unit="1")
     # A flight shortened by 100 % would have no length.
     changes = [shorter_flight] if shorter_flight.wanted < 100.0 else []
     changes += [larger_storage] if not is_failsafe else []

@@ -450,13 +450,13 @@ def shorten_statement(statement: str) -> str:
     return statement if len(statement) <= _MAX_STATEMENT_LENGTH else statement[: _MAX_STATEMENT_LENGTH - 3] + "..."
 
 
-def text_after(text: str, starts: Sequence[str]) -> str:
-    """Return a text without one of `starts` at its beginning, and without the punctuation after it.
+def text_after(text: str, prefixes: Sequence[str]) -> str:
+    """Return a text without the first of `prefixes` that it has, and without the punctuation after the prefix.
 
     >>> text_after("not flyable: slope on leg 1", ("Not flyable, and incomplete", "not flyable"))
     'slope on leg 1'
     """
-    length = next((len(start) for start in starts if text.lower().startswith(start.lower())), 0)
+    length = next((len(prefix) for prefix in prefixes if text.lower().startswith(prefix.lower())), 0)
     return text[length:].lstrip(":; ")
 
 

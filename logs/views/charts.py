@@ -1,7 +1,7 @@
 """A chart as plain data: panels of lines, bands, bars and dots with names, units and roles.
 
 Two renderers draw a chart: `logs.views.drawing` with matplotlib, for PNG, SVG and paper, and the script of the page
-with plotly.js, from `chart_json`.  A role is a word ("missile", "planned") that `logs.theme` gives a look.
+with plotly.js, from `chart_json`.  A role is a word ("missile", "planned") whose style is in `logs.theme`.
 """
 
 import math
@@ -30,7 +30,7 @@ class Layer:
     kind: "band" is filled from `lower_edge` up to `y`, "area" is the inside of closed outlines, "dashes" are short
         horizontal strokes, "rings" mark failures.
     name: name in legend and read-out; "" leaves the layer out of both.
-    role: meaning of the layer; `logs.theme` assigns its look.
+    role: meaning of the layer; `logs.theme` assigns its style.
     x, y: (n,) in the panel's units; NaN separates parts of a line or an outline.
     lower_edge: (n,) lower edge of a band.
     dashed: True for the second of two lines of one role.
@@ -193,29 +193,29 @@ def join_with_gaps(parts: Sequence[Floats]) -> tuple[Floats, Floats]:
     return points[:, 0], points[:, 1]
 
 
-def make_saturation_band(is_saturated: NDArray[np.bool_], along: Floats, span: tuple[float, float]) -> Layer:
+def make_saturation_band(is_saturated: NDArray[np.bool_], axis_positions: Floats, span: tuple[float, float]) -> Layer:
     """Return a layer that shades the parts of a long axis in which a control is at its limit.
 
     is_saturated: True at rows where the control is at its limit, (t,).
-    along: position of each row along the axis, (t,).
+    axis_positions: position of each row along the axis, (t,).
     span: lower and upper edge of the shaded bands.
     """
     edges = np.flatnonzero(np.diff(np.concatenate([[False], is_saturated, [False]]).astype(np.int8)))
-    starts, band_ends = along[edges[::2]], along[edges[1::2] - 1]
+    starts, band_ends = axis_positions[edges[::2]], axis_positions[edges[1::2] - 1]
     gap = np.full(len(starts), np.nan)
     x = np.column_stack([starts, band_ends, band_ends]).ravel()
     y = np.column_stack([np.full(len(starts), span[1]), np.full(len(starts), span[1]), gap]).ravel()
     return Layer("band", "held at its limit", "held", x, y, np.full(len(x), span[0]), quiet=True)
 
 
-def make_leg_marks(legs: NDArray[Any], along: Floats) -> tuple[tuple[float, str], ...]:
+def make_leg_marks(legs: NDArray[Any], axis_positions: Floats) -> tuple[tuple[float, str], ...]:
     """Return a mark at the start of each leg: its position along an axis, and the leg's name.
 
     legs: number of each row's leg in messages, (t,).
-    along: position of each row along the axis, (t,).
+    axis_positions: position of each row along the axis, (t,).
     """
     starts = [0, *(np.flatnonzero(np.diff(legs)) + 1).tolist()]
-    return tuple((float(along[row]), f"leg {legs[row]}") for row in starts)
+    return tuple((float(axis_positions[row]), f"leg {legs[row]}") for row in starts)
 
 
 def find_outline_rows(values: ArrayLike, count: int) -> Indices:

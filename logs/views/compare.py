@@ -145,17 +145,22 @@ def refly_charts(reflight: Reflight) -> dict[str, Chart]:
     >>> list(refly_charts(again))[:2]
     ['refly-cross-track.png', 'refly-height.png']
     """
-    along = reflight.distance / 1e3
+    distance_km = reflight.distance / 1e3
     legs = np.searchsorted(reflight.ends, reflight.distance, side="right")
-    marks = make_leg_marks(reflight.setup.route.leg_numbers_of(legs), along)
+    marks = make_leg_marks(reflight.setup.route.leg_numbers_of(legs), distance_km)
     charts = {}
     for file, name, title, unit, factor, span in _REFLOWN:
         flown_values = factor * getattr(reflight.flown, name)
         simulated_values = factor * getattr(reflight.model, name)
         if not np.isfinite(flown_values).any():
             continue
-        lines = (series("flown", "flown", along, flown_values), series("simulated", "other", along, simulated_values))
-        difference = (filled_series("flown minus simulated", "difference", along, flown_values - simulated_values),)
+        lines = (
+            series("flown", "flown", distance_km, flown_values),
+            series("simulated", "other", distance_km, simulated_values),
+        )
+        difference = (
+            filled_series("flown minus simulated", "difference", distance_km, flown_values - simulated_values),
+        )
         panels = (
             Panel(title, unit, lines, min_span=span),
             Panel("difference", unit, difference, limits=(("", 0.0),), min_span=0.5 * span),

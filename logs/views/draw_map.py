@@ -136,7 +136,12 @@ def draw_ground(figure: Figure, axes: Any, terrain: Terrain | None, column: floa
 
 
 def _draw_colour_bar(figure: Figure, colours: Any, norm: Any, levels: Floats, column: float, top: float) -> None:
-    """Draw the colour bar of the ground's altitude in the column right of the map."""
+    """Draw the colour bar of the ground's altitude in the column right of the map.
+
+    colours, norm: matplotlib's colour map and normalisation of altitudes.
+    levels: altitudes between colours, m AMSL.
+    column, top: left edge of the column, and distance of the bar from the figure's top, inches.
+    """
     figure_height = float(figure.get_figheight())
     bar_height = min(2.6, figure_height - 3.4)
     frame = (

@@ -213,6 +213,7 @@ def _draw_ground(axes: Any, projection: Projection, grid: GroundGrid | None, bou
     up_north, up_east = np.gradient(
         np.nan_to_num(grid.heights, nan=float(np.nanmin(grid.heights))), grid.north, grid.east
     )
+    # The cosine between the ground's normal and the direction to the light, (-0.5, 0.5, 0.8) of length sqrt(1.14).
     slope_e, slope_n = projection.stretch * up_east, projection.stretch * up_north
     brightness = (0.5 * slope_e - 0.5 * slope_n + 0.8) / np.sqrt(1.14 * (1.0 + slope_e**2 + slope_n**2))
     min_height, max_height = float(np.nanmin(grid.heights)), float(np.nanmax(grid.heights))
@@ -250,7 +251,7 @@ def _draw_threats(axes: Any, projection: Projection, setup: FlightSetup, failed:
     vertical = np.where(angles < math.pi, top_height, math.sin(_ELEVATION)) * np.sin(angles)
     shape = np.column_stack([np.cos(angles), vertical])
     threat_styles: tuple[tuple[str, Floats, dict[str, Any]], ...] = (
-        ("missile", threats.kill_radius, {"facecolor": theme.rgba("missile", theme.LOOKS["missile"].fill)}),
+        ("missile", threats.kill_radius, {"facecolor": theme.rgba("missile", theme.ROLE_STYLES["missile"].fill)}),
         ("radar", threats.detection_radius, {"facecolor": "none", "linestyle": (0, (4, 2.5))}),
     )
     for kind, radii, style in threat_styles:
@@ -270,7 +271,8 @@ def _draw_threats(axes: Any, projection: Projection, setup: FlightSetup, failed:
 def _draw_zones(axes: Any, projection: Projection, setup: FlightSetup) -> list[Any]:
     """Draw the walls of the zones, and return their legend handles.
 
-    A wall reaches from the floor of the zone, or the ground, to its ceiling.  Without a ceiling it ends above the path.
+    A wall reaches from the floor of the zone, or the ground, to its ceiling.  Without a ceiling it ends
+    50 m above the path's highest point.
     """
     zones, route = setup.scenario.zones, setup.route.positions
     min_altitude, max_altitude = float(route[:, 2].min()), float(route[:, 2].max()) + 50.0
@@ -322,7 +324,7 @@ def _draw_paths(
     failed: Failures,
     placer: LabelPlacer,
 ) -> list[Any]:
-    """Draw route, track, waypoints and their failures; return the handles for the legend."""
+    """Draw route (w, 3), track, waypoints with poles to the ground, and failures; return handles for the legend."""
     _, samples = route_samples(route, max(float(route_distance(route)[-1]) / 600.0, 1.0))
     if terrain is not None:
         ground = terrain.height(route[:, 0], route[:, 1])
@@ -376,7 +378,12 @@ def _draw_paths(
 def _draw_path(
     axes: Any, projection: Projection, terrain: Terrain | None, points: Floats, colour: str, width: float, order: float
 ) -> None:
-    """Draw a path, thin and dashed where the ground hides it."""
+    """Draw a path, thin and dashed where the ground hides it.
+
+    points: positions on the path, m, (n, 3).
+    width: line width, points.
+    order: matplotlib's zorder.
+    """
     projected = projection.project(points)
     is_hidden = _find_hidden_points(projection, terrain, points)
     visible_part = np.where(is_hidden[:, None], np.nan, projected[:, :2])
@@ -390,7 +397,11 @@ def _draw_path(
 def _draw_labels(
     setup: FlightSetup, projection: Projection, route: Floats, failed: Failures, placer: LabelPlacer
 ) -> None:
-    """Label start, destination, waypoints and threats, as far as the labels fit."""
+    """Label start, destination, waypoints and threats; labels without a free place are left out.
+
+    If there are too many waypoints, only every n-th and the failed ones are numbered.  Entered threats get the best
+    places.
+    """
     corners, stops = projection.project(route), setup.route.stops.tolist()
     last = len(route) - 1
 

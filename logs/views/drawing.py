@@ -223,7 +223,7 @@ def write_png(figure: Figure, path: FilePath) -> None:
 def draw_chart(chart: Chart) -> Figure:
     """Draw a chart of panels; a panel without values is omitted if another panel has values.
 
-    Stacked panels get one common legend if each look has the same meaning in all, and some looks repeat.
+    Stacked panels get one common legend if each line style has the same meaning in all, and some styles repeat.
     """
     panels = chart.shown_panels() if chart.panels else ()
     has_shared_legend = chart.legend == "beside" and can_share_legend(panels)
@@ -264,14 +264,14 @@ def draw_chart(chart: Chart) -> Figure:
     return figure
 
 
-def _compute_panel_extent(chart: Chart, k: int, right_margin: float) -> tuple[float, float]:
-    """Return the left edge and the width of panel number `k` as fractions of the picture's width."""
+def _compute_panel_extent(chart: Chart, panel_number: int, right_margin: float) -> tuple[float, float]:
+    """Return the left edge and the width of a panel as fractions of the picture's width."""
     total_width = WIDTH - _LEFT - right_margin
     if not chart.widths:
         return _LEFT / WIDTH, total_width / WIDTH
     gap = 0.75 * (len(chart.widths) - 1)
-    width_before = sum(chart.widths[:k])
-    return (_LEFT + width_before * (total_width - gap) + 0.75 * k) / WIDTH, chart.widths[k] * (
+    width_before = sum(chart.widths[:panel_number])
+    return (_LEFT + width_before * (total_width - gap) + 0.75 * panel_number) / WIDTH, chart.widths[panel_number] * (
         total_width - gap
     ) / WIDTH
 
@@ -293,7 +293,7 @@ def _make_axis_label(chart: Chart, panel: Panel, axes: Any) -> str:
 def can_share_legend(panels: Sequence[Panel]) -> bool:
     """Return True if all panels can share one legend.
 
-    In all panels, each look must have the same meaning, and each meaning the same look; some looks must repeat.
+    In all panels, each line style must have the same meaning, and each meaning the same style; some styles must repeat.
 
     >>> none = np.zeros(2)
     >>> flown, wanted = Layer("line", "flown", "flown", none, none), Layer("line", "command", "commanded", none, none)
@@ -413,17 +413,17 @@ def _set_place_ticks(axes: Any, panel: Panel) -> None:
 
 
 def draw_layers(axes: Any, panel: Panel, min_zorder: float = 2.0) -> None:
-    """Draw the layers of a panel, the lowest first; its limits lie between bands and lines.
+    """Draw the layers of a panel, the lowest first, and its limit lines between bands and other layers.
 
     min_zorder: zorder of the lowest layer.
     """
     for label, value in panel.limits:
-        look = theme.LOOKS["limit"]
+        role_style = theme.ROLE_STYLES["limit"]
         axes.axhline(
             value,
-            color=look.light,
-            linewidth=look.width,
-            linestyle=_make_dash_pattern(look),
+            color=role_style.light,
+            linewidth=role_style.width,
+            linestyle=_make_dash_pattern(role_style),
             label=label or None,
             zorder=min_zorder + 0.95,
         )
@@ -432,18 +432,18 @@ def draw_layers(axes: Any, panel: Panel, min_zorder: float = 2.0) -> None:
         is_background = layer.kind in ("band", "area") and layer.role != "terrain"
         zorder = min_zorder + (0.0 if is_background else 1.0) + 0.9 * k / len(panel.layers)
         _DRAWERS[layer.kind](
-            axes, layer, theme.LOOKS[layer.role], zorder=zorder, label=layer.legend or layer.name or None
+            axes, layer, theme.ROLE_STYLES[layer.role], zorder=zorder, label=layer.legend or layer.name or None
         )
 
 
-def _make_dash_pattern(look: theme.Look, dashed: bool = False) -> Any:
-    """Return the line style of a look in units of its line width; "-" for a solid line."""
-    pattern = look.dash or ((8.0, 3.5) if dashed else ())
-    return (0, tuple(part / max(look.width, 0.1) for part in pattern)) if pattern else "-"
+def _make_dash_pattern(role_style: theme.RoleStyle, dashed: bool = False) -> Any:
+    """Return matplotlib's line style of a role, with dashes in units of the line width; "-" for a solid line."""
+    pattern = role_style.dash or ((8.0, 3.5) if dashed else ())
+    return (0, tuple(part / max(role_style.width, 0.1) for part in pattern)) if pattern else "-"
 
 
-def _draw_line(axes: Any, layer: Layer, look: theme.Look, **options: Any) -> None:
-    """Draw a layer as a line, with a light rim if its look has one."""
+def _draw_line(axes: Any, layer: Layer, role_style: theme.RoleStyle, **options: Any) -> None:
+    """Draw a layer as a line, with a light rim if its style has one."""
     is_short = layer.role == "failing-leg" and np.hypot(np.ptp(layer.x), np.ptp(layer.y)) < 0.02 * np.ptp(
         axes.get_xlim()
     )
@@ -451,19 +451,19 @@ def _draw_line(axes: Any, layer: Layer, look: theme.Look, **options: Any) -> Non
     (line,) = axes.plot(
         layer.x,
         layer.y,
-        color=look.light,
-        linewidth=look.width,
-        linestyle=_make_dash_pattern(look, layer.dashed),
+        color=role_style.light,
+        linewidth=role_style.width,
+        linestyle=_make_dash_pattern(role_style, layer.dashed),
         solid_capstyle=cap,
         solid_joinstyle="round",
         **options,
     )
-    if look.halo:
-        rim = patheffects.Stroke(linewidth=look.width + 1.2, foreground=theme.colour("paper"), alpha=0.8)
+    if role_style.halo:
+        rim = patheffects.Stroke(linewidth=role_style.width + 1.2, foreground=theme.colour("paper"), alpha=0.8)
         line.set_path_effects([rim, patheffects.Normal()])
 
 
-def _draw_band(axes: Any, layer: Layer, look: theme.Look, **options: Any) -> None:
+def _draw_band(axes: Any, layer: Layer, role_style: theme.RoleStyle, **options: Any) -> None:
     """Draw a layer as filled bands between its two edges, with gaps where an edge is unknown."""
     lower_edge = layer.lower_edge if layer.lower_edge is not None else np.zeros(len(layer.y))
     is_known = np.isfinite(layer.x) & np.isfinite(layer.y) & np.isfinite(lower_edge)
@@ -477,74 +477,82 @@ def _draw_band(axes: Any, layer: Layer, look: theme.Look, **options: Any) -> Non
         )
         for start, end in zip(edges[::2], edges[1::2], strict=True)
     ]
-    axes.add_collection(PolyCollection(polygons, **_make_area_style(look), **options))
+    axes.add_collection(PolyCollection(polygons, **_make_area_style(role_style), **options))
 
 
-def _make_area_style(look: theme.Look) -> dict[str, Any]:
+def _make_area_style(role_style: theme.RoleStyle) -> dict[str, Any]:
     """Return matplotlib's style options of a filled area."""
-    edge = theme.colour(look.edge) if look.edge else look.light
-    if not look.width and not look.hatch:
+    edge = theme.colour(role_style.edge) if role_style.edge else role_style.light
+    if not role_style.width and not role_style.hatch:
         edge = "none"
     return {
-        "facecolor": (*theme.rgb(look.light), look.fill),
+        "facecolor": (*theme.rgb(role_style.light), role_style.fill),
         "edgecolor": edge,
-        "linewidth": look.width,
-        "linestyle": _make_dash_pattern(look),
-        "hatch": look.hatch or None,
+        "linewidth": role_style.width,
+        "linestyle": _make_dash_pattern(role_style),
+        "hatch": role_style.hatch or None,
     }
 
 
-def _draw_area(axes: Any, layer: Layer, look: theme.Look, **options: Any) -> None:
+def _draw_area(axes: Any, layer: Layer, role_style: theme.RoleStyle, **options: Any) -> None:
     """Draw the rings of an area as one path, so that the holes of the area stay open."""
     points = np.column_stack([layer.x, layer.y])
     gaps = np.flatnonzero(np.isnan(layer.x))
     rings = [ring[np.isfinite(ring[:, 0])] for ring in np.split(points, gaps)]
     shape = Path.make_compound_path(*(Path(ring, closed=True) for ring in rings))
-    axes.add_patch(PathPatch(shape, **_make_area_style(look), **options))
+    axes.add_patch(PathPatch(shape, **_make_area_style(role_style), **options))
 
 
-def _draw_bars(axes: Any, layer: Layer, look: theme.Look, **options: Any) -> None:
+def _draw_bars(axes: Any, layer: Layer, role_style: theme.RoleStyle, **options: Any) -> None:
     """Draw a layer as bars from zero."""
-    axes.bar(layer.x, layer.y, width=0.62, color=look.light, **options)
+    axes.bar(layer.x, layer.y, width=0.62, color=role_style.light, **options)
 
 
-def _draw_dots(axes: Any, layer: Layer, look: theme.Look, **options: Any) -> None:
+def _draw_dots(axes: Any, layer: Layer, role_style: theme.RoleStyle, **options: Any) -> None:
     """Draw a layer as markers."""
-    axes.plot(layer.x, layer.y, **_make_dot_style(look, len(layer.x)), **options)
+    axes.plot(layer.x, layer.y, **_make_dot_style(role_style, len(layer.x)), **options)
 
 
-def _make_dot_style(look: theme.Look, count: int = 1) -> dict[str, Any]:
-    """Return matplotlib's style options of markers; many markers are smaller."""
-    size = 3.0 if count > _MAX_TICKS and look.size == 5.5 else look.size
-    style: dict[str, Any] = {"marker": _MARKERS[look.marker], "linestyle": "", "markersize": size, "color": look.light}
-    if look.face:
-        return style | {"mfc": theme.colour(look.face), "mec": look.light, "mew": look.width}
-    is_faint = look.size < 3.0
-    return style | {"mew": 0.0 if is_faint else 0.8, "alpha": look.fill if is_faint else 1.0}
+def _make_dot_style(role_style: theme.RoleStyle, count: int = 1) -> dict[str, Any]:
+    """Return matplotlib's style options of markers; markers of medium size are smaller if there are many.
+
+    count: number of markers.
+    """
+    size = 3.0 if count > _MAX_TICKS and role_style.size == 5.5 else role_style.size
+    style: dict[str, Any] = {
+        "marker": _MARKERS[role_style.marker],
+        "linestyle": "",
+        "markersize": size,
+        "color": role_style.light,
+    }
+    if role_style.face:
+        return style | {"mfc": theme.colour(role_style.face), "mec": role_style.light, "mew": role_style.width}
+    is_faint = role_style.size < 3.0
+    return style | {"mew": 0.0 if is_faint else 0.8, "alpha": role_style.fill if is_faint else 1.0}
 
 
-def _draw_rings(axes: Any, layer: Layer, look: theme.Look, **options: Any) -> None:
+def _draw_rings(axes: Any, layer: Layer, role_style: theme.RoleStyle, **options: Any) -> None:
     """Draw a layer as hollow circles."""
-    axes.plot(layer.x, layer.y, **_make_ring_style(look), **options)
+    axes.plot(layer.x, layer.y, **_make_ring_style(role_style), **options)
 
 
-def _make_ring_style(look: theme.Look) -> dict[str, Any]:
+def _make_ring_style(role_style: theme.RoleStyle) -> dict[str, Any]:
     """Return matplotlib's style options of hollow circles."""
     return {
         "marker": "o",
         "linestyle": "",
-        "markersize": look.size,
+        "markersize": role_style.size,
         "mfc": "none",
-        "mec": look.light,
-        "mew": look.width,
-        "color": look.light,
+        "mec": role_style.light,
+        "mew": role_style.width,
+        "color": role_style.light,
         "clip_on": False,
     }
 
 
-def _draw_dashes(axes: Any, layer: Layer, look: theme.Look, **options: Any) -> None:
+def _draw_dashes(axes: Any, layer: Layer, role_style: theme.RoleStyle, **options: Any) -> None:
     """Draw a layer as short horizontal lines."""
-    axes.hlines(layer.y, layer.x - 0.42, layer.x + 0.42, color=look.light, linewidth=2.0, **options)
+    axes.hlines(layer.y, layer.x - 0.42, layer.x + 0.42, color=role_style.light, linewidth=2.0, **options)
 
 
 _DRAWERS: dict[str, Any] = {
@@ -587,19 +595,19 @@ def write_label(placer: LabelPlacer, label: Label) -> None:
 
 
 def make_legend_handle(entry: LegendEntry) -> Any:
-    """Return the handle that a legend shows next to the text of an entry."""
+    """Return the legend handle of an entry, a patch, marker or line in the style of its first layer."""
     layer = entry.layers[0]
-    look, text = theme.LOOKS[layer.role], textwrap.fill(entry.text, 36)
+    role_style, text = theme.ROLE_STYLES[layer.role], textwrap.fill(entry.text, 36)
     if layer.kind in ("band", "area"):
-        return Patch(label=text, **_make_area_style(look))
+        return Patch(label=text, **_make_area_style(role_style))
     if layer.kind == "bars":
-        return Patch(label=text, color=look.light)
+        return Patch(label=text, color=role_style.light)
     if layer.kind == "dots":
-        return Line2D([], [], label=text, **_make_dot_style(look) | {"alpha": 1.0})
+        return Line2D([], [], label=text, **_make_dot_style(role_style) | {"alpha": 1.0})
     if layer.kind == "rings":
-        return Line2D([], [], label=text, **_make_ring_style(look) | {"markersize": 9.0})
-    dashes: Any = "-" if layer.kind == "dashes" else _make_dash_pattern(look, layer.dashed)
-    return Line2D([], [], label=text, color=look.light, linewidth=min(look.width, 6.0), linestyle=dashes)
+        return Line2D([], [], label=text, **_make_ring_style(role_style) | {"markersize": 9.0})
+    dashes: Any = "-" if layer.kind == "dashes" else _make_dash_pattern(role_style, layer.dashed)
+    return Line2D([], [], label=text, color=role_style.light, linewidth=min(role_style.width, 6.0), linestyle=dashes)
 
 
 def draw_legend(figure: Figure, handles: list[Any], left: float, top: float, columns: int = 4) -> None:

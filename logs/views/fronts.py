@@ -68,8 +68,8 @@ def front_map(front: Front) -> MapChart:
         scenario,
         f"front of {count_text(len(paths), 'plan')} from above",
         layers,
-        [*labels, *end_labels(scenario, None, ())],
-        map_extent(scenario, None, paths),
+        [*labels, *end_labels(scenario, route=None, stops=())],
+        map_extent(scenario, route=None, paths=paths),
         route=shortest,
         winds=(NamedWind(scenario.wind),),
     )

@@ -13,7 +13,7 @@ from logs.views.map import Extent, MapChart, NamedWind, end_labels, map_extent, 
 from logs.views.returns import east_and_north, path_layers, split_path_by_reach
 
 # Role and name of the path by destination within reach without an engine.
-_LOOKS: dict[Reach, tuple[str, str]] = {reach: (f"reach-{reach}", reached_text(reach)) for reach in REACHES}
+_ROLES_AND_NAMES: dict[Reach, tuple[str, str]] = {reach: (f"reach-{reach}", reached_text(reach)) for reach in REACHES}
 
 
 def glide_chart(setup: FlightSetup, drawn_returns: DrawnReturns, track: Track | None) -> MapChart | None:
@@ -30,7 +30,9 @@ def glide_chart(setup: FlightSetup, drawn_returns: DrawnReturns, track: Track | 
     extent = map_extent(scenario, route, [sites, np.array([glide.start for glide in glides.each])])
     layers = make_footprint_layers(drawn_returns, extent)
     segments = split_path_by_reach(setup, drawn_returns, track)
-    layers += path_layers(segments, _LOOKS, east_and_north, lambda point: _describe_glide(point.element, drawn_returns))
+    layers += path_layers(
+        segments, _ROLES_AND_NAMES, east_and_north, lambda point: _describe_glide(point.element, drawn_returns)
+    )
     impacts = np.array([glide.own_return.impact for glide in glides.each if glide.own_return.end == "ground"])
     if len(impacts):
         name = f"place where {glides.autopilot}'s own return meets the ground"

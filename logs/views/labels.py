@@ -119,7 +119,11 @@ class LabelPlacer:
             artist.set_path_effects([outline])
 
     def _draw_lead_line(self, box: Box, x: float, y: float, color: str, width: float) -> None:
-        """Draw a thin line from the centre of a label's box, below the label, to its point."""
+        """Draw a thin line from the centre of a label's box, hidden below the label, to its point.
+
+        box, x, y: the label's box and its point, pixels.
+        width: line width, points.
+        """
         center = (0.5 * (box[0] + box[2]), 0.5 * (box[1] + box[3]))
         line_ends = self.axes.transData.inverted().transform([center, (x, y)])
         self.axes.plot(line_ends[:, 0], line_ends[:, 1], "-", color=color, linewidth=width, zorder=8.9, gid="leader")

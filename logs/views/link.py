@@ -26,7 +26,7 @@ _CLEAR_FRACTION = 0.6
 # Largest clearance, in radii of the first Fresnel zone, that the chart shows: more makes no difference.
 _MAX_SHOWN_CLEARANCE = 3.0
 # Role and name of the path by the quality of the link; the first is drawn lowest.
-_LOOKS: dict[LinkQuality, tuple[str, str]] = {
+_ROLES_AND_NAMES: dict[LinkQuality, tuple[str, str]] = {
     "kept": ("return-safe", "link kept"),
     "weak": ("return-low", f"less than {WEAK_MARGIN_DB:.0f} dB above the fade margin"),
     "unknown": ("return-unknown", "terrain below the radio path unknown"),
@@ -99,7 +99,7 @@ def compute_scenario_link(setup: FlightSetup, track: Track | None) -> DrawnLink 
 
 def link_chart(setup: FlightSetup, drawn: DrawnLink) -> Chart:
     """Chart the link's margin, diffraction loss, Fresnel clearance and distance over time."""
-    along, points = drawn.along, drawn.along.points
+    link_along_path, points = drawn.along, drawn.along.points
     name, role = ("flown", "flown") if drawn.is_flown else ("planned path", "planned")
 
     def make_panel(
@@ -110,7 +110,7 @@ def link_chart(setup: FlightSetup, drawn: DrawnLink) -> Chart:
         limits: names and values of the limit lines.
         note: note on values that are not shown.
         """
-        return Panel(title, unit, (series(name, role, along.time, values),), limits=limits, note=note)
+        return Panel(title, unit, (series(name, role, link_along_path.time, values),), limits=limits, note=note)
 
     clearance = np.clip(points.fresnel_clearance, -_MAX_SHOWN_CLEARANCE, _MAX_SHOWN_CLEARANCE)
     zone_limits = (("line of sight", 0.0), (f"{100.0 * _CLEAR_FRACTION:.0f} % of the first zone", _CLEAR_FRACTION))
@@ -145,7 +145,10 @@ def link_map(setup: FlightSetup, drawn: DrawnLink) -> MapChart:
         """Describe the link margin at point k."""
         return f"{along.time[k]:.0f} s: {points.margin[k]:.1f} dB above the fade margin"
 
-    layers = [*_make_coverage_layers(drawn.coverage), *path_layers(segments, _LOOKS, find_position, describe_point)]
+    layers = [
+        *_make_coverage_layers(drawn.coverage),
+        *path_layers(segments, _ROLES_AND_NAMES, find_position, describe_point),
+    ]
     layers.append(Layer("dots", "station", "waypoint", antenna[:1], antenna[1:2], hover_texts=("station",)))
     label = Label("station", float(antenna[0]), float(antenna[1]), "end", "waypoint", (1, 1))
     return scenario_map(

@@ -131,7 +131,7 @@ def _draw_ground_and_threats(scenario: Scenario, title: str, legend_height: floa
     axes.set_title(title, fontweight="bold")
     ground_handles = draw_ground(figure, axes, scenario.terrain, _COLUMN, _TOP)
     # The circles do not depend on altitude: a path inside a circle may pass over the sphere.
-    threat_panel = Panel("north", "m", threat_circles(scenario.threats, None, frozenset()))
+    threat_panel = Panel("north", "m", threat_circles(scenario.threats, route=None, failing_threats=frozenset()))
     draw_layers(axes, threat_panel)
     return figure, axes, ground_handles + [make_legend_handle(entry) for entry in legend_entries([threat_panel])]
 

@@ -43,13 +43,13 @@ def band_chart(bands: Sequence[Band], title: str, *, by_time: bool = True) -> Ch
     return Chart(title, along_name, unit, tuple(panels), page_height=170, print_height=1.3)
 
 
-def _with_gaps(along: Floats, *columns: Floats) -> tuple[Floats, ...]:
+def _with_gaps(axis_values: Floats, *columns: Floats) -> tuple[Floats, ...]:
     """Insert NaN into an axis and its columns where the axis jumps from one segment of a log to the next.
 
     Returns the axis, then the columns.
     """
-    steps = np.diff(along)
+    steps = np.diff(axis_values)
     jumps = np.flatnonzero(steps > _MAX_STEP_RATIO * np.median(steps)) + 1
-    return along if not len(jumps) else np.insert(along, jumps, np.nan), *(
+    return axis_values if not len(jumps) else np.insert(axis_values, jumps, np.nan), *(
         np.insert(column, jumps, np.nan) for column in columns
     )

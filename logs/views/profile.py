@@ -215,7 +215,10 @@ def _make_flown_layers(
 ) -> tuple[list[Layer], dict[int, tuple[float, float]]]:
     """Return layers of flown altitudes and entered threats, and label positions of these threats.
 
-    For a plan that was not flown, the threats are those that the plan enters.
+    For a plan that was not flown (`track` is None), there are only the threats that the plan enters.
+
+    route: waypoints, m, (w, 3).
+    plane: vertical plane along the planned path, in which the threats are cut.
     """
     if track is None:
         return entered_cuts(scenario.threats, failed, plane)

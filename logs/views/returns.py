@@ -20,7 +20,9 @@ from world.arrays import Floats
 from world.scenario import Scenario
 
 # Role and name of the path by outcome of the returns; the safe outcome is drawn lowest.
-_LOOKS: dict[Kind, tuple[str, str]] = {kind: (f"return-{kind}", segment_text(kind)) for kind in reversed(KINDS)}
+_ROLES_AND_NAMES: dict[Kind, tuple[str, str]] = {
+    kind: (f"return-{kind}", segment_text(kind)) for kind in reversed(KINDS)
+}
 # Smallest range of altitudes that a profile shows, m.
 _MIN_SPAN = 100.0
 # Number of points of a path, and of ground samples under it.
@@ -74,20 +76,20 @@ def split_judged_path(
 
 def path_layers(
     segments: Sequence[tuple[Key, Sequence[Element]]],
-    looks: dict[Key, tuple[str, str]],
+    roles_and_names: dict[Key, tuple[str, str]],
     position_of: Callable[[Element], tuple[float, float]],
     text_of: Callable[[Element], str],
 ) -> list[Layer]:
-    """Return line layers of a path whose segments are coloured by key, one layer for each look.
+    """Return line layers of a path whose segments are coloured by key, one layer for each role and name.
 
     segments: key and elements of each segment of the path.
-    looks: role and name of each key, in the order of the layers.
+    roles_and_names: role and name of each key, in the order of the layers.
     position_of: coordinates of an element.
     text_of: hover text of an element.
     """
     layers = []
-    for role, name in dict.fromkeys(looks.values()):
-        matching_segments = [elements for kind, elements in segments if looks[kind] == (role, name)]
+    for role, name in dict.fromkeys(roles_and_names.values()):
+        matching_segments = [elements for kind, elements in segments if roles_and_names[kind] == (role, name)]
         x, y = join_with_gaps(
             [np.array([position_of(element) for element in elements]) for elements in matching_segments]
         )
@@ -109,7 +111,7 @@ def returns_map(setup: FlightSetup, drawn_returns: DrawnReturns, track: Track | 
         return f"{ret.time:.0f} s: to {ret.target.name}: {outcome_text(ret, limit)}"
 
     segments = split_path_by_outcome(setup, drawn_returns, track)
-    layers = path_layers(segments, _LOOKS, east_and_north, lambda point: describe_return(point.element))
+    layers = path_layers(segments, _ROLES_AND_NAMES, east_and_north, lambda point: describe_return(point.element))
     for worst in drawn_returns.worst:
         name = "path of one of the worst returns, numbered"
         layers.append(
@@ -265,7 +267,7 @@ def return_heights_chart(setup: FlightSetup, drawn_returns: DrawnReturns, track:
         *make_ground_bands(scenario, PathPlane(time, positions, ground, *span)),
         *path_layers(
             segments,
-            _LOOKS,
+            _ROLES_AND_NAMES,
             lambda point: (point.time, float(point.position[2])),
             lambda point: outcome_text(point.element, limit),
         ),

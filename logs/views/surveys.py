@@ -52,7 +52,12 @@ def _make_survey_panel(
     position: Floats,
     name: str,
 ) -> Panel:
-    """Return the panel of one survey: usable and lost parts of its lines, and the flown track."""
+    """Return the panel of one survey: usable, lost and unjudged parts of its photo lines, and the track.
+
+    line_measures: measurement of each photo line; None for a line that was not flown, which is lost as a whole.
+    position: positions of the track, m, (t, 3).
+    name: name of the survey in the panel's title.
+    """
     origin = requirements.points[survey.first, :2]
     unit = np.array([np.sin(survey.course), np.cos(survey.course)])
     axes = np.stack([unit, [-unit[1], unit[0]]], axis=1)

@@ -71,7 +71,13 @@ def turn_chart(name: str, verdict: Verdict) -> Chart:
 
 
 def _make_rule_panel(rule: str, title: str, unit: str, place: str, values: list[PlaceValue]) -> Panel:
-    """Return the panel of a rule with planned and flown values, limits, and marked failures."""
+    """Return the panel of a rule with planned and flown values, limits, and marked failures.
+
+    Limits far above all values are not drawn; a note states the lowest of them.
+
+    title, unit: title of the panel, and unit of the values.
+    place: title of the horizontal axis.
+    """
     numbers = np.array([value.number for value in values], dtype=np.float64)
     planned_values, flown_values, limit_values = (
         np.array([getattr(value, name) for value in values]) for name in ("planned", "flown", "limit")

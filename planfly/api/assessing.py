@@ -117,7 +117,7 @@ def _write_files(result: GroundRiskResult, folder: Path, command: str, *, overwr
             result.volume,
             result.volume_height,
         ),
-        RiskVolume("operational volume and ground risk buffer", "ground-risk-buffer", result.footprint, None),
+        RiskVolume("operational volume and ground risk buffer", "ground-risk-buffer", result.footprint, height=None),
     )
     properties = {"mission": result.base.name, "ground_risk_class": result.ground_class}
     with stage("drawing", "drawing the ground risk"):

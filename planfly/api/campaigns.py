@@ -286,9 +286,12 @@ def campaign(
 def _fly_and_summarise(
     base: CampaignBase, goal: Goal, workers: Workers, directory: OutputDirectory, command: str, *, keep: bool
 ) -> CampaignResult:
-    """Fly the remaining flights of a campaign, and summarise the campaign.
+    """Fly the flights that a campaign's table lacks, and summarise the campaign.
 
-    keep: True to write the campaign's files into its folder, which is kept.
+    goal: what the campaign has to prove, and its number of flights.
+    directory: folder with the table.
+    command: command line that repeats the campaign, for its report.
+    keep: True to write summary, report and logs into the folder; False for a temporary folder.
     """
     table_path = directory.folder / CAMPAIGN_DATABASE
     with open_store(base, goal, directory.folder, resume=directory.resume) as store:

@@ -63,7 +63,7 @@ def terrain(
     source_name = str(source)
     with stage("fetching terrain" if "://" in source_name else "cutting terrain") as advance:
         if "://" not in source_name:
-            check_output_file(target, True, Path(source_name))
+            check_output_file(target, overwrite=True, source=Path(source_name))
             return cut_from_files(Path(source_name), area, target)
         if not is_address(source_name):
             allowed = "expected a folder, or its http or https address without a query"

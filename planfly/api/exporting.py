@@ -325,9 +325,10 @@ def _read_log(path: Path, *, needs_returns: bool) -> _SourceContent:
 
 
 def _read_mission(path: Path, options: MissionOptions, *, needs_world: bool, needs_returns: bool) -> _SourceContent:
-    """Read a plan or a mission file.
+    """Read the parts of a plan or a mission file that the target files need.
 
-    Its scenario is loaded only if a target, a plan, a fence or a time needs it.
+    Its scenario is loaded only if a target, a plan, a fence or a time needs it.  Raises MissionError for a missing
+    file.
 
     needs_world: True if a target needs the scenario.
     needs_returns: True to add returns from a few points of the planned path.
@@ -349,7 +350,7 @@ def _read_mission(path: Path, options: MissionOptions, *, needs_world: bool, nee
         airspeed=setup.airspeed,
         aircraft=Path(setup.aircraft).name,
     )
-    source = _with_returns(source, setup, None) if needs_returns else source
+    source = _with_returns(source, setup, track=None) if needs_returns else source
     if not is_plan:
         return _with_zones(source, setup.scenario)
     mission, notes = add_plan_fence(setup)
@@ -366,7 +367,11 @@ def _with_zones(source: _SourceContent, scenario: Scenario) -> _SourceContent:
 
 
 def _make_target_content(source: _SourceContent, target: Path) -> tuple[str | bytes, str]:
-    """Return the content of a target file, and a description of the content, such as "23 items"."""
+    """Return the content of a target file, and a description of the content, such as "23 items".
+
+    The suffix of the target decides its format.  Raises MissionError if the source has no fence or rally points to
+    write.
+    """
     suffix, mission = target.suffix.lower(), source.mission
     if suffix in LOG_SUFFIXES and source.log is not None:
         return _encode_flight(source.log, suffix)

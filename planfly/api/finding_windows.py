@@ -137,7 +137,7 @@ def _write_files(result: WindowResult, folder: Path, command: str, *, overwrite:
 
 
 def _parse_step(every: str) -> timedelta:
-    """Return the time between two departures.  Raises ArgumentError if the text states no such time."""
+    """Return the time between two departures from a text such as "30min"; raise ArgumentError for other text."""
     match = _STEP.fullmatch(every.strip())
     if match is not None:
         number = float(match.group(1))

@@ -311,7 +311,7 @@ def _report_page(identified: Identified, predicted: PredictedLog, check: str | P
 
 
 def _find_wide_numbers(identified: Identified) -> tuple[WideQuantity, ...]:
-    """Return those of the sink angle and the power that the logs determine only within a wide interval."""
+    """Return sink angle and power, or one of them, if the logs determine them only within a wide interval."""
     _, sink, power = _compute_performance_intervals(identified)
     return wide_quantities(sink, power, with_current=identified.estimate.with_current)
 

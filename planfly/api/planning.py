@@ -80,7 +80,9 @@ def plan(
     check_arguments(seed=options["seed"], budget=options["budget"], seconds=options["seconds"])
     world = _with_budget(load_scenario_with_options(scenario, options), options["budget"])
     if waypoints is None:
-        return _search_and_write(world, scenario, None, options, out, overwrite)
+        return _search_and_write(
+            world, scenario, flown_plan_and_leg=None, options=options, out=out, overwrite=overwrite
+        )
     path, target = (
         _check_waypoints(world, waypoints, options),
         _find_plan_target(world, scenario, options, out, overwrite),
@@ -223,7 +225,11 @@ def _search_and_write(
 def _find_plan_target(
     world: Scenario, source: Scenario | str | Path, options: PlanOptions, out: str | Path | None, overwrite: bool
 ) -> Path | None:
-    """Return the file for a plan of a scenario; None to write no file."""
+    """Return the checked path of the plan.json to write; None to write no file.
+
+    world, source: the scenario, and the name, file or `Scenario` that the caller passed, which is not overwritten.
+    out: path in which placeholders are still to be replaced, or None.
+    """
     if out is None:
         return None
     source_file = None if isinstance(source, Scenario) else Path(source)

@@ -279,7 +279,7 @@ class _ReturnsRequest(NamedTuple):
 def _check_request(
     every: float, suggest: bool, out: str | Path | None, sitl: str | Path | None, points: int, *, overwrite: bool
 ) -> _ReturnsRequest:
-    """Check the options of `returns`, and convert them.
+    """Check the options of `returns`, which describes them, and convert them to a request.
 
     Raises PlanflyError for a folder that is a file or is not empty, and for a program that is not ArduPlane.
     """
@@ -352,7 +352,11 @@ def _judge_flight(setup: FlightSetup, track: Track, request: _ReturnsRequest, en
 def _suggest_remedies(
     world: ReturnWorld, starts: ReturnStarts, result: ReturnsResult, every: float
 ) -> tuple[RemedyTrial, ...]:
-    """Fly the returns again with each possible remedy, and return the remedies that help."""
+    """Simulate the returns again with each possible remedy, and return the remedies that help.
+
+    starts: starts of the returns in `result`.
+    every: time between the starts of two returns, s.
+    """
     # Remedies do not help a return that sinks to the ground in a take-off or a landing.
     judged_times = [judged_return.time for judged_return in result.returns.each]
     airborne_starts = starts.subset(np.flatnonzero(np.isin(starts.time, judged_times)))

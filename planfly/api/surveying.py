@@ -253,14 +253,17 @@ def _with_camera(setup: FlightSetup, camera: Camera | None) -> FlightSetup:
         plans.append(
             replace(plan, camera=replace(camera, front=front_overlap, side=side_overlap, interval=plan_camera.interval))
         )
-    return replace(setup, mission=replace(setup.mission, survey_plans=(*plans, SurveyPlan(None, 0.0, camera))))
+    return replace(
+        setup,
+        mission=replace(setup.mission, survey_plans=(*plans, SurveyPlan(photo=None, turn_around=0.0, camera=camera))),
+    )
 
 
 def _fly_survey(setup: FlightSetup, suggest: bool) -> SurveyResult:
     """Fly a mission, measure its photo lines, and look for remedies if requested."""
     _check_has_survey(setup)
     with stage(f"flying {length_and_duration_text(setup)}", "flying a survey") as advance:
-        flight = fly_and_judge(setup, None, advance, reference="never")
+        flight = fly_and_judge(setup, log=None, advance=advance, reference="never")
     result = _measure_survey(route_requirements(flight.setup), flight.track, flight.verdict)
     if not suggest or result.usable or result.unknown_lines:
         return result

@@ -22,8 +22,8 @@ def draw_battery(result: BatteryResult) -> Figure:
     the mission, or if one of its returns does not arrive.
     """
     goal = result.goal
-    needed = np.sort([row.required_capacity(goal.reserve) for row in result.known])
-    needed = needed[np.isfinite(needed)]
+    required_capacities = np.sort([row.required_capacity(goal.reserve) for row in result.known])
+    required_capacities = required_capacities[np.isfinite(required_capacities)]
     with clean_style():
         figure = new_figure(4.6)
         axes = figure.add_axes((0.08, 0.27, 0.89, 0.62))
@@ -35,7 +35,7 @@ def draw_battery(result: BatteryResult) -> Figure:
         axes.set_axisbelow(True)
         for spine in ("top", "right"):
             axes.spines[spine].set_visible(False)
-        if not needed.size:
+        if not required_capacities.size:
             axes.text(
                 0.5,
                 0.5,
@@ -45,7 +45,7 @@ def draw_battery(result: BatteryResult) -> Figure:
                 fontsize=9,
             )
             return figure
-        _draw_capacities(axes, result, needed)
+        _draw_capacities(axes, result, required_capacities)
         figure.legend(loc="lower left", bbox_to_anchor=(0.07, 0.0), ncols=3, fontsize=9)
     return figure
 

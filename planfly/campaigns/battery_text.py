@@ -14,7 +14,7 @@ _MAX_LISTED = 3
 
 
 def answer_line(result: BatteryResult) -> str:
-    """Return the smallest battery in one line."""
+    """Return a line with the smallest sufficient battery, or with the reason why there is none."""
     goal = result.goal
     flown_text = "in the mission and in every return" if result.has_returns else "in the mission (without returns)"
     flown_text += " that arrives" if any(row.blocked_returns for row in result.rows) else ""
@@ -127,7 +127,7 @@ def leg_rows(result: BatteryResult) -> list[tuple[str, str, str]]:
 
 
 def _own_battery_line(result: BatteryResult) -> str:
-    """Return a line that states whether the aircraft's own battery keeps the reserve."""
+    """Return a line on the aircraft's own battery: it is enough, too small, uncertain or not judged."""
     if result.is_guessed:
         return "the aircraft's battery is unknown, so it is not compared; state battery_wh in the scenario"
     if math.isnan(result.capacity):

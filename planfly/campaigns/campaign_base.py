@@ -409,7 +409,7 @@ def _terrain_error_at_home(base: CampaignBase, varied_terrain: Terrain) -> float
 
 
 def _with_moved_home(base: CampaignBase, home_error: float) -> tuple[Mission, PlacedMission]:
-    """Return a campaign's mission, and the same mission placed, with home's altitude shifted by an error.
+    """Return a campaign's mission with home's altitude shifted by an error, and its stops with map positions.
 
     An autopilot measures the altitude of home where it is armed, so heights above home shift with it.  ArduPlane also
     corrects its terrain data by their error at home (`AP_Terrain::update_reference_offset`), so heights above terrain

@@ -342,7 +342,8 @@ def fly_energy_campaign(
 ) -> tuple[EnergyRow, ...]:
     """Fly the flights of a campaign, and return rows with the energy of each, in the order of the draws.
 
-    mass_factor: mass of the aircraft relative to its stated mass.
+    mass_factor: factor on the mass of the aircraft's model.
+    advance: called after each flight with the number of flights done, their total and a text.
     A flight whose worker died has no row.
     """
     indices: Iterator[int] = iter(range(goal.flights))

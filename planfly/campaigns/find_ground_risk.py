@@ -216,7 +216,7 @@ def _return_paths(setup: FlightSetup, track: Track, interval: float, *, glide: b
     """Return the paths of the returns from a track; a mission without home has no returns.
 
     interval: time between the starts of two returns, s.
-    glide: True to simulate also glides, which are returns after an engine failure.
+    glide: True to simulate also returns after an engine failure; the paths of those that reach the ground are returned.
     """
     no_returns = _ReturnPaths(np.zeros(0), [], [], [], [])
     if setup.mission.home is None:
@@ -305,10 +305,10 @@ def _fall_areas(
     positions, velocities = (np.concatenate(values) for values in zip(*sampled, strict=True))
     impacts = [impact_points(positions, velocities, drag, find_wind, terrain) for drag in (0.0, plate_drag(aircraft))]
     points = np.stack([positions[:, :2], *impacts], axis=1)
-    ends = np.cumsum([len(each) for each, _ in sampled])[:-1]
+    ends = np.cumsum([len(path_positions) for path_positions, _ in sampled])[:-1]
     areas = []
-    for part in np.split(points, ends):
-        corners = np.concatenate([part[:-1], part[1:]], axis=1)
+    for path_points in np.split(points, ends):
+        corners = np.concatenate([path_points[:-1], path_points[1:]], axis=1)
         hulls = shapely.convex_hull(shapely.multipoints(shapely.points(corners)))
         areas.append(shapely.union_all(hulls))
     return areas
@@ -495,6 +495,8 @@ def _fly_excursions(
 ) -> tuple[ExcursionRow, ...]:
     """Fly the flights of a campaign, and return rows with their areas, in the order of the draws.
 
+    A flight without such areas, or whose worker died, has no row.
+
     path: planned path, and path of the flight without variations, m.
     Raises FlightError if no flight could be flown.
     """
@@ -544,7 +546,9 @@ def make_volumes(
     rows: tuple[ExcursionRow, ...],
     glide_ratio: float | None,
 ) -> GroundRiskResult:
-    """Make the volumes of a ground risk from the rows of its flights.
+    """Make flight geography, contingency volume and ground risk buffer from the rows of the flights.
+
+    Raises ScenarioError if the ground is unknown below some flights.
 
     path: planned path, and path of the flight without variations, m.
     glide_ratio: best glide ratio; None if glides are not requested.

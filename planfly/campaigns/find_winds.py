@@ -390,6 +390,7 @@ class _Search:
 
     def result_in_calm_air(self, rows: Sequence[FlightRow]) -> WindsResult:
         """Return the result of a search that ends after its flights in calm air.  rows: these flights."""
+        # In each direction, the boundary and both ends of its interval are calm air.
         boundaries = (WindBoundary(0.0, 0.0, 0.0, is_beyond_search=False),) * self.goal.directions
         self.flown = [(0, 0.0, False)] * len(rows)
         self.undecided = [(number, row.undecided_text) for number, row in enumerate(rows) if row.undecided_text]
@@ -506,7 +507,7 @@ def _fly_round(
     stored_flights: _StoredFlights,
     progress: "_ProgressReport",
 ) -> None:
-    """Fly the missing flights of a round, and write each to the table as soon as it is done."""
+    """Fly the flights of a round that are not in the table, and write each to the table as soon as it is done."""
     remaining_requests = iter(missing_requests)
     requested_by_request: dict[FlightRequest, RequestedFlight] = {}
 

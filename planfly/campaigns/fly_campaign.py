@@ -118,6 +118,10 @@ def fly_campaign(
     Flights are counted in the order of their indices, and flights after the deciding flight are deleted.  Answer and
     table therefore do not depend on the speed of the workers.  Flights completed before an error or Ctrl-C stay in the
     table.
+
+    store: the campaign's table, which may already hold flights.
+    advance: function called with the progress; None if it is not reported.
+    fly: function that flies one flight of the campaign.
     """
     estimator = Estimator(goal)
     flight_tally = _FlightTally(estimator, goal)

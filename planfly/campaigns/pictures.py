@@ -517,8 +517,9 @@ def _draw_legend(
     wind: tuple[float, float] | None,
     open_edge: float | None,
 ) -> None:
-    """Draw the legend of the chart of winds.
+    """Draw the legend of the go/no-go chart, with entries only for what the chart shows.
 
+    target, confidence, wind: as in `draw_go_no_go`.
     open_edge: maximum wind of the search, m/s, if a judged boundary is beyond it, otherwise None.
     """
     from matplotlib.lines import Line2D

@@ -292,7 +292,10 @@ def write_files(
 ) -> None:
     """Write ``summary.json``, ``report.html`` and the logs of the three worst flights.
 
-    Logs of other flights in the folder are removed.
+    A log that exists is kept.  Logs of flights that no longer belong to the worst are removed.
+
+    command: the command line that repeats the campaign, for the report.
+    advance: called after each log with the number of logs done, their total and a text.
     """
     (folder / "worst").mkdir(exist_ok=True)
     logged_flights = [
@@ -434,9 +437,12 @@ def write_winds(folder: Path, base: CampaignBase, winds: WindsResult, command: s
 def _winds_page(
     name: str, figure: Figure, winds: WindsResult, rows: Sequence[tuple[str, ...]], command: str
 ) -> AnswerPage:
-    """Return the page of a go/no-go chart.
+    """Return the page of a go/no-go chart, with a table of the boundaries.
 
-    rows: cells of a table with a row for each wind direction.
+    name: name of the campaign.
+    figure: the chart.
+    rows: cells of the table, one row for each wind direction.
+    command: the command line that repeats the search.
     """
     titles = ("wind from", "boundary", "interval", "flights", "fails most often", "judged")
     return AnswerPage(

@@ -225,7 +225,7 @@ def _read_margins(store: Store) -> dict[str, Floats]:
 
 
 def _margin_quantile(margins: Floats) -> float | None:
-    """Return the 5 % quantile of a rule's margins; None if it is unknown.
+    """Return the 5 % quantile of a rule's margins; None without a margin, or if the quantile is infinite.
 
     >>> _margin_quantile(np.array([-np.inf, *np.linspace(0.0, 2.0, 10)])) is None
     True

@@ -666,10 +666,10 @@ def with_place_numbers(columns: Mapping[str, NDArray[Any]]) -> dict[str, NDArray
         if name not in names:
             result[name] = column
             continue
-        found = [{} if text is None else places[text] for text in column]
-        items = [place.get("to_item") if place.get("item") is None else place["item"] for place in found]
-        result[f"{name}_kind"] = np.array([place.get("kind") for place in found], dtype=object)
-        result[f"{name}_index"] = np.array([place.get("index") for place in found], dtype=np.float64)
+        parsed_places = [{} if text is None else places[text] for text in column]
+        items = [place.get("to_item") if place.get("item") is None else place["item"] for place in parsed_places]
+        result[f"{name}_kind"] = np.array([place.get("kind") for place in parsed_places], dtype=object)
+        result[f"{name}_index"] = np.array([place.get("index") for place in parsed_places], dtype=np.float64)
         result[f"{name}_item"] = np.array(items, dtype=np.float64)
     return result
 

@@ -47,6 +47,8 @@ class WorkerPool(Protocol):
 def worker_pool(workers: Workers, base: CampaignBase, fly: FlyOne = fly_one) -> Iterator[WorkerPool]:
     """Yield the pool of workers that fly a campaign.
 
+    fly: function that flies one flight of the campaign.
+
     On exit, local processes are ended, or the campaign is removed from a cluster's workers.  Raises SchedulerError for
     an address that is not allowed, and for a scheduler that does not answer.
     """

@@ -211,7 +211,10 @@ def _print_parameters(args: argparse.Namespace) -> None:
 
 
 def _identify(args: argparse.Namespace) -> int:
-    """Identify an aircraft from logs, and make its folder."""
+    """Identify an aircraft from logs, make its folder, and print its performance; return the exit code.
+
+    Raises PlanflyError for a missing option, and for options that cannot be combined with --identify.
+    """
     for name in ("mass", "span", "out"):
         if getattr(args, name) is None:
             reason = "the folder to make" if name == "out" else f"the {name} of the aircraft in these flights"

@@ -225,7 +225,10 @@ def _result_folder(args: argparse.Namespace, kind: str) -> Path:
 
 
 def _repeat_flight(args: argparse.Namespace, folder: Path) -> int:
-    """Repeat one flight of the campaign in a folder, with a log; return the exit code of its outcome."""
+    """Repeat one flight of the campaign in a folder, with a log; return the exit code of the flight's outcome.
+
+    Raises PlanflyError if --json or --junit is also given.
+    """
     from logs.verdict.rule_words import rule_word
     from logs.verdict.wording import place_text
 

@@ -168,7 +168,13 @@ def _plan_front(args: argparse.Namespace) -> int:
 def _json_answer(
     plan: "Plan", target: "Path", code: int, risks: tuple[str, ...], dispersed: "DispersedFlights | None"
 ) -> object:
-    """Return the answer of ``planfly plan`` for --json."""
+    """Return the answer of ``planfly plan`` for --json.
+
+    target: file of the plan.
+    code: exit code.
+    risks: known causes of failures in dispersed flights.
+    dispersed: result of the dispersed flights; None if none were flown.
+    """
     from planfly.api.planning import conditions_of_plan
     from planfly.terminal.plan_answers import PlanAnswer
 

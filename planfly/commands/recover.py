@@ -30,7 +30,7 @@ def recover(args: argparse.Namespace) -> int:
     log = call_api(planfly.recover, args, out=target)
     if log is None:
         print(f"{source}: complete: there is nothing to recover, and nothing was written")
-        write_json_if_requested(args, lambda: _json_answer(None, None, None))
+        write_json_if_requested(args, lambda: _json_answer(target=None, rows=None, end_time=None))
         return FLYABLE
     print(f"log       {target} ({count_text(len(log.track), 'row')}, to {log.end_time:.1f} s)")
     warn_about_incomplete_log(log)

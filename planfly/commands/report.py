@@ -79,5 +79,5 @@ def _write_layout(args: argparse.Namespace) -> int:
         raise PlanflyError(message, file=args.log, field="--layout", value=args.layout)
     file = planfly.foxglove_layout(args.layout, overwrite=args.overwrite)
     print(f"layout    {file}")
-    write_json_if_requested(args, lambda: _json_answer([file], None, FLYABLE))
+    write_json_if_requested(args, lambda: _json_answer([file], verdict=None, code=FLYABLE))
     return FLYABLE

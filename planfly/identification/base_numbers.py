@@ -89,6 +89,7 @@ class _Probe:
         self._airspeed = aircraft.airspeed
         self._trim = trim.vector()
         fdm.apply_trim(self._trim)
+        # A slug has 14.59... kg, and a foot 0.3048 m.
         self.mass = read("inertia/mass-slugs")() * 14.593902937206364
         ixx, iyy, izz, ixz = (read(f"inertia/i{axes}-slugs_ft2")() * _SLUG_FT2 for axes in ("xx", "yy", "zz", "xz"))
         # JSBSim's product of inertia has the opposite sign.

@@ -151,8 +151,10 @@ def estimate_mass_change(estimate: Estimate, base: BaseModel) -> tuple[float, fl
     zero_lift_angle = -(c.lift_zero + estimate.values[INDEX["lift-offset"]]) / slope
     length = round(_BLOCK_SECONDS * equation.hertz)
     count = len(equation.measured) // length
+    # Fewer than six blocks are too few for a trend.
     if count < 6:
         return 0.0, np.inf
+    # The divisor is at least 0.02 rad, because near zero lift the relative error would grow without limit.
     relative_error = (equation.measured - equation.predicted) / np.maximum(0.02, equation.predicted - zero_lift_angle)
     means = relative_error[: count * length].reshape(count, length).mean(axis=1)
     time = (np.arange(count) + 0.5) / count - 0.5

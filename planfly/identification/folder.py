@@ -205,6 +205,7 @@ def _find_airspeeds(log: MotionLog, base: Aircraft) -> tuple[float, float, float
     Airspeeds that the log does not state are those of the base.  ArduPlane's parameters are equivalent airspeeds.
     """
     parameters = select_flown_parameters(log)
+    # Ratio of true to equivalent airspeed; 1.225 kg/m^3 is the density of the standard atmosphere at sea level.
     ratio = math.sqrt(1.225 / DENSITY)
     cruise, min_airspeed, max_airspeed = (
         parameters[name] * ratio if name in parameters else base_value
@@ -313,6 +314,7 @@ def format_posterior(identified: Identified) -> str:
     # Standard deviation of the logarithm; if it exceeds 1, nothing is known of the value.
     power = min(1.0, float(np.std(np.log(np.maximum(samples.power, 1.0)))))
     if (conflict := identified.power_conflict()) is not None:
+        # The interval of 95 % extends to 1.96 standard deviations, here to the largest power.
         power = min(1.0, max(power, math.log(conflict.largest_power / conflict.power) / 1.96))
     climb, sink = (float(np.degrees(np.std(angles))) for angles in (samples.climb, samples.sink))
     fastest = max_level_speeds(identified.numbers, identified.draws, DENSITY)

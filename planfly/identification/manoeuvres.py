@@ -52,7 +52,7 @@ def make_identification_mission(
     def add_item(
         command: int, frame: int, params: tuple[float, float, float, float], lat: float, lon: float, altitude: float
     ) -> None:
-        """Append a mission item with the next number, with rounded position and altitude."""
+        """Append a mission item with the next number, its position rounded as in a mission file (deg, m)."""
         number = len(items) + 1
         items.append(
             MissionItem(number, command, frame, params, round_to_grid(lat), round_to_grid(lon), round(altitude, 2))
@@ -80,6 +80,7 @@ def _lay_out_waypoints(
     repeats, max_rates: see `make_identification_mission`.
     """
     cruise = aircraft.airspeed
+    # Slow and fast legs are flown at a distance from the airspeed limits.
     slow_speed = aircraft.airspeed_min + 0.15 * (cruise - aircraft.airspeed_min)
     fast_speed = cruise + 0.6 * (aircraft.airspeed_max - cruise)
     medium_speed = 0.5 * (slow_speed + cruise)

@@ -235,6 +235,7 @@ def _format_reactions(numbers: BaseModel, values: Floats, base_properties: list[
     functions = _format_motor_functions(motor)
     functions["battery-power-w"] = f"<product> <p> {DRIVE_POWER} </p> {functions['battery-power-w']} </product>"
     body = "\n".join(f'<function name="motor/{name}"> {text} </function>' for name, text in functions.items())
+    # JSBSim wants the moment in lbf ft and the force in lbf: the factors convert from N m and N.
     torque = """<moment name="torque" frame="BODY">
   <function> <product> <p> motor/torque-n_m </p> <v> -0.7375621492772654 </v> </product> </function>
   <direction> <x> 1 </x> <y> 0 </y> <z> 0 </z> </direction>
@@ -256,7 +257,7 @@ def _format_reactions(numbers: BaseModel, values: Floats, base_properties: list[
 
 
 def _format_motor_functions(motor: Motor) -> dict[str, str]:
-    """Return the content of each JSBSim function ``motor/NAME`` by NAME, in order of computation."""
+    """Return the XML content of each JSBSim function ``motor/NAME`` by NAME, in order of computation."""
     shared = {
         "rho-kg_m3": "<product> <p> atmosphere/rho-slugs_ft3 </p> <v> 515.3788183931961 </v> </product>",
         "airspeed-mps": "<product> <p> velocities/vt-fps </p> <v> 0.3048 </v> </product>",

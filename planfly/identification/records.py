@@ -131,7 +131,7 @@ def flight_records(
         velocity=velocity,
         wind=wind,
         airspeed=airspeed,
-        density=1.225 / np.square(ratio),
+        density=1.225 / np.square(ratio),  # 1.225 kg/m^3 in the standard atmosphere at sea level
         height=height,
         controls=controls,
         current=battery[:, 1],
@@ -261,6 +261,7 @@ def _check_usable(log: MotionLog) -> None:
     for number, function in _read_servo_functions(log).items():
         if function in _FLAPS:
             min_pulse, max_pulse = _find_pulse_range(log, number)
+            # A flap moves if its pulses differ by more than 20 us.
             if max_pulse - min_pulse > 20.0:
                 message = f"output {number} (SERVO{number}_FUNCTION {function}, {_FLAPS[function]}) moves in flight"
                 raise LogError(f"{log.source}: {message}, but its effect is not modelled", file=log.source)
@@ -403,6 +404,8 @@ def _hold_samples(samples: Samples, grid: Floats) -> Floats:
 
 def _compute_true_airspeed_ratio(amsl: Floats) -> Floats:
     """Return the ratio of true to equivalent airspeed in the standard atmosphere.  amsl: altitude, m AMSL."""
+    # The air density of the standard atmosphere decreases with (1 - 2.25577e-5 h)^4.25588, and the ratio is the inverse
+    # square root of the density relative to sea level.
     return np.asarray((1.0 - 2.25577e-5 * np.clip(amsl, -500.0, 9000.0)) ** -2.12794)
 
 
@@ -423,6 +426,7 @@ def _find_vtol_rows(log: MotionLog, grid: Floats, pulses: Floats) -> Flags:
         return rows
     for number, function in _read_servo_functions(log).items():
         if function in _LIFT_MOTORS:
+            # A lifting motor runs at pulses above 1100 us.
             rows |= pulses[:, number - 1] > 1100.0
     return rows
 
@@ -433,6 +437,7 @@ def _find_settled_flight(log: MotionLog, grid: Floats, equivalent_airspeed: Floa
     Gaps are pauses in sensors, surface commands, airspeed or wind.  The first `_SETTLING_TIME_S` of each segment are
     False.
     """
+    # ARSPD_FBW_MIN is the name until ArduPlane 4.4, and 9 m/s its default.
     min_airspeed = log.parameters.get("AIRSPEED_MIN", log.parameters.get("ARSPD_FBW_MIN", 9.0))
     is_flying = (equivalent_airspeed > _MIN_AIRSPEED_FRACTION * min_airspeed) & ~_find_vtol_rows(log, grid, pulses)
     sensors = [

@@ -114,7 +114,9 @@ def load_served_scenario(options: ServeOptions) -> ServedScenario:
     scenario = load_scenario_with_options(scenario_name, options.flight_options)
     scenario, seed = fences.add_to_scenario(scenario), options.flight_options.get("seed")
     chosen_seed = choose_seed(scenario, seed)
-    return ServedScenario(scenario, load_uav(scenario), chosen_seed, None, fences.items, fences.rally)
+    return ServedScenario(
+        scenario, load_uav(scenario), chosen_seed, mission=None, fence=fences.items, rally=fences.rally
+    )
 
 
 def autopilot_parameters(scenario: Scenario, stated_values: Mapping[str, float]) -> dict[str, float]:
@@ -177,7 +179,7 @@ class ServedFlights:
             for number, (lat, lon) in enumerate(zip(lats.tolist(), lons.tolist(), strict=True), 1)
         )
         with contextlib.suppress(PlanflyError):
-            setup = make_setup(scenario, self._uav, Mission(None, items), self._served.seed)
+            setup = make_setup(scenario, self._uav, Mission(home=None, items=items), self._served.seed)
             judge_geometry(setup)
             rows, _ = Flight(setup, self.aircraft).fly_block(30)
             judge_flight(setup, as_track(rows), "warm")
@@ -199,7 +201,7 @@ class ServedFlights:
             flight.fly_block(1)
         except PlanflyError as error:
             text = StatusText(f"mission cannot be flown: {error}", CRITICAL)
-            return None, MissionJudged(request.number, False, False, (text,))
+            return None, MissionJudged(request.number, possible=False, flyable=False, texts=(text,))
         verdict = judge_geometry(setup)
         home = request.mission.home
         start = SnapshotMaker(setup, flight.map).start_snapshot(setup)
@@ -209,7 +211,9 @@ class ServedFlights:
         texts = describe_mission(setup, verdict)
         # A mission that is not judged in full is armed with a warning; for example, MAVSDK writes ground speeds.
         can_arm = verdict.flies or verdict.undecided
-        mission_judged = MissionJudged(request.number, True, can_arm, texts, home, items, start)
+        mission_judged = MissionJudged(
+            request.number, possible=True, flyable=can_arm, texts=texts, home=home, items=items, start=start
+        )
         return PreparedFlight(setup, flight.map), mission_judged
 
     def prepare_diversion(self, request: DivertFlight, position: Floats) -> PreparedFlight:
@@ -302,13 +306,13 @@ class ServedLog:
         if was_abandoned and end_time < 1.0:
             self._recorder.abandon()
             self._path.unlink()
-            return FlightJudged(False, ())
+            return FlightJudged(flyable=False, texts=())
         self._recorder.event(
             end_time, f"flight ended: {end_reason}", "info" if was_abandoned or end_reason == "completed" else "error"
         )
         if was_abandoned and should_abort():
             self._recorder.finish(end_reason)
-            return FlightJudged(False, (StatusText(f"log {self._path}, not judged yet", INFO),))
+            return FlightJudged(flyable=False, texts=(StatusText(f"log {self._path}, not judged yet", INFO),))
         requirements = route_requirements(self._setup)
         verdict, reference = judge_flight(self._setup, track, end_reason, requirements=requirements), None
         if end_reason == "completed" and verdict.failed:

@@ -56,10 +56,12 @@ def serve_vehicle(
 def _make_vehicle(
     link: Link, pool: "_FlightPool", served_scenario: ServedScenario, speed: float, on_message: Callable[[str], None]
 ) -> Vehicle:
-    """Make the vehicle that ground stations see, still without a mission.
+    """Make the vehicle that ground stations see, without a mission and waiting at the scenario's start.
 
+    link: MAVLink connection to the stations.
     pool: flight processes, which fly the missions.
     speed: multiple of real time.
+    on_message: called with each message of the vehicle, with the time of day before it.
     """
     uav = served_scenario.uav
     autopilot_settings = uav.autopilot.parameters

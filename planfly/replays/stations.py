@@ -37,6 +37,8 @@ def play_to_stations(
 
     speed: multiple of real time.
     wait: maximum time to wait for the first station, s; FlightError is raised if none answers.
+    should_stop: polled continuously; the replay ends when it returns True.
+    on_message: called with each message of the replay.
     """
     link = Link(access)
     snapshots = SnapshotMaker(log.setup, LocalMap.around(log.setup))
@@ -54,21 +56,21 @@ def play_to_stations(
         if not link.peers:
             addresses = ",".join(f"{host}:{port}" for host, port in access.to)
             raise FlightError.of_argument("to", addresses, f"no ground station has answered within {wait:g} s")
-        start_time, k = link.clock(), 0
+        start_time, row = link.clock(), 0
         player.announce(f"replay of {log.source} at {speed:g}x")
-        while k < len(rows) - 1 and not should_stop():
+        while row < len(rows) - 1 and not should_stop():
             log_time = (link.clock() - start_time) * speed
-            k = min(len(rows) - 1, int(np.searchsorted(track.time, log_time, side="right")))
-            snapshot = snapshots.snapshot(rows[k])
+            row = min(len(rows) - 1, int(np.searchsorted(track.time, log_time, side="right")))
+            snapshot = snapshots.snapshot(rows[row])
             if snapshot.is_finite:
                 status.snapshot = snapshot
                 status.current = max(0, int(items[min(int(snapshot.leg) + 1, len(items) - 1)]))
-            player.step(0.01)
-        if log.ended == "completed" and k == len(rows) - 1:
+            player.step(pause=0.01)
+        if log.ended == "completed" and row == len(rows) - 1:
             status.mission_state = COMPLETE
         status.armed = status.flying = False
         player.announce(f"replay ended: {log.ended or CUT_SHORT}")
-        player.continue_sending(1.5, should_stop)
+        player.continue_sending(seconds=1.5, should_stop=should_stop)
     finally:
         link.close()
 
@@ -95,13 +97,13 @@ class _Player:
         """Call stations until one answers, or for ``timeout`` seconds."""
         end = self._link.clock() + timeout
         while not self._link.peers and self._link.clock() < end and not should_stop():
-            self.step(0.05)
+            self.step(pause=0.05)
 
     def continue_sending(self, seconds: float, should_stop: ShouldStop) -> None:
         """Send the last snapshot for a number of seconds."""
         end = self._link.clock() + seconds
         while self._link.clock() < end and not should_stop():
-            self.step(0.02)
+            self.step(pause=0.02)
 
     def step(self, pause: float) -> None:
         """Handle messages from the stations, send the messages that are due, and sleep for `pause` seconds."""

@@ -86,7 +86,7 @@ def return_summary(
         returns = judge_returns(world, starts, interval)
     except PlanflyError as error:
         return ReturnSummary(f"not judged: {error}")
-    is_replaced = world.stands_in and not world.has_other_law
+    is_replaced = world.stands_in and not world.uses_other_autopilot
     replacement_text = f" (simulated with ArduPlane in place of {setup.autopilot.title})" if is_replaced else ""
     return ReturnSummary(headline(returns) + replacement_text, world, starts, returns)
 

@@ -218,6 +218,7 @@ def _is_lead_in_clear(world: ReturnWorld, row: Record) -> bool:
         return True
     velocity = np.array([float(row[f"velocity_{name}"]) for name in ("east", "north", "up")])
     start_position = np.array([float(row[name]) for name in ("east", "north", "up")])
+    # 26 points on the lead-in, from the start backwards.
     seconds_before = np.linspace(0.0, LEAD_IN_LENGTH_M / max(1.0, math.hypot(*velocity[:2])), 26)
     path = start_position - seconds_before[:, None] * velocity
     return bool((path[:, 2] - world.scenario.terrain.height(path[:, 0], path[:, 1])).min() > _MIN_LEAD_IN_HEIGHT_M)
@@ -255,10 +256,12 @@ def fly_by_program(
 def _judge_flown_return(
     world: ReturnWorld, simulated_return: SimulatedReturn, start: Record, track: Track, end_reason: str
 ) -> SimulatedReturn | None:
-    """Judge a return flown by the program.
+    """Judge a return that the autopilot program flew, by the same rules as a simulated return.
 
     simulated_return: simulation of the same return; its required height and its energy at the start are used.
-    start: state at the start of the return.
+    start: position and velocity at the start of the return.
+    track: flown track, which begins before the start.
+    end_reason: reason why the flight ended, such as "ground contact".
     Returns None if the flight did not reach the start.
     """
     path = positions_from_start(track, start)
@@ -340,6 +343,7 @@ def _flown_target(world: ReturnWorld, simulated_target: ReturnTarget, position: 
     position: path points, (t, 3) m.
     """
     end_point = position[-1, :2]
+    # The last course is the course over the last five seconds.
     earlier_point = position[max(0, len(position) - 5 * _ROWS_PER_SECOND), :2]
     course = math.atan2(*(end_point - earlier_point))
     best_target, best_rank = simulated_target, math.inf

@@ -159,23 +159,23 @@ def read_autosave(
     data = json.loads(
         utf8_text(read_small_file(file, _MAX_AUTOSAVE_BYTES, "session", PlanflyError), file, PlanflyError)
     )
-    first = document.setup.mission
+    opened_mission = document.setup.mission
     is_same_file = bool(document.on_disk) and data.get("file") == _file_digest(document)
     if data["schema"] != _SCHEMA:
         return None
     unused_edits = 0
-    if data["first"] != mission_data(first) and not is_same_file:
+    if data["first"] != mission_data(opened_mission) and not is_same_file:
         is_unsaved = data["mission"] != data["first"] and data.get("in_file") is not True
         unused_edits = max(1, len(data.get("steps", []))) if is_unsaved else 0
-        data |= {"mission": mission_data(first), "steps": [], "undone": [], "plan": None}
+        data |= {"mission": mission_data(opened_mission), "steps": [], "undone": [], "plan": None}
     if settings is not None and settings["scenario"] == data.get("scenario"):
         # The certificate of a plan applies only to the settings for which it was made.
         has_same_settings = all(data.get(key) == value for key, value in settings.items())
         data |= settings | ({} if has_same_settings else {"plan": None})
-    is_opened = data["mission"] == mission_data(first) or (is_same_file and data.get("in_file") is True)
-    mission = first if is_opened else mission_from_data(data["mission"], first)
+    is_opened = data["mission"] == mission_data(opened_mission) or (is_same_file and data.get("in_file") is True)
+    mission = opened_mission if is_opened else mission_from_data(data["mission"], opened_mission)
     steps, undone_steps = (
-        [(mission_from_data(step, first), str(text)) for step, text in data.get(name, [])]
+        [(mission_from_data(step, opened_mission), str(text)) for step, text in data.get(name, [])]
         for name in ("steps", "undone")
     )
     try:
@@ -197,13 +197,13 @@ def set_autosave_aside(file: Path) -> Path:
     return file.replace(file.with_name(f"{file.stem}-earlier-{digest}{file.suffix}"))
 
 
-def sibling_autosave_path(file: Path, first: Mission) -> Path:
+def sibling_autosave_path(file: Path, opened_mission: Mission) -> Path:
     """Return the autosave path for a document opened later, named by a digest of its mission.
 
     file: autosave path of the first document, in the same folder.
-    first: the mission that was opened.
+    opened_mission: the mission as it was opened.
     """
-    digest = hashlib.sha256(json.dumps(mission_data(first)).encode()).hexdigest()[:8]
+    digest = hashlib.sha256(json.dumps(mission_data(opened_mission)).encode()).hexdigest()[:8]
     return file.with_name(f"{file.stem}-{digest}{file.suffix}")
 
 
@@ -335,10 +335,10 @@ def mission_data(mission: Mission) -> Json:
     }
 
 
-def mission_from_data(data: Json, first: Mission) -> Mission:
+def mission_from_data(data: Json, opened_mission: Mission) -> Mission:
     """Make a mission from the data of `mission_data`.
 
-    Fields that are not in the data are taken from `first`.
+    opened_mission: mission from which the fields that are not in the data are taken.
 
     Raises ValueError, LookupError or TypeError for other data.
     """
@@ -366,5 +366,5 @@ def mission_from_data(data: Json, first: Mission) -> Mission:
             raise ValueError(f"item {item.seq}: {problem}")
     home = data["home"]
     return replace(
-        first, items=tuple(items), home=None if home is None else Home(*(to_number(value) for value in home))
+        opened_mission, items=tuple(items), home=None if home is None else Home(*(to_number(value) for value in home))
     )

@@ -266,7 +266,11 @@ def _state_changes(old_results: _Results, new_results: _Results) -> list[str]:
             not_before = old_result is not None and old_result.level == _NOT_REACHED
             new_failures.append(_change_text(rule, result, old_result, f"fails now{', not flown before' * not_before}"))
         elif result.ok is not False and old_failure is not None and result.level == _NOT_REACHED:
-            ended_failures.append(_change_text(rule, old_failure._replace(place=result.place), None, "not flown now"))
+            ended_failures.append(
+                _change_text(
+                    rule, old_failure._replace(place=result.place), old_result=None, state_text="not flown now"
+                )
+            )
         elif result.ok is not False and old_failure is not None:
             ended_failures.append(
                 _change_text(rule, result, old_result, "now passes" if result.ok else "is not judged now")
@@ -276,9 +280,9 @@ def _state_changes(old_results: _Results, new_results: _Results) -> list[str]:
         if old_result.ok is False and (rule, key) not in new_results:
             was_removed = key not in current_keys and key[0] in (*_ITEM_PLACE_KINDS, _REMOVED_PLACE)
             ended_failures.append(
-                f"the former {_change_text(rule, old_result, None, 'is gone')}"
+                f"the former {_change_text(rule, old_result, old_result=None, state_text='is gone')}"
                 if was_removed
-                else _change_text(rule, old_result, None, "now passes")
+                else _change_text(rule, old_result, old_result=None, state_text="now passes")
             )
     return new_failures + ended_failures
 

@@ -286,6 +286,8 @@ def _format_losses(context: EditContext, mission: Mission, text: str, name: str,
     """Return a line for each part of the mission that a ground station's file cannot store.
 
     text: the mission as text of this file.
+    name: name of the file.
+    kind: kind of the file, such as "waypoints".
     """
     parsed, losses = parse_mission(text, name), []
     lost_counts: Mapping[str, tuple[int, str]] = {

@@ -89,6 +89,7 @@ class Guard:
         status, reason = request_refusal(scope, self._port)
         if status and scope["type"] == "websocket":
             await receive()
+            # Code 1008 is a policy violation (RFC 6455).
             await send({"type": "websocket.close", "code": 1008})
             return
 

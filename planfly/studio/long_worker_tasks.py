@@ -44,7 +44,7 @@ _WORKERS = Workers(count=1)
 def run_returns_task(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any]:
     """Fly a mission, and judge returns to launch from points along the flight.
 
-    Returns the results of the returns as page data.
+    Returns state, headline and result lines as page data.  Raises MissionError without a home or terrain.
 
     payload: editing context, and mission.
     """
@@ -56,7 +56,7 @@ def run_returns_task(payload: tuple[EditContext, Mission], advance: Advance) -> 
         raise MissionError(f"{mission.source}: {reason}", field=missing_input)
     world = make_return_world(setup)
     flight = fly_and_judge(
-        setup, None, lambda done, total, remark: advance(0.5 * done, total, remark), reference="never"
+        setup, log=None, advance=lambda done, total, remark: advance(0.5 * done, total, remark), reference="never"
     )
     interval = max(1.0, (float(flight.track.time[-1]) if len(flight.track) else 0.0) / _MAX_RETURNS)
     starts = return_starts(setup, flight.track, interval)

@@ -212,6 +212,7 @@ def read_message(text: str | bytes) -> Message:
     pydantic_core._pydantic_core.ValidationError: ...
     """
     size = len(text)
+    # The kind of a message is among its first 200 characters.
     if size > MAX_MESSAGE_CHARACTERS and '"open"' not in str(text[:200]):
         raise ValueError("a message that is too long")
     return _ADAPTER.validate_json(text)

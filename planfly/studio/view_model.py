@@ -333,6 +333,7 @@ def profile_json(scenario: Scenario, setup: FlightSetup) -> Json:
     waypoint_distance = route_distance(route)
     distance, points = route_samples(route, max(float(waypoint_distance[-1]) / _PROFILE_SAMPLES, 1.0))
     ground = terrain_altitudes(scenario, points)
+    # The picture begins 50 m below path and ground, and ends 300 m above the path.
     bottom = float(min(points[:, 2].min(), np.nanmin(ground) if ground is not None else np.inf)) - 50.0
     top = float(points[:, 2].max()) + 300.0
     view = PathPlane(distance, points, ground, bottom, top)

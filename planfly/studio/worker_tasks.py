@@ -52,7 +52,7 @@ def fly(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any
     """
     context, mission = payload
     setup = context.setup(mission)
-    flight = fly_and_judge(setup, None, advance, reference="never")
+    flight = fly_and_judge(setup, log=None, advance=advance, reference="never")
     requirements = route_requirements(setup)
     judged_mission = JudgedMission(mission, setup, requirements, flight.verdict)
     states = place_states(requirements, flight.verdict.findings)

@@ -310,7 +310,7 @@ class _Trials:
             return None
         mission, requirements, distances = self._setup.mission, route_requirements(self._setup), []
         for survey in self._surveys:
-            measure = measure_overlap(requirements, None, survey)
+            measure = measure_overlap(requirements, aligned=None, survey=survey)
             distance = math.floor((None if measure is None else measure.needed_photo_spacing) or 0.0)
             first_line, *_ = survey.lines
             if 1.0 <= distance < first_line.photo:
@@ -655,7 +655,7 @@ def missing_height(measure: OverlapMeasure) -> float:
 
 
 def _with_gates(setup: FlightSetup, surveys: Sequence[Survey]) -> Mission:
-    """Return a setup's mission with gates (CONDITION_GATE) at the ends of lines that have leads.
+    """Return a setup's mission with gates (CONDITION_GATE) at the ends of photo lines with turn-around distances.
 
     The mission is unchanged for an autopilot without gates.
     """

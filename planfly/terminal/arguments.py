@@ -38,7 +38,10 @@ def number_parser(keyword: str) -> Callable[[str], Any]:
 
 
 def parse_wind(text: str) -> tuple[float, float]:
-    """Parse SPEED,FROM: speed (m/s) of a steady wind, and direction (degrees) from which the wind blows."""
+    """Parse SPEED,FROM: speed (m/s) of a steady wind, and direction (degrees) from which the wind blows.
+
+    Raises argparse.ArgumentTypeError for other text.
+    """
     try:
         speed, from_deg = (float(part) for part in text.split(","))
     except ValueError:
@@ -54,7 +57,8 @@ def parse_wind(text: str) -> tuple[float, float]:
 def parse_camera(text: str) -> tuple[float, ...]:
     """Parse WxH,FOCAL or WxH,FOCAL,FRONT,SIDE.
 
-    They are the sensor size and the focal length (mm), and the photo overlaps (percent).
+    They are the sensor size and the focal length (mm), and the photo overlaps (percent).  Raises
+    argparse.ArgumentTypeError for other text.
 
     >>> parse_camera("23.5x15.6,16")
     (23.5, 15.6, 16.0)
@@ -70,7 +74,10 @@ def parse_camera(text: str) -> tuple[float, ...]:
 
 
 def parse_position(text: str) -> tuple[float, float]:
-    """Parse LAT,LON: latitude and longitude of a position, degrees."""
+    """Parse LAT,LON: latitude and longitude of a position, degrees.
+
+    Raises argparse.ArgumentTypeError for other text.
+    """
     try:
         lat, lon = (float(part) for part in text.split(","))
     except ValueError:
@@ -83,7 +90,10 @@ def parse_position(text: str) -> tuple[float, float]:
 
 
 def parse_area(text: str) -> tuple[float, ...]:
-    """Parse S,W,N,E: edges of an area, degrees; the API checks the order of the edges."""
+    """Parse S,W,N,E: edges of an area, degrees; the API checks the order of the edges.
+
+    Raises argparse.ArgumentTypeError for other text.
+    """
     try:
         edges = tuple(float(part) for part in text.split(","))
     except ValueError:
@@ -94,7 +104,7 @@ def parse_area(text: str) -> tuple[float, ...]:
 
 
 def parse_autopilots(text: str) -> list[str]:
-    """Parse the names of autopilots, separated by commas."""
+    """Parse the names of autopilots, separated by commas; raise argparse.ArgumentTypeError for an unknown name."""
     names = [name.strip() for name in text.split(",")]
     for name in names:
         if name not in CHOICES["autopilot"]:
@@ -115,7 +125,7 @@ def parse_time_or_stations(text: str) -> float | str:
 def parse_budget(text: str) -> tuple[int | None, float | None]:
     """Parse a number of evaluations, or a number of seconds if the text ends in s.
 
-    Returns (evaluations, seconds).
+    Returns (evaluations, seconds), one of which is None.  Raises argparse.ArgumentTypeError for other text.
     """
     try:
         if text.endswith("s"):
@@ -128,7 +138,10 @@ def parse_budget(text: str) -> tuple[int | None, float | None]:
 
 
 def parse_threat(text: str) -> tuple[float, float, float, float]:
-    """Parse EAST,NORTH,KILL,DETECTION: position, kill radius and detection radius of a pop-up threat, m."""
+    """Parse EAST,NORTH,KILL,DETECTION: position, kill radius and detection radius of a pop-up threat, m.
+
+    Raises argparse.ArgumentTypeError for other text.
+    """
     try:
         east, north, kill, detection = (float(part) for part in text.split(","))
     except ValueError:
@@ -141,9 +154,9 @@ def parse_threat(text: str) -> tuple[float, float, float, float]:
 
 
 def parse_problems(text: str) -> tuple[int, ...]:
-    """Parse threat counts separated by commas, such as "7,15".
+    """Parse threat counts separated by commas, such as "7,15", and return them sorted without duplicates.
 
-    Only the four counts of the paper are allowed.
+    Only the four counts of the paper's problems are allowed: 7, 15, 30 and 60.
     """
     parts = [part.strip() for part in text.split(",")]
     numbers = sorted({int(part) for part in parts if part.isdecimal()})

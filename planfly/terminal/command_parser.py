@@ -100,7 +100,7 @@ class CommandParser(argparse.ArgumentParser):
         self.extra_help: Callable[[], str] = str
 
     def error(self, message: str) -> NoReturn:
-        """Print a message in one line, as for all other bad input, and exit."""
+        """Print a message on bad usage in one line, and exit with the code for bad input."""
         line = f"{self.prog}: {message} (see {self.prog} --help)"
         print(colour_text(line, "bad", sys.stderr), file=sys.stderr)
         raise UsageExit(line)

@@ -224,7 +224,7 @@ def _with_wind_of_log(scenario: Scenario, flight: LoggedFlight, options: LogOpti
     if wind is None:
         source_text = "from the scenario, because the log contains no wind" if options.get("scenario") else ""
         return scenario, source_text
-    windy_scenario = with_wind(scenario, wind.speed, wind.from_course, None)
+    windy_scenario = with_wind(scenario, wind.speed, wind.from_course, turbulence=None)
     course_text = f"{round(math.degrees(wind.from_course)) % 360:03d}°"
     return windy_scenario, f"from {course_text}, according to {wind.source} of the log"
 
@@ -432,6 +432,10 @@ def fly_draws(
     A draw is a sampled variant of the aircraft in a sampled wind.  A draw is left out if its aircraft cannot start or
     flies none of the legs.
 
+    setup, track: setup and track of the logged flight.
+    aircraft: name or folder of the aircraft that is varied.
+    advance: called after each draw with the number of draws done, their total and a text.
+
     Raises LogError for a flight that followed no part of its mission, or if no draw flies.
     """
     setup = start_after_takeoff(setup, track)
@@ -440,7 +444,7 @@ def fly_draws(
     for number, draw in enumerate(draws, 1):
         # The aircraft of a draw may have no steady flight at the start, or lose it at once.
         with contextlib.suppress(StartError, LogError):
-            flights.append(_refly_followed_legs(setup, legs, aircraft, draw.turbulence, None, draw))
+            flights.append(_refly_followed_legs(setup, legs, aircraft, draw.turbulence, advance=None, draw=draw))
         advance(number, len(draws), f"flight {number} of {len(draws)}")
     if not flights:
         name = setup.scenario.name
@@ -501,12 +505,16 @@ def _refly_followed_legs(
     """Simulate followed legs with the model of an aircraft, and compare the flight with the log.
 
     aircraft, turbulence: replace the aircraft and the turbulence of the setup unless None.
+    advance: called with the distance flown, the total (m) and a text; None to report nothing.
     draw: variations of aircraft, wind and start of one sampled flight, or None.
     Raises LogError if the model flies none of the legs.
     """
-    scenario = with_wind(with_flight(setup.scenario, aircraft=aircraft), None, None, turbulence)
+    scenario = with_wind(
+        with_flight(setup.scenario, aircraft=aircraft), speed=None, from_course=None, turbulence=turbulence
+    )
     if draw is not None:
         wind = scenario.wind
+        # The wind blows from `from_course`; the drawn wind is a velocity towards north and east.
         north = -wind.speed * math.cos(wind.from_course) + draw.wind[0]
         east = -wind.speed * math.sin(wind.from_course) + draw.wind[1]
         scenario = with_wind(scenario, math.hypot(north, east), math.atan2(-east, -north) % (2.0 * math.pi), turbulence)
@@ -557,4 +565,5 @@ def _followed_legs(setup: FlightSetup, track: Track) -> list[FlownLegs]:
         raise LogError(
             f"{name}: the flight followed no leg of its mission, so there is nothing to fly again", file=name
         )
+    # The difference is the number of legs, negated.
     return sorted(stretch_legs, key=lambda legs: legs.first - legs.last)

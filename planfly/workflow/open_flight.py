@@ -102,8 +102,11 @@ def _open_plan(
     fences: NamedFences,
     terrain: str | None,
 ) -> FlightSetup:
-    """Make the setup of a plan in its own scenario, or of its mission in a named scenario.
+    """Make the setup of a plan in its own scenario, or of its mission in the scenario that the options name.
 
+    program: autopilot program that flies the mission; None for a simulated autopilot.
+    engine: choice between the compiled flight model and JSBSim.
+    fences: fences and zones in addition to those of the plan.
     terrain: elevation file that replaces the terrain of the plan; None keeps the terrain.
     """
     named_world = options.get("scenario")

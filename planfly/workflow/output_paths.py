@@ -177,8 +177,11 @@ def file_target(
     """Replace the placeholders in the path of an output file; check the path, and return it.
 
     `check_output_file` checks it.  A path with placeholders in a missing folder is not checked, because the caller
-    makes the folder.
+    makes the folder.  Raises PlanflyError for another suffix.
+
+    name, seed: values of the placeholders {name} and {seed}.
     suffix: suffix that the file must have, because its format does not depend on its name.
+    source: file from which the output is made, which must not be overwritten.
     """
     path = expand_path_pattern(target, name, seed)
     if path.suffix.lower() != suffix:

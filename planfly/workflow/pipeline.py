@@ -150,7 +150,7 @@ def plan_then_fly(scenario: Scenario, *, seed: int | None = None, log: Path | No
     plan = make_plan(scenario, uav, chosen_seed)
     mission = replace(mission_of_plan(plan, uav, "plan"), autopilot=uav.autopilot.name)
     if not plan.feasible:
-        return PlanThenFly(plan, mission, None, judge_plan_only(plan, planning_conditions(scenario, uav)))
+        return PlanThenFly(plan, mission, track=None, verdict=judge_plan_only(plan, planning_conditions(scenario, uav)))
     setup = make_setup(scenario, uav, mission, chosen_seed, plan=plan)
     flight = fly_and_judge(setup, log)
     return PlanThenFly(plan, mission, flight.track, flight.verdict)

@@ -81,7 +81,7 @@ class Trial:
 
 
 def max_explaining_flights(setup: FlightSetup) -> int:
-    """Return how many flights of a setup's length may be flown to explain its verdict.
+    """Return the maximum number of flights of a setup's length that may explain its verdict.
 
     >>> from logs.recording.example_log import example_log
     >>> max_explaining_flights(example_log().setup) > 100

@@ -96,7 +96,9 @@ def test_words_can_be_read_and_limits_are_no_threats(dark: bool) -> None:
 
 def test_every_role_reaches_page_and_script() -> None:
     style, looks = theme.css_variables(), theme.page_styles()
-    for role in theme.LOOKS:
+    for role in theme.ROLE_STYLES:
         assert style.count(f"--{role}: ") == 2
         assert set(looks[role]) == {"width", "dash", "fill", "size", "face", "edge", "symbol"}
-    assert all(re.fullmatch("#[0-9a-f]{6}", text) for look in theme.LOOKS.values() for text in (look.light, look.dark))
+    assert all(
+        re.fullmatch("#[0-9a-f]{6}", text) for look in theme.ROLE_STYLES.values() for text in (look.light, look.dark)
+    )

@@ -185,7 +185,7 @@ class ColumnLog:
     def parameters(self) -> dict[str, float]:
         """Return the autopilot's parameters by name, from the parameter columns and from [parameters].
 
-        A value in [parameters] takes precedence.
+        A value in [parameters] takes precedence.  Raises LogError if the columns of names and values differ in length.
         """
         if self.table.parameter_columns is None:
             return dict(self.table.parameters)
@@ -209,7 +209,10 @@ class ColumnLog:
         return LogError.at(self.table_path, field, value, allowed)
 
     def _find_data_path(self, clock: ClockTable) -> Path:
-        """Return the data file of a clock: the clock's file, else the opened data file, else the table's file."""
+        """Return the data file of a clock: the clock's file, else the opened data file, else the table's file.
+
+        Raises LogError if none of them is named.
+        """
         if clock.file is not None:
             return self.table_path.parent / clock.file
         if self.path != self.table_path:
@@ -463,7 +466,7 @@ class ColumnLog:
         """Return the times and values of the rows in which the value changes.
 
         They are the measurements of a column that is written more often than it is measured.  Raises LogError if the
-        value changes more often than the stated rate.
+        value changes more often than the rate that the table states for the column.
         """
         is_changed: Flags = np.concatenate([[True], np.diff(values) != 0.0]) & np.isfinite(values)
         rate = is_changed.sum() / max(1e-9, float(np.ptp(time)))

@@ -35,7 +35,7 @@ _COMMANDS = {
 
 
 def read_column_motion(path: Path) -> MotionLog:
-    """Read the motion of an aircraft by a table of columns.
+    """Read the motion of an aircraft from a data file, as a table of columns describes it.
 
     path: a table of columns, or a data file with a table next to it.
 
@@ -205,6 +205,8 @@ def _find_airspeed_ratio(ratio: Samples, height: Samples, time: Floats) -> Float
     if len(ratio.time):
         return np.asarray(np.interp(time, ratio.time, ratio.values[:, 0]))
     altitude = np.interp(time, height.time, height.values[:, 0]) if len(height.time) else np.zeros(len(time))
+    # The air density of the standard atmosphere decreases with (1 - 2.25577e-5 h)^4.25588, and the ratio is the inverse
+    # square root of the density relative to sea level.
     return np.asarray((1.0 - 2.25577e-5 * np.clip(altitude, -500.0, 9000.0)) ** -2.12794)
 
 
@@ -238,8 +240,8 @@ def _read_controls(log: ColumnLog) -> tuple[Samples, tuple[bool, bool, bool], bo
 def _read_surface(log: ColumnLog, name: str, halves: tuple[str, ...]) -> tuple[Series, str] | None:
     """Return a surface's deflections and their unit, or None if the table lacks them.
 
-    They come from the surface's own column, or else from the columns of its left and right half.  Raises LogError if
-    one half is an angle and the other a fraction.
+    They come from the surface's own column, or else from the columns of its left and right half: as their mean, or for
+    ailerons as half their difference.  Raises LogError if one half is an angle and the other a fraction.
     """
     if log.has(name):
         return log.series(name), log.unit(name)

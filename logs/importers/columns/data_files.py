@@ -72,23 +72,30 @@ def read_data_file(path: Path) -> DataFile:
 
 
 def _read_csv(path: Path) -> DataFile:
-    """Read a CSV file with a header line; remarks may come before it, and a line with units after it."""
+    """Read a CSV file with a header line; remarks may come before it, and a line with units after it.
+
+    Raises LogError for a file without rows or without column names, and for two columns with the same name.
+    """
     import pandas as pd
 
     text = path.read_bytes().decode("utf-8-sig", errors="replace")
     lines = text.splitlines()
-    first = next((k for k, line in enumerate(lines) if line.strip() and not _is_remark(line, lines[k + 1 : k + 2])), -1)
-    if first < 0:
+    header_index = next(
+        (k for k, line in enumerate(lines) if line.strip() and not _is_remark(line, lines[k + 1 : k + 2])), -1
+    )
+    if header_index < 0:
         raise LogError(f"{path}: holds no rows; expected columns of numbers", file=path)
-    header = lines[first].lstrip("#% ")
+    header = lines[header_index].lstrip("#% ")
     separator = max(_SEPARATORS, key=header.count)
     names = [name.strip().strip('"') for name in header.split(separator)]
     if all(_NUMBER.fullmatch(name) for name in names):
-        raise LogError(f"{path}: line {first + 1}: {header[:40]!r}: expected the names of the columns", file=path)
+        raise LogError(
+            f"{path}: line {header_index + 1}: {header[:40]!r}: expected the names of the columns", file=path
+        )
     if len(set(names)) < len(names):
         repeated = next(name for k, name in enumerate(names) if name in names[:k])
         raise LogError.at(path, "columns", repr(repeated), "two columns have this name")
-    rows = [(k, line) for k, line in enumerate(lines[first + 1 :], first + 2) if line.strip()]
+    rows = [(k, line) for k, line in enumerate(lines[header_index + 1 :], header_index + 2) if line.strip()]
     units: dict[str, str] = {}
     if rows and not any(_NUMBER.fullmatch(cell) for cell in rows[0][1].split(separator) if cell.strip()):
         cells = [cell.strip().strip('"[]()') for cell in rows.pop(0)[1].split(separator)]

@@ -204,13 +204,13 @@ def guess_column_table(paths: Sequence[Path], target: Path) -> str:
     """
     file_names = [Path(os.path.relpath(path, target.parent)).as_posix() for path in paths]
     files = {name: read_data_file(path) for name, path in zip(file_names, paths, strict=True)}
-    times = [clock for file, data in files.items() for clock in _find_clocks(data, file)]
+    all_clocks = [clock for file, data in files.items() for clock in _find_clocks(data, file)]
     clocks: list[_Clock] = []
-    for clock in sorted(times, key=lambda clock: -clock.length):
+    for clock in sorted(all_clocks, key=lambda clock: -clock.length):
         # Of several columns of times in a group, use the one with the most time in common with the longest group.
         clocks_of_group = [
             other
-            for other in times
+            for other in all_clocks
             if (other.file, other.prefix, other.length) == (clock.file, clock.prefix, clock.length)
         ]
         best = max(clocks_of_group, key=lambda candidate: candidate.overlap(clocks[0]) if clocks else 0.0)
@@ -264,12 +264,12 @@ def _find_clocks(data: DataFile, file: str) -> Iterator[_Clock]:
             yield _Clock(file, prefix, column, unit, len(values), span)
 
 
-def _find_time_unit(values: Column, stated: str) -> str:
+def _find_time_unit(values: Column, stated_unit: str) -> str:
     """Return the unit in which a column has increasing times at usual intervals.
 
-    The unit is "iso" for dates with times of day.  Return "" if the column has no such times.
+    The unit is "iso" for dates with times of day.  Return "" if the column is not such a series of times.
 
-    stated: unit from the column's name or the file, or "".
+    stated_unit: unit from the column's name or the file, or "".
     """
     if values.dtype.kind == "M":
         return "iso"
@@ -279,7 +279,7 @@ def _find_time_unit(values: Column, stated: str) -> str:
     if len(steps) < 2 or not np.isfinite(steps).all() or (steps < 0.0).any() or not (steps > 0.0).any():
         return ""
     usual_step = float(np.median(steps[steps > 0.0]))
-    units = [stated] if stated in UNITS["time"] else ["s", "ms", "us", "ns"]
+    units = [stated_unit] if stated_unit in UNITS["time"] else ["s", "ms", "us", "ns"]
     return next((unit for unit in units if _STEPS_S[0] <= usual_step * UNITS["time"][unit] <= _STEPS_S[1]), "")
 
 
@@ -301,12 +301,12 @@ def _guess_entries(quantity: str, clocks: Sequence[_Clock], files: dict[str, Dat
                     yield guess
 
 
-def _guess_entry(quantity: str, column: str, clock: _Clock, values: Column, stated: str) -> _Guess | None:
+def _guess_entry(quantity: str, column: str, clock: _Clock, values: Column, stated_unit: str) -> _Guess | None:
     """Return a column as the guessed entry of a quantity, with its unit and frame.
 
     Return None if the column is not numeric, if it is constant, or if it is implausible in every unit.
 
-    stated: unit from the column's name or the file, or "".
+    stated_unit: unit from the column's name or the file, or "".
     """
     entry = QUANTITIES[quantity]
     if quantity == "mode":
@@ -317,10 +317,12 @@ def _guess_entry(quantity: str, column: str, clock: _Clock, values: Column, stat
     known = numbers[np.isfinite(numbers)]
     if not known.size or not np.ptp(known):
         return None
-    unit = stated if stated in UNITS[entry.dimension] else _find_plausible_unit(quantity, known)
+    unit = stated_unit if stated_unit in UNITS[entry.dimension] else _find_plausible_unit(quantity, known)
     if unit is None:
         return None
-    reason = f": largest value {np.abs(known).max():.4g}" + (f", named {stated}" if stated and unit == stated else "")
+    reason = f": largest value {np.abs(known).max():.4g}" + (
+        f", named {stated_unit}" if stated_unit and unit == stated_unit else ""
+    )
     return _Guess(quantity, column, clock, unit, _guess_frame(quantity, column, known), reason)
 
 

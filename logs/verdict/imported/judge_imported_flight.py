@@ -55,7 +55,9 @@ def imported_lines(
 ) -> tuple[str, ...]:
     """Return the lines of the summary on an imported flight, the headline first.
 
-    own_answer: answer of the verdict at its own level, with the headline.
+    For a flight that was not imported, the headline is the only line.
+
+    own_answer: answer of the verdict at the level "flown", with the headline.
     flown_stretches: legs flown in each judged stretch of the log.
     """
     imported_log = setup.imported_log
@@ -224,6 +226,7 @@ def damage_text(damage: Damage) -> str:
 
 def _start_time_text(imported_log: ImportedLog) -> str:
     """Return a clause on the date and time at the log's time 0; "" without a plausible date."""
+    # A date before 1970 or after 2099 (4.1e9 s) shows that the log's clock was not set.
     if not isfinite(imported_log.utc_start) or not 0.0 <= imported_log.utc_start < 4.1e9:
         return ""
     return f", time 0 s is {datetime.fromtimestamp(imported_log.utc_start, UTC):%Y-%m-%d %H:%M:%S} UTC"

@@ -132,7 +132,10 @@ def compare_with_model(
     """Compare an imported flight with a simulated flight of the same route.
 
     setup: setup of the simulated flight.
+    stretch_legs: legs that the imported flight flew.
+    simulated: track of the simulated flight.
     end_reason: reason for the end of the simulated flight.
+    stands_in: True if the log's aircraft is unknown, and another aircraft's model flew.
 
     Raises LogError if the simulated flight has too few rows.
 
@@ -272,19 +275,20 @@ def _reduce_values(values: Floats, reduce: str) -> float:
 
 
 def _turn_pair(
-    first: int,
-    k: int,
+    first_waypoint: int,
+    waypoint: int,
     pairs: Sequence[tuple[RouteRequirements, AlignedTrack]],
     corners: Sequence[Sequence[CornerPass]],
 ) -> TurnPair:
-    """Compare the flown and the simulated turn at waypoint `k` of the stretch.
+    """Compare the flown and the simulated turn at one waypoint of the stretch.
 
-    first: number of the stretch's first waypoint in the whole route.
+    first_waypoint: number of the stretch's first waypoint in the whole route.
+    waypoint: number of the waypoint in the stretch.
     pairs: requirements and aligned track of the flown and of the simulated flight.
     corners: passes of the waypoints in the flown and in the simulated flight.
     """
-    flown_turn, model_turn = (measure_turn(requirements, aligned, k) for requirements, aligned in pairs)
-    flown_pass, model_pass = (passes[k] for passes in corners)
+    flown_turn, model_turn = (measure_turn(requirements, aligned, waypoint) for requirements, aligned in pairs)
+    flown_pass, model_pass = (passes[waypoint] for passes in corners)
 
     def value_pair(flown_value: float | None, model_value: float | None, factor: float = 1.0) -> tuple[float, float]:
         """Return both values times a factor, with NaN instead of None."""
@@ -294,8 +298,8 @@ def _turn_pair(
         )
 
     return TurnPair(
-        first + k,
-        math.degrees(float(pairs[0][0].turns[k])),
+        first_waypoint + waypoint,
+        math.degrees(float(pairs[0][0].turns[waypoint])),
         overshoot=value_pair(flown_pass.overshoot, model_pass.overshoot),
         bank=value_pair(flown_turn.peak_bank, model_turn.peak_bank, 180.0 / math.pi),
         passed=value_pair(flown_pass.distance, model_pass.distance),

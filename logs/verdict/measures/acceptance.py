@@ -66,7 +66,8 @@ def acceptance_condition(requirements: RouteRequirements, waypoint: int) -> Acce
         return AcceptanceCondition(
             setup.autopilot.turns.distance(turn, float(requirements.points[waypoint, 2])), "autopilot", tolerance
         )
-    return AcceptanceCondition(path_radius, "fly-over" if setup.route.fly_over[waypoint] else "fly-by path", 0.0)
+    source = "fly-over" if setup.route.fly_over[waypoint] else "fly-by path"
+    return AcceptanceCondition(path_radius, source, tolerance=0.0)
 
 
 def position_error(setup: FlightSetup) -> float:
@@ -262,9 +263,9 @@ def _reduced_route(route: Route, waypoints: NDArray[np.int64]) -> Route:
 
 
 def step_height(requirements: RouteRequirements, leg: int) -> float | None:
-    """Return the negligible altitude change of a leg beyond its slope limit, m; None if it is too large.
+    """Return the altitude change of a leg steeper than its limit, m, if it is negligible; otherwise None.
 
-    The change is positive, up or down.
+    The change is positive for a climb and for a descent.
     A change up to `NEGLIGIBLE_STEP_M` is negligible.  If a sequence of legs around the leg is too steep overall, the
     altitude change of the whole sequence counts.
     """

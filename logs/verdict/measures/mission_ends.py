@@ -94,6 +94,7 @@ def missing_ends_text(mission: Mission, limits: FeasibilityLimits) -> str:
     """
     has_takeoff = any(item.command in TAKEOFFS for item in mission.items)
     has_landing = any(item.command in LANDINGS for item in mission.items)
+    # MIS_TKO_LAND_REQ is 0 for nothing, 1 for a take-off, 2 for a landing, 3 for both, more for both or neither.
     is_enough = {0: True, 1: has_takeoff, 2: has_landing, 3: has_takeoff and has_landing}.get(
         limits.requires, has_takeoff == has_landing
     )

@@ -164,8 +164,9 @@ BLOCK_MOVES = 64
 def move_blocks(
     moves: Records, heights: Heights, to_pixel: PolyMapRecord, spacing: float, reads_ground: bool
 ) -> Records:
-    """Group moves into blocks, (b,) of dtype `BLOCK`.
+    """Return the bounding box of each `BLOCK_MOVES` consecutive moves, (b,) of dtype `BLOCK`.
 
+    heights, to_pixel, spacing: terrain heights, m, map from positions to their pixels, and distance of pixels, m.
     reads_ground: True to compute the steepest ground below each block, for zones with a limit above ground.
     """
     blocks = np.zeros((moves.shape[0] + BLOCK_MOVES - 1) // BLOCK_MOVES, BLOCK)
@@ -189,7 +190,10 @@ def move_blocks(
 
 @inner
 def _steepest_ground(block: Record, heights: Heights, to_pixel: PolyMapRecord, spacing: float) -> float:
-    """Return an upper bound on the slope of the interpolated ground below a block, m per m; ignore NaN."""
+    """Return an upper bound on the slope of the interpolated ground below a block, m per m.
+
+    Steps to pixels without data (NaN) are ignored.  Return 0 outside the raster.
+    """
     rows, cols = heights.shape
     west, south = polymap(to_pixel, block.west, block.south)
     east, north = polymap(to_pixel, block.east, block.north)

@@ -88,7 +88,11 @@ def path_spheres(points: Floats, time: Floats, centres: Floats, radii: Floats, s
 
 @compiled
 def _sphere_visits(points: Floats, time: Floats, centres: Floats, radii: Floats, scales: Floats) -> SphereVisits:
-    """Measure the visits of a path to all spheres block by block; see `path_spheres`."""
+    """Measure the visits of a path to all spheres, block by block of its segments; see `path_spheres`.
+
+    points, time: positions, m, (n, 3), and times, s, (n,), of the path.
+    centres, radii, scales: one entry per sphere, as in `path_spheres`; a sphere with radius 0 is skipped.
+    """
     boxes = _block_boxes(points)
     count = centres.shape[0]
     visits = SphereVisits(
@@ -241,6 +245,9 @@ def segment_clearances(terrain: Terrain, position: Floats) -> tuple[Floats, Floa
 
 def passages(time: Floats, position: Floats, centre: Floats, radius: float) -> list[Passage]:
     """Return the periods that a track spends inside a sphere or on its surface, in order of time.
+
+    There are none for a radius of 0 or a track of fewer than two rows.  A period that lasts until the last row is not
+    `whole`.
 
     time, position: times, s, (t,), and positions, m, (t, 3), of the track.
     centre: center of the sphere, m, (3,).

@@ -141,7 +141,11 @@ def _line_rows(
 def measure_line(
     requirements: RouteRequirements, aligned: AlignedTrack, survey: Survey, line: PhotoLine
 ) -> LineMeasure | None:
-    """Measure a photo line on a flown track; return None if it was not reached or has one row."""
+    """Measure a photo line on a flown track; return None if it was not reached or has only one row.
+
+    The conditions of a usable photo are applied one after another.  A step of the line is lost by the first condition
+    that it does not meet.
+    """
     rows = _line_rows(requirements, aligned, survey, line)
     if rows is None:
         return None
@@ -225,26 +229,28 @@ def _camera_on_rows(
 ) -> Flags:
     """Return a mask (n,): True for each row at which the camera is on.
 
+    axis: axis of the line, onto which positions are projected.
+    position: positions of the track, m, (n, 3).
     is_ahead: True for each row that flies along the line.
 
     The camera is on between two rows: the row that reaches the waypoint where the mission switches it on, and the row
     that reaches the waypoint where it is switched off.  Both waypoints may lie beyond the line's ends, and either may
     be missing.
     """
-    rows, along = np.arange(len(position)), axis.project(position)[0]
+    rows, distance_along = np.arange(len(position)), axis.project(position)[0]
 
     def first_row_at(waypoint: int, first_row: int = 0) -> int:
         """Return the first row, from `first_row` on, that reaches or passes a waypoint."""
         point = requirements.points[waypoint]
         distances = np.hypot(*(position[:, :2] - point[:2]).T)
         is_at_waypoint = (distances <= _switch_radius(requirements, waypoint)) | (
-            along >= axis.project(point[None])[0][0]
+            distance_along >= axis.project(point[None])[0][0]
         )
         indices = np.flatnonzero(is_at_waypoint & is_ahead & (rows >= first_row))
-        return int(indices[0]) if indices.size else len(along)
+        return int(indices[0]) if indices.size else len(distance_along)
 
     on_row = first_row_at(line.camera_on_at) if line.camera_on_at >= 0 else 0
-    off_row = first_row_at(line.camera_off_at, on_row) if line.camera_off_at >= 0 else len(along)
+    off_row = first_row_at(line.camera_off_at, on_row) if line.camera_off_at >= 0 else len(distance_along)
     return (rows >= on_row) & (rows <= off_row)
 
 

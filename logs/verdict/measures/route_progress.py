@@ -202,13 +202,18 @@ def _match_rows(track: Floats, samples: Floats, radii: Floats, capture: float, a
 
     The cost of a row is min(distance, capture)^2.  The cost of a skipped sample is `_SKIP_FRACTION` of this cost plus
     `_SKIP_DISTANCE_M`^2.  If several ends have the same cost, the earliest is taken.
+    A start at a later sample costs `_LATE_START_M`^2 for each sample before it.
+
     track: positions, m, (n, 2).
     samples, radii: route samples, m, (m, 2), and the radii within which they are reached, m, (m,).
+    capture: distance beyond which the cost of a row does not increase, m.
     anywhere: True if the track may begin at any sample; False if it begins at the first.
 
     Return the first and the last row at each sample, (m, 2); -1 for samples before the track's start or after its end.
     """
     rows, count = track.shape[0], samples.shape[0]
+    # How each row came to each sample: 0 from the sample before, 1 the row before was at the same sample, 2 the sample
+    # is skipped, 3 the track starts there.
     moves = np.zeros((rows, count), dtype=np.uint8)
     total = np.zeros(count)
     for i in range(rows):

@@ -273,7 +273,14 @@ def available_lengths(
 def _sharpest_turns(
     route: Route, runs: Floats, min_radius: Floats, lengths_before: Floats, lengths_after: Floats, reversal: Floats
 ) -> Floats:
-    """Return the sharpest turn at each waypoint that fits between the neighbouring turns, (w,) rad."""
+    """Return the sharpest turn at each waypoint that fits between the neighbouring turns, rad, (w,).
+
+    It is 0 if the turn radius is infinite, and pi at the ends of the route.
+
+    runs: horizontal lengths of the legs, m, (w - 1,).
+    min_radius: smallest turn radius at each waypoint, m, (w,).
+    lengths_before, lengths_after, reversal: see `available_lengths`.
+    """
     limits = np.full(len(min_radius), math.pi)
     for waypoint in range(1, len(min_radius) - 1):
         if not math.isfinite(min_radius[waypoint]):
@@ -663,7 +670,7 @@ def _fly_by_offsets(route: Route, turns: TurnRequirements) -> Floats:
 
 
 def _blend_lengths(setup: FlightSetup, route: Route, points: Floats, runs: Floats, turns: TurnRequirements) -> Floats:
-    """Return the length, next to each turn, over which the slope still changes, (w,) m.
+    """Return the length next to each turn over which the slope still changes, m, (w,).
 
     The altitude follows a parabola about each end of the arc, or about the waypoint if there is no arc.
     """
@@ -706,7 +713,7 @@ def turn_limit(requirements: RouteRequirements, waypoint: int) -> tuple[float, s
 
 
 def tighter_turn_limit(requirements: RouteRequirements, waypoint: int, aircraft_limit: float) -> tuple[float, str]:
-    """Return the lower of the scenario's turn limit and the given `aircraft_limit` (rad), and its source.
+    """Return the lower of two turn limits, the scenario's and `aircraft_limit`, rad, and its source.
 
     The scenario's limit does not apply to the corners of a loiter.
     """

@@ -99,6 +99,7 @@ def leg_course(requirements: RouteRequirements, aligned: AlignedTrack, leg: int)
     distance_along, lateral_offset = project_onto_leg(requirements, leg, aligned.track.position[rows])
     span_start, span_end = straight_span(requirements, leg, TURN_EXCLUSION_M)
     is_inside = (distance_along >= span_start) & (distance_along <= span_end)
+    # A fit needs at least 20 rows.
     if is_inside.sum() >= 20 and np.ptp(distance_along[is_inside]) >= MIN_COURSE_STRETCH_M:
         cross_slope, residual = fit_line(distance_along[is_inside], lateral_offset[is_inside])
         distance = float(np.ptp(distance_along[is_inside]))
@@ -106,7 +107,7 @@ def leg_course(requirements: RouteRequirements, aligned: AlignedTrack, leg: int)
             requirements.courses[leg] + math.atan(cross_slope),
             _angle_tolerance(COURSE_ERROR_FLOOR_RAD, residual, distance),
             distance,
-            True,
+            is_fitted=True,
         )
     # The course of a short leg is the mean between its turns, over at least one second.
     span_start, span_end = straight_span(requirements, leg, 0.0)
@@ -124,7 +125,10 @@ def leg_course(requirements: RouteRequirements, aligned: AlignedTrack, leg: int)
         first, last = rows_around.start, rows_around.stop - 1
     # The course column is unwrapped, so a full circle shows as a course change of 360 degrees.
     return LegFit(
-        float(aligned.course[first : last + 1].mean()), ROUGH_COURSE_ERROR_RAD, float(np.ptp(distance_along)), False
+        float(aligned.course[first : last + 1].mean()),
+        ROUGH_COURSE_ERROR_RAD,
+        float(np.ptp(distance_along)),
+        is_fitted=False,
     )
 
 
@@ -141,10 +145,13 @@ def leg_slope(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) 
     distance_along, _ = project_onto_leg(requirements, leg, position)
     span_start, span_end = straight_span(requirements, leg, TURN_EXCLUSION_M, excludes_blends=True)
     is_inside = (distance_along >= span_start) & (distance_along <= span_end)
+    # A fit needs at least 20 rows.
     if is_inside.sum() >= 20 and np.ptp(distance_along[is_inside]) >= MIN_SLOPE_STRETCH_M:
         slope, residual = fit_line(distance_along[is_inside], position[is_inside, 2])
         distance = float(np.ptp(distance_along[is_inside]))
-        return LegFit(math.atan(slope), _angle_tolerance(SLOPE_ERROR_FLOOR_RAD, residual, distance), distance, True)
+        return LegFit(
+            math.atan(slope), _angle_tolerance(SLOPE_ERROR_FLOOR_RAD, residual, distance), distance, is_fitted=True
+        )
     time = aligned.track.time[rows]
     if time[-1] - time[0] < 1.0:
         return None
@@ -159,7 +166,7 @@ def leg_slope(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) 
     if distance_run.size < 2 or np.ptp(distance_run) < 1.0:
         return None
     slope, _ = fit_line(distance_run, position[is_in_window, 2])
-    return LegFit(math.atan(slope), ROUGH_SLOPE_ERROR_RAD, float(np.ptp(distance_run)), False)
+    return LegFit(math.atan(slope), ROUGH_SLOPE_ERROR_RAD, float(np.ptp(distance_run)), is_fitted=False)
 
 
 def _angle_tolerance(floor: float, residual: float, distance: float) -> float:
@@ -371,12 +378,14 @@ def measure_ability(requirements: RouteRequirements, aligned: AlignedTrack, leg:
     altitude = track.position[rows, 2][is_measured]
     top_altitude = float(altitude.max())
     excess_speed = np.sqrt((air_velocity[is_measured] ** 2).sum(axis=1)) - commanded_speed
+    # The altitude is in units of 100 m, so that both regressors are of similar size.
     rate_fit = _fit_plane_at_origin(
         climb_rate, excess_speed, 0.01 * (altitude - top_altitude), duration / ABILITY_SAMPLE_INTERVAL_S
     )
     if rate_fit is None:
         return None
     tailwind, crosswind = requirements.wind_on(leg).components_on_course(float(requirements.courses[leg]), top_altitude)
+    # The slope at the fitted climb rate, and the slope at a climb rate that is one standard error higher.
     slopes = [
         ground_slope(math.asin(min(1.0, max(-1.0, value / commanded_speed))), commanded_speed, tailwind, crosswind)
         for value in (rate_fit[0], rate_fit[0] + rate_fit[1])

@@ -369,6 +369,9 @@ def _match_chords(
     assignments is taken.  Only the chords from `first` to `last` can capture a mark.
     position: positions of the track, m, (t, 3).
     marks: positions of the marks, m, (n, 3).
+    first, last: first and last chord that can capture each mark, (n,).
+    step: number of rows from one chord to the next.
+    capture: distance within which a mark is captured, m.
 
     Return the chord of each mark, and a mask: True for each mark that is farther than `capture` from all rows of its
     chord.
@@ -377,7 +380,7 @@ def _match_chords(
     chords = -(-last_row // step)
     count = marks.shape[0]
     cost = np.zeros(chords)
-    starts_here = np.zeros((count, chords), dtype=np.uint8)
+    is_assigned = np.zeros((count, chords), dtype=np.uint8)
     for i in range(count):
         min_total = math.inf
         for j in range(chords):
@@ -400,13 +403,13 @@ def _match_chords(
             total = cost[j] + min(distance_square, capture * capture)
             if total < min_total:
                 min_total = total
-                starts_here[i, j] = 1
+                is_assigned[i, j] = 1
             cost[j] = min_total
     chord_of_mark = np.zeros(count, dtype=np.int64)
     is_missed = np.zeros(count, dtype=np.bool_)
     j = chords - 1
     for i in range(count - 1, -1, -1):
-        while starts_here[i, j] == 0:
+        while is_assigned[i, j] == 0:
             j -= 1
         chord_of_mark[i] = j
         nearest_square = math.inf

@@ -46,9 +46,10 @@ PART = record_dtype(
 def distances_outside_zone(
     records: ZoneRecords, z: int, heights: Heights, to_pixel: PolyMapRecord, east: float, north: float, up: float
 ) -> tuple[float, float, int]:
-    """Return a position's distances outside the outline and altitude band of zone `z`, and its edge.
+    """Return a position's distances outside zone `z`'s outline and altitude band, m, and the closest edge.
 
-    The distances are in m; the edge is the closest one.
+    heights, to_pixel: terrain heights, m, and map from positions to their pixels.
+    east, north, up: the position, m.
     A distance is negative inside.  The distance from a band above ground is NaN if the terrain there is unknown.
     """
     zone = records.zones[z]
@@ -210,7 +211,13 @@ def path_zones(moves: Records, records: ZoneRecords, terrain: Terrain | None) ->
 def _visit_zones(
     moves: Records, records: ZoneRecords, heights: Heights, to_pixel: PolyMapRecord, spacing: float
 ) -> Records:
-    """Return the visits of a path to all zones, computed for the nearest zone first."""
+    """Return the visits of a path to all zones, (z,) of dtype `VISIT`, computed for the nearest zone first.
+
+    For a zone that is certainly further away than the nearest zone, the depth is only an upper bound.
+
+    moves: moves of the path, (m,) of dtype `MOVE`.
+    heights, to_pixel, spacing: terrain heights, m, map from positions to their pixels, and distance of pixels, m.
+    """
     count = records.zones.shape[0]
     visits = np.zeros(count, VISIT)
     above_ground = False
@@ -252,12 +259,16 @@ def _fill_visit(
     parts: Records,
     visit: Record,
 ) -> None:
-    """Fill `visit` with the visit of a path to zone `z`.
+    """Fill `visit` with the visit of a path to zone `z`: greatest violation depth, entries and exits.
 
+    blocks: bounding boxes of each `BLOCK_MOVES` moves, (b,) of dtype `BLOCK`.
+    heights, to_pixel: terrain heights, m, and map from positions to their pixels.
     known_depth: depth below which the result need not be exact, m.
+    parts: scratch records, which are overwritten.
 
-    There are three rounds.  Round 0 checks only the ends of the moves.  Round 1 finds the deepest point, which is near
-    the deepest end.  If the zone is violated, round 2 finds the times.
+    There are three rounds.  Round 0 checks only the ends of the moves.  Round 1 bisects moves to find the deepest
+    point.  Round 2 finds the times of entry and exit, if the zone is violated.  Blocks that cannot be deeper than the
+    depth found so far are skipped.
     """
     zone = records.zones[z]
     above_ground = zone.floor_above_ground or zone.ceiling_above_ground
@@ -307,9 +318,12 @@ def _add_block(
     parts: Records,
     visit: Record,
 ) -> None:
-    """Update a visit with a block of consecutive moves.
+    """Update the visit of a path to zone `z` with a block of consecutive moves.
 
     round_number: 0 updates the depth from the moves' ends; 1 and 2 bisect the moves (see `_fill_visit`).
+    heights, to_pixel: terrain heights, m, and map from positions to their pixels.
+    ground_slope: upper bound on the slope of the ground below the block, m per m.
+    known_depth: depth below which the result need not be exact, m.
     parts: scratch records, which are overwritten.
     """
     part = parts[0]
@@ -350,7 +364,7 @@ def _bisect_move(
 
     in_order: True to bisect until each part is on one side of the limit, and add the parts in order of time; False to
         bisect until no part can be deeper than the known depth.
-    parts: scratch records; `parts[0]` is the whole move, whose end must not change, because the next move begins there.
+    parts: scratch records: the move, whose end must not change (the next move begins there), and a stack of its parts.
     """
     exclusion = records.zones[z].exclusion
     # Largest change of the height relative to the altitude band over the whole move.
@@ -398,7 +412,7 @@ def _bisect_move(
 
 @inner
 def _is_unknown(exclusion: bool, part: Record) -> bool:
-    """Return True if the depth of a part is unknown because the ground is unknown at both of its ends."""
+    """Return True if the violation depth at both ends of a part of a move is unknown (NaN), as is the ground."""
     start_depth = violation_depth(exclusion, part.outline_distance, part.band_distance)
     end_depth = violation_depth(exclusion, part.end_outline_distance, part.end_band_distance)
     return start_depth != start_depth and end_depth != end_depth

@@ -254,9 +254,10 @@ def glide_steps() -> tuple[Records, Records]:
         step.east, step.north = east, north
         step.course, step.length, step.first = math.atan2(east, north), math.hypot(east, north), len(crossed_cells)
         fraction_by_cell: dict[tuple[int, int], float] = {}
+        # Sample 63 points between the ends of the step, backwards from its end.  A cell that is only touched at a
+        # corner may be missed.
         for k in range(1, 64):
             fraction = k / 64.0
-            # The samples go backwards from the end.  A cell that is only touched at a corner may be missed.
             cell = (-round(fraction * east), -round(fraction * north))
             fraction_by_cell.setdefault(cell, fraction)
         ends = ((0, 0), (-east, -north))
@@ -321,8 +322,14 @@ def _fill_slopes(
     winds: Floats,
     slopes: Floats,
 ) -> None:
-    """Fill the zeroed table `slopes`, (c, h), with glide slopes by course and altitude.
+    """Fill the zeroed table `slopes`, (c, h), with glide slopes, m per m, by course and altitude.
 
+    A slope is inf if the aircraft makes no progress against the wind.
+
+    aircraft, excess: point mass, and its excess power by throttle and airspeed.
+    airspeed: equivalent airspeed, m/s.
+    courses: rad, (c,).
+    min_altitude: first altitude of the table, m AMSL; the others follow every `_ALTITUDE_STEP_M`.
     winds: possible winds by altitude, m/s, (n, h, 2); the worst of them is used.  Empty for the mean wind.
     """
     for h in range(slopes.shape[1]):
@@ -439,7 +446,9 @@ def _settle_cells(
     """Fill `min_altitude`, `destination` and `next_step` by settling cells in order of altitude.
 
     This is the search of Dijkstra, against the direction of flight; see the head of this module.
-    band: height of a band, m.
+    floor, sphere_bottoms, sphere_tops: see `GlideMap`.  step_records, crossed_cells: see `glide_steps`.
+    slopes: glide slope of each step at altitudes from `slopes_first_altitude`, every `altitude_step`, m per m.
+    cell, band: side of a cell, and height of a band, m.  first_altitude: lower end of the lowest band, m AMSL.
     band_heads: first cell of each band, (b,); -1 for an empty band.
     links: previous and next cell of each cell in its band, (cells, 2); -1 for none.
     """
@@ -454,6 +463,7 @@ def _settle_cells(
             _remove_from_band(k, b, band_heads, links)
             row, column = k // columns, k % columns
             altitude = flat_altitudes[k]
+            # The position stays below the last column, because the slope is interpolated to the next column.
             slope_position = min(slopes.shape[1] - 1.001, max(0.0, (altitude - slopes_first_altitude) / altitude_step))
             for step_index in range(step_records.shape[0]):
                 step = step_records[step_index]
@@ -499,6 +509,8 @@ def _step_start_altitude(
 
     The result is NaN if the ground is unknown.
 
+    floor, sphere_bottoms, sphere_tops: see `GlideMap`.
+    crossed_cells, step: the cells of all steps, and the step; see `glide_steps`.
     row, column: cell in which the step ends.
     end_altitude: altitude at the end of the step, m AMSL.
     altitude_loss: height lost in the step, m.

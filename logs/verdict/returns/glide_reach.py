@@ -89,6 +89,10 @@ def cell_position(grid: GlideMap, cell: int) -> tuple[float, float, float]:
     return (*grid.cell_center(row, column), float(grid.ground[row, column]))
 
 
+# The starts are of dtype `flight.autopilots.simulated_returns.RETURN_START`.  spheres, radii: centres, m, (s, 3), and
+# radii, m, (s,), of the kill spheres.  floor: lowest altitude allowed in each cell, m.  min_altitude, destination,
+# next_step: see `GlideAltitudes`; step_records: step of each index in `next_step`, in cells.  aircraft, excess_table,
+# field: point mass, its excess power by throttle and airspeed, and the wind field.
 @compiled
 def _fill_altitudes_left(
     starts: Records,
@@ -106,7 +110,7 @@ def _fill_altitudes_left(
     altitude_left: Floats,
     reached_cells: Codes,
 ) -> None:
-    """Fill `altitude_left` and `reached_cells` for each start, with the better of a left and a right turn."""
+    """Fill `altitude_left` (m) and `reached_cells` for each start, by simulating a left and a right turn to a glide."""
     state_array = np.zeros(1, _TURN_STATE)
     state = state_array[0]
     max_speed = aircraft.first_airspeed + (excess_table.shape[1] - 1) * aircraft.airspeed_step
@@ -181,7 +185,11 @@ def _wind_at_start(start: Record, aircraft: Record, field: Floats) -> tuple[floa
 
 @inner
 def _is_clear(state: Record, floor: Floats, spheres: Floats, radii: Floats, glider: Record) -> bool:
-    """Return True if the aircraft is on the map, above the cell's floor and outside kill spheres."""
+    """Return True if the aircraft is on the map, not below the cell's floor and outside kill spheres.
+
+    floor: lowest altitude allowed in each cell of the map, m, (rows, columns).
+    spheres, radii: centres, m, (s, 3), and radii, m, (s,), of the threats' kill spheres.
+    """
     i = round((state.north - glider.south) / glider.cell)
     j = round((state.east - glider.west) / glider.cell)
     if not (0 <= i < floor.shape[0] and 0 <= j < floor.shape[1]) or not state.up >= floor[i, j]:
@@ -220,12 +228,14 @@ def _best_cell(state: Record, min_altitude: Floats, slope: float, glider: Record
 def _remaining_turn(
     state: Record, i: int, j: int, turn_sign: float, next_step: Codes, step_records: Records, glider: Record
 ) -> float:
-    """Return the course change until the aircraft heads along the path from a cell, rad.
+    """Return the course change until the aircraft heads along the path ahead of a cell, rad.
 
-    It is negative if the turn has overshot this course, and 0 near the end of the path.
+    The path ahead is `_LOOKAHEAD_STEPS` steps of the glide map.  The course change is negative if the turn has overshot
+    its course.  It is 0 within two cells of the end of the path.
 
     i, j: row and column of the cell.
     turn_sign: 1 for a turn to the right, -1 to the left.
+    next_step, step_records: index of the next step from each cell, and step of each index in cells.
     """
     for _ in range(_LOOKAHEAD_STEPS):
         step_index = next_step[i, j]

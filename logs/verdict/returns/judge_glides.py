@@ -231,19 +231,19 @@ def judge_glides(world: ReturnWorld, starts: ReturnStarts) -> Glides:
     Low starts in take-offs and landings are omitted, because the aircraft then descends straight ahead.
     """
     starts = starts.subset(np.flatnonzero(~starts.is_low))
-    none = _no_glides(world)
-    sites, airspeed = none.sites, none.airspeed
+    no_glides = _no_glides(world)
+    sites, airspeed = no_glides.sites, no_glides.airspeed
     terrain, environment, aircraft = world.scenario.terrain, world.environment, world.aircraft
     if terrain is None or not aircraft.glides:
-        return replace(none, not_judged="terrain" if terrain is None else "trim")
+        return replace(no_glides, not_judged="terrain" if terrain is None else "trim")
     rows = starts.rows
     if not len(rows):
-        return none
+        return no_glides
     positions = np.concatenate([np.stack([rows["east"], rows["north"]], axis=1), [site[2:] for site in sites]])
     grid = make_glide_map(terrain, positions, MARGIN, environment.spheres, environment.radii)
     if grid is None:
-        return replace(none, not_judged="far")
-    own_returns = _simulate_engine_out_returns(world, starts)
+        return replace(no_glides, not_judged="far")
+    engine_out_returns = _simulate_engine_out_returns(world, starts)
     bank, max_altitude = float(world.autopilot.turns.max_bank), float(rows["up"].max())
     min_ground_altitude = float(np.nanmin(grid.ground)) if np.isfinite(grid.ground).any() else 0.0
     top_altitude = max(max_altitude, min_ground_altitude + 1.0)
@@ -273,7 +273,7 @@ def judge_glides(world: ReturnWorld, starts: ReturnStarts) -> Glides:
             Glide(
                 time=float(starts.time[k]),
                 start=(float(row["east"]), float(row["north"]), float(row["up"])),
-                own_return=own_returns[k],
+                own_return=engine_out_returns[k],
                 home_altitude_left=altitudes_left[0],
                 site_altitude_left=altitudes_left[1],
                 site=site_by_cell.get(int(reached_cells[k]), -1),
@@ -283,7 +283,7 @@ def judge_glides(world: ReturnWorld, starts: ReturnStarts) -> Glides:
             )
         )
     footprint = GlideFootprint(grid, np.minimum(home_min_altitudes, site_min_altitudes), is_landable)
-    return replace(none, each=tuple(glides), cell=grid.cell, footprint=footprint)
+    return replace(no_glides, each=tuple(glides), cell=grid.cell, footprint=footprint)
 
 
 def _no_glides(world: ReturnWorld) -> Glides:

@@ -300,7 +300,7 @@ class ReturnWorld:
     aircraft: point-mass model.
     environment: ground and spheres.
     stands_in: as in `Returns`.
-    has_other_law: True if ArduPlane's return replaces the return of an autopilot with parameters of its own.
+    uses_other_autopilot: True if ArduPlane's return replaces the return of an autopilot with parameters of its own.
     landings: the mission's landing sequences.
     """
 
@@ -312,7 +312,7 @@ class ReturnWorld:
     environment: ReturnEnvironment
     airspace: Airspace
     stands_in: bool = False
-    has_other_law: bool = False
+    uses_other_autopilot: bool = False
     landings: tuple[LandingStart, ...] = ()
 
     @property
@@ -385,7 +385,7 @@ class ReturnWorld:
     @property
     def causes(self) -> tuple[Cause, ...]:
         """Events that can take the aircraft off its mission; empty for an autopilot without an RTL."""
-        return () if self.has_other_law else self.autopilot.returns.causes(self.mission)
+        return () if self.uses_other_autopilot else self.autopilot.returns.causes(self.mission)
 
     @property
     def ending(self) -> Ending:
@@ -411,7 +411,7 @@ class ReturnWorld:
         parts = []
         if unsimulated_text := behaviour.unsimulated_text(self.mission):
             parts.append(unsimulated_text)
-        if self.has_other_law:
+        if self.uses_other_autopilot:
             parts.append("law")
         if any(cause.action == "autoland" for cause in self.causes):
             parts.append("autoland")
@@ -477,16 +477,19 @@ def returning_title(setup: FlightSetup) -> str:
     return ArduPlane.title if autopilot.returns.fly is None else autopilot.title
 
 
-def make_return_world(setup: FlightSetup, other_law: Autopilot | None = None) -> ReturnWorld:
+def make_return_world(setup: FlightSetup, rtl_autopilot: Autopilot | None = None) -> ReturnWorld:
     """Collect the data with which returns to launch from a setup's mission are simulated.
 
-    other_law: autopilot whose RTL is simulated; None for the setup's autopilot, or ArduPlane if that has no RTL.
+    rtl_autopilot: autopilot whose RTL is simulated; None for the setup's autopilot, or ArduPlane if that has no RTL.
     Raises MissionError for a mission without a home, and FlightError for an aircraft that cannot be loaded.
     """
     aircraft: Aircraft = find_logged_aircraft(setup.aircraft, setup.scenario.flight.aircraft)
-    law, has_other_law = other_law or setup.autopilot.model, other_law is not None
-    if law.returns.fly is None:
-        law, has_other_law = ArduPlane(ArduPilotParameters.load(aircraft)), law.parameters is not None
+    simulated_autopilot, uses_other_autopilot = rtl_autopilot or setup.autopilot.model, rtl_autopilot is not None
+    if simulated_autopilot.returns.fly is None:
+        simulated_autopilot, uses_other_autopilot = (
+            ArduPlane(ArduPilotParameters.load(aircraft)),
+            simulated_autopilot.parameters is not None,
+        )
     return_positions = return_points(setup.mission, setup.scenario.origin, setup.scenario.terrain)
     if not return_positions:
         source = setup.mission.source
@@ -494,14 +497,14 @@ def make_return_world(setup: FlightSetup, other_law: Autopilot | None = None) ->
         raise MissionError(message, file=source, field="home")
     return ReturnWorld(
         setup,
-        law,
+        simulated_autopilot,
         return_positions[0],
         return_positions[1:],
         make_point_mass(aircraft, setup.envelope, setup.airspeed, setup.scenario.wind, setup.scenario.geo_map),
         make_return_environment(setup.scenario),
         judged_airspace(setup),
-        stands_in=other_law is not None or setup.autopilot.model.returns.fly is None,
-        has_other_law=has_other_law,
+        stands_in=rtl_autopilot is not None or setup.autopilot.model.returns.fly is None,
+        uses_other_autopilot=uses_other_autopilot,
         landings=landing_starts(setup.mission, setup.scenario.origin, setup.scenario.terrain),
     )
 
@@ -547,7 +550,9 @@ def judge_returns(
     max_flights: int = MAX_JSBSIM_FLIGHTS,
     advance: Callable[[float, float], None] = lambda done, total: None,
 ) -> Returns:
-    """Simulate and judge the return from each start.
+    """Simulate and judge the return from each start, once for each ending (loiter or landing) to be judged.
+
+    A return from a low start that only sinks to the ground is left out, but counted in `omitted_count`.
 
     interval: time between starts, s.
     fly_again: function that flies an uncertain return again in JSBSim; None for no such flights.
@@ -606,7 +611,7 @@ def _no_returns(world: ReturnWorld, starts: ReturnStarts, interval: float) -> Re
         flown=starts.is_flown,
         stands_in=world.stands_in,
         unjudged_parts=world.unjudged_parts,
-        autoland=None if world.has_other_law else autoland,
+        autoland=None if world.uses_other_autopilot else autoland,
         autoland_assumed=parameters is not None and "RTL_AUTOLAND" in parameters.by_origin("assumed"),
         landings=world.landings,
         autopilot=world.autopilot.title,
@@ -639,11 +644,12 @@ def simulate_judged_returns(
     min_heights: Floats,
     min_sphere_distances: Floats | None = None,
 ) -> tuple[Records, tuple[Floats, ...]]:
-    """Simulate returns for judging; the required height does not apply in a landing sequence.
+    """Simulate returns for judging, without the clearance on approaches to a landing.
 
     After the first item of a landing sequence, a return flies the mission's approach, which descends to the landing.
     The clearance of a return that becomes too low on the approach is therefore measured only up to the first item.
 
+    starts, targets: start and target of each return, n of each.
     min_heights: required heights above ground, m, (n,).
     min_sphere_distances: required distances outside spheres, m, (n,), to abort a return that is too close or too low;
         None to simulate every return to its end.
@@ -736,24 +742,24 @@ def classify_return(world: ReturnWorld, result: Record, zone: int, energy_left: 
 def _judge_return(
     world: ReturnWorld,
     starts: ReturnStarts,
-    k: int,
+    start_index: int,
     target: ReturnTarget,
     result: Record,
     path: Floats,
     required_height: float,
 ) -> SimulatedReturn:
-    """Judge one simulated return, from start number `k`.
+    """Judge one simulated return from the start with index `start_index`.
 
     result: record of dtype `RETURN_RESULT`.
     path: positions of the return, m, (t, 3); empty without zones.
     required_height: required height above ground, m.
     """
     zone = most_violated_zone(world, path) if len(path) > 1 else -1
-    energy_used = float(starts.energy_used[k])
+    energy_used = float(starts.energy_used[start_index])
     energy_left = float(world.setup.battery - energy_used - result["energy"]) if world.is_energy_known else math.nan
-    row = starts.rows[k]
+    row = starts.rows[start_index]
     return SimulatedReturn(
-        time=float(starts.time[k]),
+        time=float(starts.time[start_index]),
         start=(float(row["east"]), float(row["north"]), float(row["up"])),
         target=target,
         kind=classify_return(world, result, zone, energy_left, required_height),
@@ -861,7 +867,7 @@ def _corrected_return(
     ret: SimulatedReturn,
     result: Record,
     offsets: tuple[float, float],
-    flown: SimulatedReturn,
+    flown_return: SimulatedReturn,
     *,
     is_flown: bool,
 ) -> SimulatedReturn:
@@ -870,12 +876,15 @@ def _corrected_return(
     If these differences are large and matter, the outcome becomes "unsure", unless a failure is certain.
 
     offsets: differences (JSBSim minus point mass) in clearance and in distance outside kill spheres, m.
-    flown: result of the point mass for the flown return.
+    flown_return: result of the point mass for the return that JSBSim flew.
     is_flown: True if the flown return is the doubtful return itself.
     """
     height_offset, distance_offset = offsets
-    is_low = min(flown.clearance, flown.clearance + height_offset) < flown.required_height + _DECISIVE_MARGIN_M
-    is_close = min(flown.sphere_distance, flown.sphere_distance + distance_offset) < _DECISIVE_MARGIN_M
+    is_low = (
+        min(flown_return.clearance, flown_return.clearance + height_offset)
+        < flown_return.required_height + _DECISIVE_MARGIN_M
+    )
+    is_close = min(flown_return.sphere_distance, flown_return.sphere_distance + distance_offset) < _DECISIVE_MARGIN_M
     simulations_disagree = (is_low and abs(height_offset) > POINT_MASS_ERROR_M) or (
         is_close and abs(distance_offset) > POINT_MASS_POSITION_ERROR_M
     )

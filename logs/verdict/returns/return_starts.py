@@ -68,7 +68,7 @@ class ReturnStarts:
 
 
 def flown_starts(setup: FlightSetup, track: Track, interval: float) -> ReturnStarts:
-    """Sample a flown track as starts of returns, without samples on the ground or in its own RTL.
+    """Sample a flown track as starts of returns, without samples on the ground or in the mission's RTL.
 
     interval: time between samples, s.
 
@@ -185,7 +185,7 @@ def _ground_velocities(track: Track, rows: NDArray[np.intp]) -> Floats:
 
 
 def planned_starts(setup: FlightSetup, interval: float, requirements: RouteRequirements | None = None) -> ReturnStarts:
-    """Sample the planned path up to its own RTL as starts of returns, with the energy used.
+    """Sample the planned path up to the mission's RTL as starts of returns, with the energy used.
 
     interval: time between samples, s.
     requirements: the setup's route requirements if already known.
@@ -222,7 +222,7 @@ def planned_starts(setup: FlightSetup, interval: float, requirements: RouteRequi
 
 
 def planned_positions(setup: FlightSetup, interval: float) -> tuple[Floats, Floats]:
-    """Return times, s, (t,), and positions, m, (t, 3), on the planned path up to its own return to launch.
+    """Return times, s, (t,), and positions, m, (t, 3), on the planned path up to the mission's return to launch.
 
     interval: time between samples, s.
     """

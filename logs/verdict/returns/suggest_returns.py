@@ -112,7 +112,7 @@ def _return_limits(world: ReturnWorld, starts: ReturnStarts, margin: float = MAR
 
 def meets_return_limits(world: ReturnWorld, starts: ReturnStarts) -> Flags:
     """Return a mask (n,): True for each start whose simulated RTL keeps all limits, without `MARGIN`."""
-    limits = replace(_return_limits(world, starts, 0.0), clearance=required_heights(world, starts))
+    limits = replace(_return_limits(world, starts, margin=0.0), clearance=required_heights(world, starts))
     return _rtls_meet_criterion(world, starts, limits, _meets_all_limits)
 
 
@@ -201,15 +201,15 @@ def suggest_parameters(world: ReturnWorld, starts: ReturnStarts) -> list[Remedy]
     lowest_values: dict[str, float] = {}
     for present_values in world.autopilot.returns.trials.altitudes:
         search = _AltitudeSearch(world, present_values)
-        ground_altitude = search.lowest(0.0, _clears_ground, trial)
+        ground_altitude = search.lowest(min_altitude=0.0, criterion=_clears_ground, trial=trial)
         if ground_altitude is not None and ground_altitude > search.current:
             lowest_values = lowest_values or search.values(ground_altitude)
             remedies.append(Remedy(search.values(ground_altitude)))
         safe_altitude = search.lowest(ground_altitude or 0.0, _meets_all_limits, trial)
         if safe_altitude is None:
             # No height keeps the margin on all returns: take the lowest height with which they are safe.
-            trial_without_margin = _ReturnTrial(starts, _return_limits(world, starts, 0.0))
-            safe_altitude = search.lowest(0.0, _meets_all_limits, trial_without_margin)
+            trial_without_margin = _ReturnTrial(starts, _return_limits(world, starts, margin=0.0))
+            safe_altitude = search.lowest(min_altitude=0.0, criterion=_meets_all_limits, trial=trial_without_margin)
         if safe_altitude is not None and safe_altitude not in (ground_altitude, search.current):
             remedies.append(Remedy(search.values(safe_altitude)))
         if safe_altitude is not None:
@@ -228,6 +228,7 @@ class _AltitudeSearch:
         self._world, self._present_values = world, present_values
         self.current = next(iter(present_values.values()))
         ground_heights = world.environment.heights[np.isfinite(world.environment.heights)]
+        # Up to the height that clears all ground; without terrain, up to 500 m more than at present.
         max_altitude = (
             float(ground_heights.max()) - world.home.up + world.limit + 2.0 * MARGIN
             if world.environment.known
@@ -362,7 +363,7 @@ def _search_in_rounds(
 def _rally_candidates(
     world: ReturnWorld, starts: ReturnStarts, spacing: float, max_distance: float
 ) -> list[ReturnPoint]:
-    """Return candidate rally points on a grid near the path, at two altitudes, clear of spheres.
+    """Return candidate rally points on a grid near the path, at two altitudes 200 m apart, clear of spheres.
 
     spacing: grid spacing, m, increased if there are too many candidates.
     max_distance: maximum distance from the path, m.
@@ -412,6 +413,7 @@ def _highest_ground(world: ReturnWorld, east: float, north: float) -> float:
     """
     if world.scenario.terrain is None:
         return world.home.up
+    # The center, and 16 points on each of three circles.
     angles = np.arange(16) * (math.pi / 8.0)
     radii = np.concatenate([np.zeros(1), *(np.full(16, fraction * _LOITER_RADIUS_M) for fraction in (0.33, 0.67, 1.0))])
     directions = np.concatenate([np.zeros(1), angles, angles, angles])

@@ -230,13 +230,15 @@ def _find_landing(requirements: RouteRequirements) -> _Landing | None:
     setup, ground = requirements.setup, requirements.ground_phases
     approach = (setup.ground_phases if ground is None else ground.procedures).approach
     if approach is not None:
-        return _Landing(approach.leg, approach.item, (float(approach.point[0]), float(approach.point[1])), True)
+        return _Landing(
+            approach.leg, approach.item, (float(approach.point[0]), float(approach.point[1])), is_judged_here=True
+        )
     landing = landing_item(requirements.setup)
     if landing is None or (setup.imported_log is None and not has_ground_paths(requirements)):
         return None
     waypoint, item = landing
     position = setup.route.positions[waypoint]
-    return _Landing(waypoint - 1, item.seq, (float(position[0]), float(position[1])), False)
+    return _Landing(waypoint - 1, item.seq, (float(position[0]), float(position[1])), is_judged_here=False)
 
 
 def _fields_by_leg(
@@ -436,10 +438,11 @@ def _placed_message(requirements: RouteRequirements, leg: int, text: str) -> Mes
     return message(f"{place_text_within(requirements.leg(leg))} {text}", placed=True)
 
 
-def _time_and_place_text(aligned: AlignedTrack, k: int, fraction: float) -> str:
-    """Describe time and position of the aircraft at a fraction (0 to 1) of track segment `k`."""
-    time = aligned.track.time
-    return f"at {time[k] + fraction * (time[k + 1] - time[k]):.1f} s, {aligned.position_text(k, fraction)}"
+def _time_and_place_text(aligned: AlignedTrack, segment: int, fraction: float) -> str:
+    """Describe time and position of the aircraft at a fraction (0 to 1) of a segment of the track."""
+    times = aligned.track.time
+    time = times[segment] + fraction * (times[segment + 1] - times[segment])
+    return f"at {time:.1f} s, {aligned.position_text(segment, fraction)}"
 
 
 RULE = Rule(

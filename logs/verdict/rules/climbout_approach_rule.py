@@ -208,7 +208,7 @@ def _find_launch(requirements: RouteRequirements) -> _Launch:
     course_text = f"on the launch course {round(math.degrees(stated_launch.course)) % 360}°"
     if abs(float(wrap(stated_launch.course - first_leg.course))) <= PLAN_TOLERANCE_RAD:
         return first_leg._replace(course_text=course_text)
-    return _Launch(stated_launch.course, math.inf, 0.0, course_text)
+    return _Launch(stated_launch.course, leg_length=math.inf, slope=0.0, course_text=course_text)
 
 
 class _Climb(NamedTuple):
@@ -286,7 +286,7 @@ def _find_obstacles(requirements: RouteRequirements, path: GroundPath) -> _Obsta
     terrain, end = requirements.setup.scenario.terrain, float(path.distance[-1])
     entered_hazard = first_hazard_on_path(requirements, path)
     if terrain is None or end <= LAUNCH_RUN_M:
-        return _Obstacles(math.inf, 0.0, entered_hazard)
+        return _Obstacles(clearance=math.inf, distance=0.0, entered_hazard=entered_hazard)
     return _Obstacles(*min_path_clearance(terrain, path.between(LAUNCH_RUN_M, end)), entered_hazard)
 
 
@@ -302,7 +302,7 @@ def _air_start_finding(place: Place, obstacles: _Obstacles) -> Finding:
     else:
         subject = f"the flight starts in the air, but a straight climb from home to {_item_text(place)}"
         fault = obstacles.obstacle_message(subject, "from home", ", even at the steepest climb")
-        return _path_finding("climbout", place, obstacles, None, fault, GROUND_PATH)
+        return _path_finding("climbout", place, obstacles, ok=None, outcome=fault, check=GROUND_PATH)
     return _path_finding("climbout", place, obstacles, ok, message(reason), check)
 
 
@@ -328,7 +328,7 @@ def _launch_finding(
     subject = f"the climb from home {direction_text}"
     if math.isnan(obstacles.clearance) and not obstacles.entered_hazard:
         reason = message(f"the terrain below {subject} is unknown")
-        return _path_finding("climbout", place, obstacles, None, reason)
+        return _path_finding("climbout", place, obstacles, ok=None, outcome=reason)
     is_certain, end_height = certain_slope == steepest.slope, start[2] - start[1]
     if not obstacles.is_clear:
         fault = obstacles.obstacle_message(subject, "from home", ", even at the steepest climb")
@@ -343,19 +343,19 @@ def _launch_finding(
     min_obstacles = gentlest.obstacles
     if math.isnan(min_obstacles.clearance) and not min_obstacles.entered_hazard:
         reason = message(f"{subject} leads to where the terrain is unknown")
-        return _path_finding("climbout", place, obstacles, None, reason)
+        return _path_finding("climbout", place, obstacles, ok=None, outcome=reason)
     if not min_obstacles.is_clear:
         fault = min_obstacles.obstacle_message(subject, "from home")
         climb_text = _climb_text(gentlest, launch, item_text, end_height)
         limit_text = "" if is_certain else _certain_climb_text(steepest.slope, certain_slope)
         fault = replace(fault, text=f"{fault.text} ({climb_text}{limit_text})")
-        return _path_finding("climbout", place, obstacles, None, fault, GROUND_PATH)
+        return _path_finding("climbout", place, obstacles, ok=None, outcome=fault, check=GROUND_PATH)
     return _path_finding(
         "climbout",
         place,
         obstacles,
-        True,
-        message(f"{direction_text}: {_clearance_text(obstacles)}"),
+        ok=True,
+        outcome=message(f"{direction_text}: {_clearance_text(obstacles)}"),
     )
 
 
@@ -467,25 +467,29 @@ def approach_findings(
     obstacles = _Obstacles(clearance, length - position, first_hazard_on_path(requirements, path))
     subject = f"the glide to {item_text}"
     if math.isnan(obstacles.clearance) and not obstacles.entered_hazard:
-        return [_path_finding("approach", place, obstacles, None, message(f"the terrain below {subject} is unknown"))]
+        return [
+            _path_finding(
+                "approach", place, obstacles, ok=None, outcome=message(f"the terrain below {subject} is unknown")
+            )
+        ]
     obstacle_message = obstacles.obstacle_message(subject, "before the landing point")
     # A glide to a landing point below the ground hits the ground early.  The elevation data may be wrong by metres.
     if (
         obstacles.entered_hazard
         or obstacles.clearance + min(LANDING_POINT_ERROR_M, max(0.0, ground_altitude - point_altitude)) < 0.0
     ):
-        return [_path_finding("approach", place, obstacles, False, obstacle_message)]
+        return [_path_finding("approach", place, obstacles, ok=False, outcome=obstacle_message)]
     if obstacles.clearance < 0.0:
         fault = message(
             f"the landing point of {item_text} is {ground_altitude - point_altitude:.0f} m below the ground",
             f": {obstacle_message.text}",
         )
-        return [_path_finding("approach", place, obstacles, None, fault, GROUND_PATH)]
+        return [_path_finding("approach", place, obstacles, ok=None, outcome=fault, check=GROUND_PATH)]
     if point_altitude - ground_altitude > LANDING_POINT_ERROR_M:
         fault = message(
             f"the landing point of {item_text} is {point_altitude - ground_altitude:.0f} m above the ground"
         )
-        return [_path_finding("approach", place, obstacles, None, fault, GROUND_PATH)]
+        return [_path_finding("approach", place, obstacles, ok=None, outcome=fault, check=GROUND_PATH)]
     judged_end = length - glide.flare_distance - max(0.0, FLARE_HEIGHT_MARGIN_M - glide.flare_height) / glide.slope
     clearance = min_path_clearance(terrain, path.between(0.0, judged_end))[0] if judged_end > 0.0 else math.inf
     if clearance < GLIDE_PATH_TOLERANCE_M:
@@ -493,7 +497,7 @@ def approach_findings(
             f"{subject} clears the ground by only {clearance:.1f} m",
             f"; the flight may be {GLIDE_PATH_TOLERANCE_M:.0f} m lower than planned",
         )
-        return [_path_finding("approach", place, obstacles, None, fault, GROUND_PATH)]
+        return [_path_finding("approach", place, obstacles, ok=None, outcome=fault, check=GROUND_PATH)]
     reason = f"glides down at {math.degrees(math.atan(glide.slope)):.1f}°"
     if glide.flare_distance > 0.0:
         reason += (
@@ -501,7 +505,7 @@ def approach_findings(
         )
     reason += f"; {_clearance_text(obstacles)} until {EARLY_TOUCHDOWN_DISTANCE_M:.0f} m before the landing point"
     reason += "" if setup.ground_phases.approach is not None else "; not flown, because the flight ends in the air"
-    return [_path_finding("approach", place, obstacles, True, message(reason))]
+    return [_path_finding("approach", place, obstacles, ok=True, outcome=message(reason))]
 
 
 # ----------------------------------------------------------------------
@@ -527,7 +531,12 @@ def _clearance_text(obstacles: _Obstacles) -> str:
 def _path_finding(
     rule: str, place: Place, obstacles: _Obstacles, ok: bool | None, outcome: Message, check: str = ""
 ) -> Finding:
-    """Make the finding on a climb-out or an approach, with `outcome` as its reason."""
+    """Make the finding on the clearance of a climb-out or an approach above ground.
+
+    ok: None if undecided.
+    outcome: message with the reason; it is a fault unless the finding passes.
+    check: see `logs.verdict.findings.Finding`.
+    """
     return make_finding(
         rule,
         place,

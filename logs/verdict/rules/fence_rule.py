@@ -91,7 +91,9 @@ def _findings_on_legs(requirements: RouteRequirements, first: int, last: int) ->
     records = ZoneRecords(airspace.records.zones[numbers], airspace.records.edges)
     planned = path_zones(planned_moves(requirements, first, last), records, requirements.setup.scenario.terrain)
     touched_indices = np.flatnonzero((planned["depth"] > 0.0) | planned["unknown"])
-    return [_zone_finding(requirements, int(numbers[k]), planned[k], None) for k in touched_indices.tolist()]
+    return [
+        _zone_finding(requirements, int(numbers[k]), planned[k], flown_visit=None) for k in touched_indices.tolist()
+    ]
 
 
 def _compliance_finding(

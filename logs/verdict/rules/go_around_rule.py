@@ -189,7 +189,7 @@ def go_around_findings(
 def _find_landing(
     requirements: RouteRequirements, terrain: Terrain, waypoint: int, item: MissionItem
 ) -> _Landing | None:
-    """Return the landing at a waypoint.
+    """Return the landing at a waypoint, with the glide to it and the climb of its go-around.
 
     Return None if the climb height of its go-around, home's altitude or the ground at the landing is unknown, and if
     the glide to the waypoint is too short or does not descend.
@@ -199,8 +199,8 @@ def _find_landing(
     leg_length, course = float(requirements.runs[leg]), float(requirements.courses[leg])
     home_position = home_point(setup.mission, setup.scenario.origin, terrain)
     home_altitude = math.nan if home_position is None else home_position.up
-    first, takeoff = takeoff_item(requirements.setup)
-    takeoff_climb = 0.0 if takeoff is None else float(requirements.points[first, 2]) - home_altitude
+    takeoff_waypoint, takeoff = takeoff_item(requirements.setup)
+    takeoff_climb = 0.0 if takeoff is None else float(requirements.points[takeoff_waypoint, 2]) - home_altitude
     climb_height = setup.autopilot.ground.go_around_height(item.params[0], takeoff_climb)
     destinations = _go_around_destinations(requirements, waypoint)
     ground_altitude = setup.route.landing_ground
@@ -484,14 +484,14 @@ def _required_heights(terrain: Terrain, destination: LandingStart, points: Float
 def _next_sufficient_height(
     requirements: RouteRequirements, terrain: Terrain, world: ReturnWorld, landing: _Landing, worst_distance: float
 ) -> float:
-    """Find the next higher climb height above home with which all go-arounds are clear, m; NaN if none is.
+    """Find the next higher climb height above home at which all go-arounds are clear, m; NaN if there is none.
 
     Heights are tried in steps of `_HEIGHT_STEP_M` up to `_MAX_HEIGHT_M`.
     worst_distance: abort point to try first, as a distance before the landing point, m.
     """
-    first = _HEIGHT_STEP_M * math.ceil(landing.climb_height / _HEIGHT_STEP_M + 1e-9)
+    lowest_height = _HEIGHT_STEP_M * math.ceil(landing.climb_height / _HEIGHT_STEP_M + 1e-9)
     distances = [worst_distance, *_abort_distances(landing).tolist()]
-    for height in np.arange(first, _MAX_HEIGHT_M + 1.0, _HEIGHT_STEP_M).tolist():
+    for height in np.arange(lowest_height, _MAX_HEIGHT_M + 1.0, _HEIGHT_STEP_M).tolist():
         for distance in distances:
             go_arounds = _simulate_go_arounds(requirements, terrain, world, landing, height, [distance])
             if not all(go_around.is_clear and not go_around.unknown_part_text for go_around in go_arounds):

@@ -113,7 +113,7 @@ def _max_heights(path: _Path, segments: NDArray[np.intp]) -> _LegMaxima | None:
     heights = path.max_heights[segments]
     is_known = np.isfinite(heights)
     if not is_known.any():
-        return _LegMaxima(math.nan, amsl, "", False)
+        return _LegMaxima(math.nan, amsl, "", is_ground_known=False)
     k = int(segments[np.nanargmax(heights)])
     time, position = (
         (1.0 - path.fraction[k]) * values[k] + path.fraction[k] * values[k + 1] for values in (path.times, path.points)

@@ -204,15 +204,15 @@ def _starts_in_outages(starts: ReturnStarts, outages: Sequence[Outage], delay: f
 # The finding.
 
 
-def _link_text(along: LinkAlongPath, leg: Place | None) -> str:
+def _link_text(link_along_path: LinkAlongPath, leg: Place | None) -> str:
     """Describe the smallest margin of the link, the outages, and the place of the smallest margin.
 
     leg: leg of the smallest margin; None if no margin is known.
     """
-    k = along.worst
+    k = link_along_path.worst
     if leg is None:
         return "the terrain below the radio path is unknown"
-    points, (east, north) = along.points, along.positions[k, :2].tolist()
+    points, (east, north) = link_along_path.points, link_along_path.positions[k, :2].tolist()
     sight_text = "in line of sight" if points.is_visible[k] else "behind the terrain"
     if points.diffraction_loss[k] >= _MIN_STATED_LOSS_DB:
         sight_text += f", {points.diffraction_loss[k]:.1f} dB lost by diffraction"
@@ -222,15 +222,18 @@ def _link_text(along: LinkAlongPath, leg: Place | None) -> str:
         else f"the link margin is up to {abs(points.margin[k]):.1f} dB below the required fade margin"
     )
     place = (
-        f". It is lowest on {place_text_within(leg)} at {along.time[k]:.0f} s (east {east:.0f} m, north {north:.0f} m,"
+        f". It is lowest on {place_text_within(leg)} at {link_along_path.time[k]:.0f} s"
+        f" (east {east:.0f} m, north {north:.0f} m,"
         f" {points.distance[k] / 1000.0:.1f} km from the station, {sight_text})"
     )
-    if along.outages:
-        count = len(along.outages)
-        times_text = f", {count} times, at most {duration_text(along.longest_outage)} at a time" if count > 1 else ""
-        text += f" for {duration_text(along.time_below_margin)}{times_text}"
+    if link_along_path.outages:
+        count = len(link_along_path.outages)
+        times_text = (
+            f", {count} times, at most {duration_text(link_along_path.longest_outage)} at a time" if count > 1 else ""
+        )
+        text += f" for {duration_text(link_along_path.time_below_margin)}{times_text}"
     text += place
-    return text if along.is_known else f"{text}. Elsewhere the terrain below the radio path is unknown"
+    return text if link_along_path.is_known else f"{text}. Elsewhere the terrain below the radio path is unknown"
 
 
 def duration_text(duration: float) -> str:
@@ -268,12 +271,12 @@ def _reaction_text(title: str, reactions: Sequence[LinkLossReaction], returns: R
     return f"{text}: not judged, because the mission has no home" if has_return else text
 
 
-def _worst_leg(requirements: RouteRequirements, aligned: AlignedTrack | None, along: LinkAlongPath) -> Place:
+def _worst_leg(requirements: RouteRequirements, aligned: AlignedTrack | None, link_along_path: LinkAlongPath) -> Place:
     """Return the leg on which the link has its smallest margin.
 
     aligned: flown track; None for the planned path.
     """
-    time, phases = float(along.time[along.worst]), requirements.ground_phases
+    time, phases = float(link_along_path.time[link_along_path.worst]), requirements.ground_phases
     if aligned is None:
         path = requirements.path
         segment = int(np.searchsorted(path.times, time, side="right")) - 1

@@ -253,8 +253,9 @@ def _corner_faults(
     *,
     has_faults: bool,
 ) -> list[Message]:
-    """Return a message on failed corners as a list; [] without any.
+    """Return at most one message on the failed corners of a loiter.
 
+    aligned: flown track; None for a plan, whose first failed corner is described.
     has_faults: True if the loiter itself has a fault; planned corners are then not reported.
     """
     if not failed_corners or (aligned is None and has_faults):

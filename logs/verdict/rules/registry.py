@@ -110,12 +110,12 @@ def geometric_findings(
     flight_findings: findings on a flight of the route.  Findings of rules with `Rule.is_same_for_plan` are copied from
         them; None to run these rules, too.
     """
-    return _run_rules(requirements, None, (), geometric=True, flight_findings=flight_findings)
+    return _run_rules(requirements, aligned=None, end_findings=(), geometric=True, flight_findings=flight_findings)
 
 
 def place_findings(requirements: RouteRequirements) -> tuple[Finding, ...]:
     """Return only those geometric findings that judge legs, corners, threats and zones, not the route as a whole."""
-    return _run_rules(requirements, None, (), geometric=True, includes_whole_flight=False)
+    return _run_rules(requirements, aligned=None, end_findings=(), geometric=True, includes_whole_flight=False)
 
 
 def track_findings(requirements: RouteRequirements, aligned: AlignedTrack | None) -> tuple[Finding, ...]:

@@ -64,7 +64,7 @@ def return_findings(
             requirements, partial(planned_starts, requirements.setup, requirements=requirements)
         )
         end_findings = _automatic_return_findings(requirements, planned_end(requirements))
-        return [*_rtl_findings(requirements, None, "not flown yet"), *end_findings, *required_findings]
+        return [*_rtl_findings(requirements, ok=None, outcome="not flown yet"), *end_findings, *required_findings]
     if requirements.setup.imported_log is None:
         return []
     has_passed_end = aligned is not None and bool(aligned.passed[-1])
@@ -341,7 +341,7 @@ def _suggest_end_loiter(
     is_waypoint = commands.get(-1 if end.item is None else end.item) == Command.NAV_WAYPOINT
     if finding.place != end or not is_waypoint or not judges_return_after_last_item(setup):
         return ()
-    return ((Change("end loiter", end, None, float(Command.NAV_LOITER_UNLIM), ""),),)
+    return ((Change("end loiter", end, current=None, wanted=float(Command.NAV_LOITER_UNLIM), unit=""),),)
 
 
 RULE = Rule(

@@ -376,7 +376,11 @@ def _no_progress_text(requirements: RouteRequirements, leg: int) -> str:
 
 
 def _limit_text(requirements: RouteRequirements, leg: int, limit: float, source: str, *, is_climb: bool) -> str:
-    """Describe the limit on a leg's slope (rad), for the aircraft with airspeed and wind."""
+    """Describe the limit on a leg's slope, and the airspeed, altitude and wind for which it applies.
+
+    limit: largest slope of a climb or a descent, rad.
+    source: "scenario" for a limit of the scenario; any other source is the aircraft.
+    """
     if source == "scenario":
         return f"the scenario allows {math.degrees(limit):.1f}°"
     speed = float(requirements.route.leg_airspeeds[leg])

@@ -71,7 +71,7 @@ def _parameter_findings(requirements: RouteRequirements) -> list[Finding]:
 def _speed_finding(
     requirements: RouteRequirements, aligned: AlignedTrack | None, leg: int, demanded: float, *, geometric: bool
 ) -> Finding:
-    """Judge the airspeed on one leg; `demanded` is the mission's airspeed, true or equivalent, m/s."""
+    """Judge the commanded and the flown airspeed on a leg; `demanded`: the mission's, true or equivalent, m/s."""
     commanded = float(requirements.route.leg_airspeeds[leg])
     min_speed, max_speed, faults = _level_speed_range(requirements, leg, commanded)
     notes = [*_speed_range_notes(requirements, leg), _command_text(demanded, commanded, min_speed, max_speed)]

@@ -299,11 +299,22 @@ def _flown_finding(
     """Judge the usable fraction of a flown photo line.
 
     A line is not judged if it was not flown, or if its usable fraction depends on unknown ground.
+
+    aligned: flown track; None for a flight with too few rows.
+    number: number of the line in its survey.
     """
     name = _line_text(requirements, survey, line, number)
     measure = None if aligned is None else measure_line(requirements, aligned, survey, line)
     if measure is None:
-        return _line_finding(requirements, line, None, [], [f"{name}: not flown"], math.nan, geometric=False)
+        return _line_finding(
+            requirements,
+            line,
+            ok=None,
+            faults=[],
+            facts=[f"{name}: not flown"],
+            usable_fraction=math.nan,
+            geometric=False,
+        )
     ok = measure.ok
     faults, facts = [], [f"{name}: {100.0 * measure.usable:.0f} % of its {measure.length:.0f} m can be used"]
     if ok is None:

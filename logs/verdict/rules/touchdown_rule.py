@@ -115,7 +115,11 @@ def _short_strip_findings(place: Place, approach: Approach) -> list[Finding]:
 def _measure_landing(
     requirements: RouteRequirements, track: Track, terrain: Terrain, approach: Approach, touchdown_row: int
 ) -> _Landing:
-    """Measure a landing that touches down in row `touchdown_row` of the track; `point_height` remains NaN."""
+    """Measure a landing: positions of touchdown and stop, sink rates, and lowest clearance of the approach.
+
+    touchdown_row: row of the track in which the aircraft touches down.
+    The result's `point_height` is not set and remains NaN.
+    """
     position = np.asarray(track.position, dtype=np.float64)
     distance_beyond_point, lateral_offset = _as_floats(approach.distances_from_landing_point(position[touchdown_row]))
     touchdown, stop = (_as_floats(approach.distances_from_strip_center(position[row])) for row in (touchdown_row, -1))

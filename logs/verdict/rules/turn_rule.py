@@ -186,6 +186,9 @@ def _sharp_turn_message(
     """Explain why the planned turn at a waypoint is too sharp.
 
     The message states the scenario's limit, or the length of leg that the turn needs.  All angles are in rad.
+
+    limit: largest allowed turn at the waypoint.
+    source: where the limit comes from, "scenario" or "aircraft".
     """
     turn_text = f"turns {math.degrees(planned_turn):.1f}°"
     if source == "scenario":

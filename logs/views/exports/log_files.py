@@ -172,6 +172,7 @@ def px4_log_bytes(log: FlightLog) -> bytes:
         name = f"float {parameter.name}".encode()
         head += _encode_message(b"P", bytes([len(name)]) + name + struct.pack("<f", parameter.value))
     for number, topic in enumerate(topics):
+        # Instance 0 of the topic, and its number in the data messages.
         head += _encode_message(b"A", struct.pack("<BH", 0, number) + topic.name.encode())
     stamps, messages = [], []
     for number, topic in enumerate(topics):

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
-from logs.theme import LOOKS
+from logs.theme import ROLE_STYLES
 from logs.verdict.measures.route_requirements import with_fence_zones
 from logs.verdict.returns.drawn_returns import DrawnReturns
 from logs.verdict.returns.glide_footprint import BAND_ROLES, Part
@@ -42,7 +42,7 @@ class MapLine:
     amsl: (n,) m above mean sea level.
     marks: a name for each point, or empty.
     folder: KML folder shared with other lines; "" for its own folder.
-    role: role in `logs.theme` that gives its look; "" for the viewer's default look.
+    role: role in `logs.theme` that gives its style; "" for the viewer's default style.
     """
 
     name: str
@@ -108,7 +108,7 @@ class MapZone:
 
 
 def map_zones(setup: FlightSetup) -> list[MapZone]:
-    """Return the zones of a setup's scenario, and the fence of its mission.
+    """Return the zones of a setup's scenario, and the zones of its mission's fence.
 
     >>> from logs.recording.example_log import example_log
     >>> map_zones(example_log().setup)
@@ -152,7 +152,10 @@ def return_lines(setup: FlightSetup, drawn_returns: DrawnReturns, track: Track |
 
 
 def _make_line(setup: FlightSetup, name: str, positions: ArrayLike, folder: str, role: str) -> MapLine:
-    """Make a line on the map from positions (n, 3) m."""
+    """Make a line on the map from positions, m, (n, 3).
+
+    role: role of the data, which decides colour and width.
+    """
     points = np.asarray(positions, dtype=np.float64)
     lat, lon = to_geo(setup.scenario.origin, points[:, 0], points[:, 1])
     return MapLine(name, np.asarray(lat), np.asarray(lon), points[:, 2], folder=folder, role=role)
@@ -252,13 +255,13 @@ def _add_style(mark: ElementTree.Element, role: str) -> None:
     """
     if not role:
         return
-    look, style = LOOKS[role], _add_element(mark, "Style")
+    role_style, style = ROLE_STYLES[role], _add_element(mark, "Style")
     # KML colours are opacity, blue, green, red.
-    colour = "".join(look.dark[k : k + 2] for k in (5, 3, 1))
+    colour = "".join(role_style.dark[k : k + 2] for k in (5, 3, 1))
     line = _add_element(style, "LineStyle")
     _add_element(line, "color", f"ff{colour}")
-    _add_element(line, "width", f"{max(1.0, look.width):g}")
-    _add_element(_add_element(style, "PolyStyle"), "color", f"{round(255.0 * look.fill):02x}{colour}")
+    _add_element(line, "width", f"{max(1.0, role_style.width):g}")
+    _add_element(_add_element(style, "PolyStyle"), "color", f"{round(255.0 * role_style.fill):02x}{colour}")
 
 
 def _add_zones(folders: _Folders, zones: Sequence[MapZone]) -> None:
@@ -294,9 +297,9 @@ def _add_element(parent: ElementTree.Element, name: str, text: str = "") -> Elem
     return element
 
 
-def _format_coordinates(line: MapLine, k: int) -> str:
+def _format_coordinates(line: MapLine, index: int) -> str:
     """Return longitude, latitude and altitude of a point in the syntax of KML."""
-    return f"{line.lon_deg[k]:.8f},{line.lat_deg[k]:.8f},{line.amsl[k]:.3f}"
+    return f"{line.lon_deg[index]:.8f},{line.lat_deg[index]:.8f},{line.amsl[index]:.3f}"
 
 
 def gpx_text(title: str, lines: list[MapLine], zones: Sequence[MapZone] = ()) -> str:

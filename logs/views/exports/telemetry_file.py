@@ -73,7 +73,9 @@ def _list_timed_messages(log: FlightLog) -> Iterator[tuple[float, tuple[int, int
 def _make_upload_messages(log: FlightLog) -> Iterator[Any]:
     """Yield the messages with which a ground station uploads the mission."""
     items, _, _ = mission_lists(log.setup.mission)
+    # No base mode, no custom mode, state ACTIVE (4), MAVLink version 3.
     yield mavlink.MAVLink_heartbeat_message(mavlink.MAV_TYPE_GCS, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, 4, 3)
+    # Target system and component 1, number of items, mission type 0 (the mission itself).
     yield mavlink.MAVLink_mission_count_message(1, 1, len(items), 0)
     for item in items:
         yield to_message(item)

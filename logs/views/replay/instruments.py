@@ -76,17 +76,17 @@ class Instruments:
         ]
         return [shorten(line, columns).rstrip() for line in lines]
 
-    def _format_head_lines(self, k: int, columns: int) -> list[str]:
+    def _format_head_lines(self, row: int, columns: int) -> list[str]:
         """Return the title with the time, a bar of the time flown, and the leg with the remaining distance."""
         log, track = self.log, self.log.track
-        time, end = float(track.time[k]), log.end_time
+        time, end = float(track.time[row]), log.end_time
         title = f"{log.setup.scenario.name}: {log.setup.aircraft}"
         clock = f"{time:8.1f} of {end:.1f} s"
         filled_columns = round((columns - 2) * (time - float(track.time[0])) / max(end - float(track.time[0]), 1e-9))
         bar = "[" + "=" * filled_columns + " " * (columns - 2 - filled_columns) + "]"
-        leg = int(track.leg[k])
+        leg = int(track.leg[row])
         route = log.setup.route
-        step = route.positions[leg + 1, :2] - track.position[k, :2] if leg < route.legs else np.zeros(2)
+        step = route.positions[leg + 1, :2] - track.position[row, :2] if leg < route.legs else np.zeros(2)
         leg_text = (
             f"leg {route.leg_numbers[leg]} of {route.leg_numbers[-1] + 1}, to {waypoint_name(route, leg + 1)},"
             f" {_format_metres(float(np.hypot(*step)))} to go"
@@ -96,9 +96,9 @@ class Instruments:
         title_width = max(1, columns - len(clock))
         return [_replace_control_characters(title)[: title_width - 1].ljust(title_width) + clock, bar, leg_text]
 
-    def _draw_horizon(self, k: int, columns: int) -> list[str]:
+    def _draw_horizon(self, track_row: int, columns: int) -> list[str]:
         """Return the artificial horizon: sky above, ground (:) below, the aircraft's wings in the center."""
-        roll, pitch, _ = (float(angle) for angle in self.log.track.attitude[k])
+        roll, pitch, _ = (float(angle) for angle in self.log.track.attitude[track_row])
         rows = []
         for row in range(_HORIZON_ROWS):
             cells = []
@@ -115,17 +115,17 @@ class Instruments:
         edge = "+" + "-" * columns + "+"
         return [edge, *("|" + "".join(cells) + "|" for cells in rows), edge]
 
-    def _format_readouts(self, k: int) -> list[str]:
+    def _format_readouts(self, row: int) -> list[str]:
         """Return the numbers next to the horizon: speeds, heights, attitude, path errors, wind and battery."""
         track, setup = self.log.track, self.log.setup
-        east, north, up = (float(value) for value in track.velocity[k])
-        roll, pitch, yaw = (math.degrees(float(angle)) for angle in track.attitude[k])
-        _, _, amsl = track.position[k].tolist()
-        height_above_ground = amsl - float(self.ground[k])
-        wind_east, wind_north, _ = (float(value) for value in track.wind[k])
+        east, north, up = (float(value) for value in track.velocity[row])
+        roll, pitch, yaw = (math.degrees(float(angle)) for angle in track.attitude[row])
+        _, _, amsl = track.position[row].tolist()
+        height_above_ground = amsl - float(self.ground[row])
+        wind_east, wind_north, _ = (float(value) for value in track.wind[row])
         height = _format_metres(height_above_ground) if math.isfinite(height_above_ground) else "unknown"
         airspeed, commanded, load_factor, energy_used, current = (
-            float(column[k])
+            float(column[row])
             for column in (track.airspeed, track.speed_command, track.load_factor, track.energy, track.current)
         )
         return [
@@ -135,24 +135,24 @@ class Instruments:
             f"course       {_format_course(math.degrees(math.atan2(east, north)))}, heading {_format_course(yaw)}",
             f"roll, pitch  {_format_number(roll, 1, '+')}°, {_format_number(pitch, 1, '+')}°, "
             f"{_format_number(load_factor, 2)} g",
-            f"off the path {_format_number(float(track.cross_track[k]), 1, '+')} m right, "
-            f"{_format_number(float(track.height_error[k]), 1, '+')} m high",
+            f"off the path {_format_number(float(track.cross_track[row]), 1, '+')} m right, "
+            f"{_format_number(float(track.height_error[row]), 1, '+')} m high",
             f"wind         {_format_number(math.hypot(wind_east, wind_north), 1)} m/s from "
             f"{_format_course(math.degrees(math.atan2(-wind_east, -wind_north)))}",
             f"battery      {_format_number(energy_used, 1)} of {_format_number(setup.battery, 0)} Wh used,"
             f" {_format_number(current, 1)} A",
         ]
 
-    def _format_control_lines(self, k: int, bar_width: int) -> list[str]:
+    def _format_control_lines(self, row: int, bar_width: int) -> list[str]:
         """Return one bar for each control, with its position (O) between its limits, and its command (|).
 
         The bar of a control without a limit ends at 30°.
 
-        k: row of the track.  bar_width: number of characters.
+        row: row of the track.  bar_width: number of characters.
         """
         lines = []
-        controls = self.log.track.controls[k].tolist()
-        commands = self.log.track.commands[k].tolist()
+        controls = self.log.track.controls[row].tolist()
+        commands = self.log.track.commands[row].tolist()
         for (name, limit), deflection, command in zip(self.limits, controls, commands, strict=True):
             is_throttle = name == "throttle"
             max_value = limit if math.isfinite(limit) else math.radians(30.0)
@@ -172,9 +172,9 @@ class Instruments:
             lines.append(f"{name:<9} [{''.join(cells)}] {state_text}{limit_text}")
         return lines
 
-    def _describe_threats(self, k: int) -> str:
+    def _describe_threats(self, row: int) -> str:
         """Return the names and distances of the missiles and radars whose range contains the aircraft."""
-        threats, position = self.log.setup.scenario.threats, self.log.track.position[k]
+        threats, position = self.log.setup.scenario.threats, self.log.track.position[row]
         distances = np.sqrt(((threats.position - position) ** 2).sum(axis=1))
         threats_in_reach = [
             f"{unit} {threats.names[m]} at {_format_metres(float(distances[m]))}"

@@ -196,24 +196,27 @@ def _list_turn_entries(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEn
     return entries
 
 
-def _list_clearance_entries(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:
-    """List an entry for the lowest height above ground on each leg; it states if the height is too low."""
+def _list_clearance_entries(log: FlightLog, rows_by_leg: list[_LegRows]) -> list[TimelineEntry]:
+    """List an entry for the lowest height above ground on each leg, which warns if the height is too low.
+
+    The legs around one loiter have one entry together.  Without terrain there is a single entry that says so.
+    """
     terrain, track = log.setup.scenario.terrain, log.track
     if terrain is None:
         return [TimelineEntry(float(track.time[0]), "ground", "no terrain in the log: clearance is unknown")]
     clearances, fractions = segment_clearances(terrain, track.position)
     required = log.setup.scenario.limits.min_clearance_m
     entries = []
-    for group in _group_by_loiter(parts, log.setup.route):
-        part = replace(group[0], last=group[-1].last)
-        name = f"leg {log.setup.route.leg_numbers[part.leg]}" + (", around its circle" if len(group) > 1 else "")
+    for group in _group_by_loiter(rows_by_leg, log.setup.route):
+        leg_rows = replace(group[0], last=group[-1].last)
+        name = f"leg {log.setup.route.leg_numbers[leg_rows.leg]}" + (", around its circle" if len(group) > 1 else "")
         # Segment k leads from row k to row k + 1; the segment into the next leg belongs to this leg.
-        part_clearances = clearances[part.first : part.last + 1]
+        part_clearances = clearances[leg_rows.first : leg_rows.last + 1]
         if not np.isfinite(part_clearances).any():
-            time = float(track.time[part.first])
+            time = float(track.time[leg_rows.first])
             entries.append(TimelineEntry(time, "ground", f"{name}: no terrain data under it"))
             continue
-        k = part.first + int(np.nanargmin(part_clearances))
+        k = leg_rows.first + int(np.nanargmin(part_clearances))
         time = float(track.time[k] + fractions[k] * (track.time[k + 1] - track.time[k]))
         below_text = "" if clearances[k] >= required else f", below the required {required:.0f} m"
         known_text = "" if np.isfinite(part_clearances).all() else ", where there is terrain data"

@@ -127,7 +127,7 @@ def identification_page(facts: IdentificationFacts) -> str:
         whiteness=[f"{100.0 * share:.0f} %" for share in facts.predicted.predictions[-1].whiteness],
         predicted_picture=picture_data_url(pictures["predicted.png"]),
         style=Markup(style_text("style", "compare", "identification")),
-        scene=Markup(script_json(None)),
+        scene=Markup(script_json(data=None)),
         flight_data=Markup(script_json({"flights": []})),
         chart_data=Markup(script_json({name: view_json(chart) for name, chart in charts.items()})),
         library=page_library(),

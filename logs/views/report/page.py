@@ -161,14 +161,14 @@ def page_template(name: str, package: str = "logs.views.report") -> Template:
 
 
 def script_text(names: tuple[str, ...]) -> str:
-    """Join the theme's looks and scripts of ``templates/scripts`` to one script.
+    """Join the theme's styles and scripts of ``templates/scripts`` to one script.
 
     names: names of the scripts in their order; ``start`` is added at the end.
     """
     files = resources.files("logs.views.report").joinpath("templates", "scripts")
     parts = [files.joinpath(f"{name}.js").read_text(encoding="utf-8") for name in (*names, "start")]
-    looks = f"const LOOKS = {json.dumps(theme.page_styles(), separators=(',', ':'))};"
-    return "\n".join(['\n(function () {\n"use strict";', looks, *parts]) + "})();\n"
+    styles = f"const LOOKS = {json.dumps(theme.page_styles(), separators=(',', ':'))};"
+    return "\n".join(['\n(function () {\n"use strict";', styles, *parts]) + "})();\n"
 
 
 def style_text(*names: str) -> str:
@@ -267,7 +267,14 @@ def _render_page(
     command: str,
     events: Sequence["LogEvent"] = (),
 ) -> str:
-    """Return the report's page: the template filled with verdict, tables, pictures and facts."""
+    """Return the report's page: the template filled with verdict, tables, pictures and facts.
+
+    subject: the track, if any, and its verdict.
+    views: interactive charts by name.  pictures: PNG files by name.
+    end_reason: reason why the flight ended; None for a plan.
+    versions: versions of planfly and of its libraries by name.
+    command: the command line that repeats the flight.
+    """
     track, verdict = subject.track, subject.verdict
     failed = failures(verdict, len(setup.route.points))
     shown = verdict.present()

@@ -32,7 +32,7 @@ def prediction_page(heading: str, bands: Sequence[Band], chart: Chart) -> str:
         bands=[band for band in bands if band.inside == band.inside],
         picture=picture_data_url(draw_pictures({"bands": chart})["bands.png"]),
         style=Markup(style_text("style", "compare", "identification")),
-        scene=Markup(script_json(None)),
+        scene=Markup(script_json(data=None)),
         flight_data=Markup(script_json({"flights": []})),
         chart_data=Markup(script_json({"bands": view_json(chart)})),
         library=page_library(),

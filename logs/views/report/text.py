@@ -131,7 +131,7 @@ def _make_finding_row(finding: Finding) -> FindingRow:
         flown=number(flown_value, digits=digits),
         limit=limit if limit == NOTHING else f"{finding.limit_sign}\u00a0{limit}",
         margin=number(margin_with_tolerance, signed=True),
-        unit=in_unit(None, finding.unit)[1],
+        unit=in_unit(value=None, unit=finding.unit)[1],
         method=method,
     )
 

@@ -224,7 +224,7 @@ _SEED = 1
 
 
 def importance_sample(log_density: Callable[[Floats], Floats], mean: Floats, covariance: Floats, count: int) -> Floats:
-    """Sample a distribution of which the log-density is known: equally likely points in random order, (count, k).
+    """Return equally likely samples of a distribution with a known log-density, in random order, (count, k).
 
     The points are spread more evenly in the first coordinate than in the others.
     log_density: log-density (n,) of points (n, k), up to a constant; -inf for zero density.

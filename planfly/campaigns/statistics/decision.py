@@ -74,7 +74,9 @@ def wilson(successes: int, trials: int, confidence: float = 0.95) -> Interval:
 
 
 def lower_bound(tally: Tally, confidence: float = 0.95) -> float:
-    """Return Clopper and Pearson's one-sided lower bound of the probability of success.
+    """Return Clopper and Pearson's one-sided lower bound of the probability of success; 0 without flights.
+
+    Lost and undecided flights count as failures.
 
     299 flights without a failure give P >= 0.99 at 95 %.
 
@@ -83,6 +85,7 @@ def lower_bound(tally: Tally, confidence: float = 0.95) -> float:
     >>> lower_bound(Tally(299, 0)) >= 0.99 > lower_bound(Tally(298, 0))
     True
     """
+    # A one-sided bound is an end of the two-sided interval that excludes as much on the other side.
     return clopper_pearson(tally.flyable, tally.flown, 2.0 * confidence - 1.0).low if tally.flown else 0.0
 
 

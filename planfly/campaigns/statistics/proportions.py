@@ -62,7 +62,8 @@ def paired_difference(only_first: int, only_second: int, pairs: int, confidence:
 def _score_deviation(only_first: int, only_second: int, pairs: int, difference: float) -> float:
     """Return the standard deviation of the difference of the counts, for a true difference of the proportions.
 
-    only_first, only_second: numbers of pairs in which only that trial succeeds.
+    only_first, only_second: number of pairs in which only the first trial, or only the second, succeeds.
+    pairs: number of all pairs.
 
     The probability that only the first trial succeeds is estimated by maximum likelihood for this difference: it is the
     larger root of Tango's quadratic equation.

@@ -345,6 +345,7 @@ def next_flights(direction: Direction, count: int) -> list[tuple[float, int]]:
     """
     if direction.all_flyable or direction.all_failed:
         speed = _bisect_speed(direction)
+        # In the maximum wind, the draws with extreme values come first, because they are the most likely to fail.
         draws = _extreme_draws(direction) if speed == direction.max_speed else []
         return [(speed, draw) for draw in (draws + _next_draws(direction, count, draws))[:count]]
     return _choose_most_informative(direction, count)

@@ -37,10 +37,10 @@ def by_role(layers: tuple[Layer, ...], role: str) -> list[Layer]:
 
 
 def test_every_kind_has_a_look_and_a_name_of_its_own() -> None:
-    assert {f"return-{kind}" for kind in KINDS} | {f"reach-{reach}" for reach in REACHES} <= set(theme.LOOKS)
+    assert {f"return-{kind}" for kind in KINDS} | {f"reach-{reach}" for reach in REACHES} <= set(theme.ROLE_STYLES)
     assert len({segment_text(kind) for kind in KINDS}) == len(KINDS)
     assert len({reached_text(reach) for reach in REACHES}) == len(REACHES)
-    looks = [theme.LOOKS[f"return-{kind}"] for kind in KINDS]
+    looks = [theme.ROLE_STYLES[f"return-{kind}"] for kind in KINDS]
     assert len({(look.light, look.dash) for look in looks}) == len(looks)
     # Without colours too, they differ from what is safe.
     assert all(look.dash for kind, look in zip(KINDS, looks, strict=True) if kind != "safe")
@@ -153,8 +153,8 @@ def test_lines_that_coincide_are_one_and_others_are_both_seen(shown: tuple[Fligh
         layers = chart.panels[1].layers
         assert [layer.role for layer in layers] == names
         assert ("and for a rally point or landing place there" in layers[0].name) is (shift == 0.0)
-    assert theme.LOOKS["left-site"].width > 2.0 * theme.LOOKS["left-home"].width
-    assert not theme.LOOKS["left-site"].dash
+    assert theme.ROLE_STYLES["left-site"].width > 2.0 * theme.ROLE_STYLES["left-home"].width
+    assert not theme.ROLE_STYLES["left-site"].dash
 
 
 def test_a_flown_path_is_drawn_where_it_was_flown() -> None:

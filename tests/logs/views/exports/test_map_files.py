@@ -158,7 +158,7 @@ def test_returns_have_the_colours_of_what_they_come_to(tmp_path: Path) -> None:
     assert "hits the ground" in (folders["the worst returns"][0].findtext(f"{KML}name") or "")
     near = folders["the glide's footprint"][0]
     assert near.findtext(f"{KML}name") == "home or another chosen place in reach from 150 m above ground"
-    opacity = round(255.0 * theme.LOOKS["glide-near"].fill)
+    opacity = round(255.0 * theme.ROLE_STYLES["glide-near"].fill)
     assert (near.findtext(f"{KML}Style/{KML}PolyStyle/{KML}color") or "").startswith(f"{opacity:02x}")
     # It lies about home, and no height is stated: on the ground.
     ring = near.findtext(f".//{KML}outerBoundaryIs/{KML}LinearRing/{KML}coordinates") or ""
