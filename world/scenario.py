@@ -566,11 +566,9 @@ def _assemble_scenario(
     # The ends of an external mission are its own waypoints: the verdict reports zones that they violate.
     check_ends(zones, source, ends if zones and not external else (), ground)
     if not external and math.dist(start[:2], destination[:2]) < 10.0:
-        raise ScenarioError(
-            f"{source}: destination: less than 10 m horizontally from the start", file=source, field="destination"
-        )
-    table, start_up = spec.wind, float(start[2])
-    wind = Wind(table.speed_mps, math.radians(table.from_deg), table.gradient, table.turbulence, table.seed, start_up)
+        text = f"{source}: destination: less than 10 m horizontally from the start"
+        raise ScenarioError(text, file=source, field="destination")
+    table, direction = spec.wind, math.radians(spec.wind.from_deg)
     return Scenario(
         name=spec.name,
         spec=spec,
@@ -587,7 +585,7 @@ def _assemble_scenario(
         limits=spec.limits,
         planner=spec.planner,
         flight=spec.flight,
-        wind=wind,
+        wind=Wind(table.speed_mps, direction, table.gradient, table.turbulence, table.seed, float(start[2])),
         external=external,
         zones=zones,
         home=make_home(spec.home, source, origin, ground, bounds, start),

@@ -240,6 +240,17 @@ def optimise(
     1.08
     """
     check_arguments(population=population, seed=None if isinstance(seed, np.random.Generator) else seed)
+    lower_bounds, upper_bounds = _parse_bounds(lower, upper)
+    if not isinstance(model, str) or model not in _MODELS:
+        raise ArgumentError.of_argument("model", model, f"expected {', '.join(_MODELS)}")
+    if population % 2:
+        raise ArgumentError.of_argument("population", population, RANGES["population"].expected)
+    first_points = None if initial is None else _parse_initial(initial, population, lower_bounds, upper_bounds)
+    return Optimiser(lower_bounds, upper_bounds, model, population, np.random.default_rng(seed), first_points)
+
+
+def _parse_bounds(lower: ArrayLike, upper: ArrayLike) -> tuple[Floats, Floats]:
+    """Return the bounds of a box as arrays (d,).  Raises ArgumentError for other shapes or bounds without a width."""
     lower_bounds, upper_bounds = _parse_numbers("lower", lower), _parse_numbers("upper", upper)
     if lower_bounds.ndim != 1 or lower_bounds.shape != upper_bounds.shape or not lower_bounds.size:
         shapes = f"of shapes {lower_bounds.shape} and {upper_bounds.shape}"
@@ -249,12 +260,7 @@ def optimise(
     if not (np.isfinite(widths) & (widths > 0.0)).all():
         allowed = "expected finite numbers, lower below upper by a finite difference"
         raise ArgumentError.of_argument("lower, upper", lower, allowed, shown="")
-    if not isinstance(model, str) or model not in _MODELS:
-        raise ArgumentError.of_argument("model", model, f"expected {', '.join(_MODELS)}")
-    if population % 2:
-        raise ArgumentError.of_argument("population", population, RANGES["population"].expected)
-    first_points = None if initial is None else _parse_initial(initial, population, lower_bounds, upper_bounds)
-    return Optimiser(lower_bounds, upper_bounds, model, population, np.random.default_rng(seed), first_points)
+    return lower_bounds, upper_bounds
 
 
 def _parse_initial(initial: ArrayLike, population: int, lower: Floats, upper: Floats) -> Floats:

@@ -104,8 +104,7 @@ def plan_path(
     progress: called with generations done, generations in total, and a short text.
     stop: called every few hundredths of a second. If it returns a text ("interrupted"), the search ends with the best
         path so far, and the plan records the text.
-    improved: called with each path (w, 3) that meets the constraints better than all earlier paths; it is not yet
-        certified.
+    improved: called with each path (w, 3), not yet certified, that meets the constraints better than all earlier paths.
     first_safe: True to end the search with the first safe path.
     previous: older path (w, 3) with the same ends and number of waypoints, from which the search starts.
 
@@ -116,29 +115,19 @@ def plan_path(
     _check_options(scenario, limits.airspeed)
     problem = make_problem(scenario, limits_for(found_algorithm, limits))
     cost = make_objective_cost(scenario, limits, problem)
-    stated_count = scenario.planner.waypoints
 
     def search_with(count: int, evaluations: int) -> _Result:
         """Search with a number of waypoints; the legs of a path with too few waypoints are halved."""
-        search = Search(
-            problem,
-            found_algorithm,
-            ENCODINGS[found_algorithm.encoding](problem.space, count),
-            stream(seed, PLANNER),
-            progress,
-            stop,
-            first_safe,
-            required_kill_distance(problem),
-            improved,
-            evaluations=evaluations,
-        )
+        encoding = ENCODINGS[found_algorithm.encoding](problem.space, count)
+        settings = (progress, stop, first_safe, required_kill_distance(problem), improved)
+        search = Search(problem, found_algorithm, encoding, stream(seed, PLANNER), *settings, evaluations=evaluations)
         path, path_certificate = search_cheapest_path(search, _search_repeatedly(search, previous), cost)
-        if count < stated_count:
-            path = with_waypoints(path, stated_count)
+        if count < scenario.planner.waypoints:
+            path = with_waypoints(path, scenario.planner.waypoints)
             path_certificate = certify(problem, path)
         return search, path, path_certificate
 
-    result = best = search_with(stated_count, 0)
+    result = best = search_with(scenario.planner.waypoints, 0)
     for count in _other_waypoint_counts(scenario, found_algorithm, previous):
         if not result[0].must_end() and _needs_other_count(best, count):
             result = search_with(count, result[0].evaluations)
@@ -146,11 +135,11 @@ def plan_path(
     search, waypoints, certificate = best
     violations, objectives = paper_scores(problem.certified, waypoints[None])
     return Plan(
-        scenario=scenario,
-        waypoints=waypoints,
-        violations=Violations(*violations[0]),
-        objectives=Objectives(*objectives[0]),
-        certificate=certificate,
+        scenario,
+        waypoints,
+        Violations(*violations[0]),
+        Objectives(*objectives[0]),
+        certificate,
         seed=seed,
         algorithm=found_algorithm.name,
         evaluations=result[0].evaluations,

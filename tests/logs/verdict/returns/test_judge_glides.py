@@ -194,7 +194,7 @@ def test_taking_off_is_left_out_and_what_is_not_known_is_undecided(tmp_path: Pat
     found = demanded(tmp_path, mission=way)
     assert "; 9 starts lower than 30 m above ground are omitted" in found.reason
     # 3 km at 25 m/s, and the start.
-    assert f" of {121 - 9} positions, " in found.reason
+    assert f" of {121 - 9} positions; " in found.reason
     setup = hill_setup(tmp_path, '[returns]\nrequire = ["glide"]\n')
     bare = replace(setup, scenario=replace(setup.scenario, terrain=None))
     verdict = judge_geometry(bare)
