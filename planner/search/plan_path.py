@@ -33,7 +33,6 @@ from planner.search.search_state import (
     with_narrow_margins,
 )
 from planner.search.seeds import (
-    LONG_PATH_EXCESS_FRACTION,
     MIN_DETOUR_FRACTION,
     may_turn_back,
     search_other_sides,
@@ -166,19 +165,18 @@ def _other_waypoint_counts(scenario: Scenario, algorithm: Algorithm, previous_pa
 def _needs_other_count(best: _Result, count: int) -> bool:
     """Return True if a search with another number of waypoints may find a better path than the best so far.
 
-    Another number is tried if no path is safe, unless it is proven that there is none. If the shortest path is sought,
-    fewer waypoints are also tried if the best path is long, or longer than the straight line among zones, where paths
-    are not shortened.
+    Another number is tried if no path is safe, unless it is proven that there is none. If the shortest path is sought
+    among zones, where paths are not shortened, fewer waypoints are also tried if the best path is longer than the
+    straight line.
     """
     search, waypoints, certificate = best
     if not search.meets_goal(certificate):
         return not search.is_closed
     if search.first_safe or (search.problem.scenario.planner.objective or "length") != "length":
         return False
+    max_length = (1.0 + MIN_DETOUR_FRACTION) * math.dist(waypoints[0], waypoints[-1])
     is_among_zones = is_limited(search.problem.search.airspace)
-    max_excess = MIN_DETOUR_FRACTION if is_among_zones else LONG_PATH_EXCESS_FRACTION
-    max_length = (1.0 + max_excess) * math.dist(waypoints[0], waypoints[-1])
-    return count < search.encoding.waypoints and bool(path_length(waypoints) > max_length)
+    return is_among_zones and count < search.encoding.waypoints and bool(path_length(waypoints) > max_length)
 
 
 def _is_better(result: _Result, other: _Result) -> bool:

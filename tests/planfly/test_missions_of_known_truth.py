@@ -77,7 +77,7 @@ CASES = {
         False,
         ("energy",),
         ("completion", "energy"),
-        "not started: it takes 3 times",
+        "not started: the mission needs 3 times",
         tables={"flight": {"battery_wh": 39.0}},
     ),
     "3 jumps with half the energy they take": Case(

@@ -175,7 +175,7 @@ def test_obstacles_that_block_every_route_are_named(
     lines = explain_failure(plan)
     assert "terrain blocks the whole width" in lines[0]
     assert "ceiling is at 450 m AMSL" in lines[0]
-    assert "turn back or circle to climb were searched" in lines[-1]
+    assert "also tried routes that turn back or circle to climb" in lines[-1]
     alone = plan_path(walled, make_limits(walled), seed=1, algorithm="umda")
     assert "it searched no route that turns back" in explain_failure(alone)[-1]
 
