@@ -6,7 +6,7 @@ into a `Scenario`.
 
 from typing import Annotated, Any, Literal, NamedTuple, get_args
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, field_validator, model_validator
 
 from world.airspace.zone_times import parse_period, parse_span
 from world.elevation_formats import MAX_TILES
@@ -439,6 +439,8 @@ def names_folder(aircraft: str) -> bool:
 DEFAULT_AUTOPILOT = "ardupilot"
 # Planfly's own guidance: the only one with a choice of laws, and the only one without parameters.
 OWN_GUIDANCE = "planfly"
+# Name of planfly's own guidance in scenarios, plans and logs written before version 0.2.
+_OLD_OWN_GUIDANCE = "ideal"
 # Autopilots with a choice of release.
 _ARDUPILOT = "ardupilot"
 _PX4 = "px4"
@@ -487,6 +489,12 @@ class FlightTable(ScenarioTable):
     fly_over: bool = False
     motor_braking: bool = False
     battery_wh: Annotated[float, in_range(0.0, 100_000.0, exclude_min=True)] | None = None
+
+    @field_validator("autopilot")
+    @classmethod
+    def _replace_old_name(cls, name: str | None) -> str | None:
+        """Return the present name of an autopilot."""
+        return OWN_GUIDANCE if name == _OLD_OWN_GUIDANCE else name
 
     @model_validator(mode="after")
     def _check_autopilot(self) -> "FlightTable":

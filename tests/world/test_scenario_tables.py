@@ -177,6 +177,8 @@ def test_every_default() -> None:
         ({}, (DEFAULT_AUTOPILOT, "path", "perfect" if DEFAULT_AUTOPILOT == "planfly" else "gnss")),
         ({"guidance": "l1"}, ("planfly", "l1", "perfect")),
         ({"autopilot": "planfly"}, ("planfly", "path", "perfect")),
+        # The name before version 0.2.
+        ({"autopilot": "ideal"}, ("planfly", "path", "perfect")),
         ({"autopilot": "planfly", "nav": "gnss"}, ("planfly", "path", "gnss")),
         ({"autopilot": "ardupilot"}, ("ardupilot", "path", "gnss")),
         ({"params": "mine.parm"}, ("ardupilot", "path", "gnss")),
