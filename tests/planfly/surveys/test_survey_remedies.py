@@ -163,7 +163,7 @@ def test_a_slower_flight_with_longer_turn_arounds(monkeypatch: pytest.MonkeyPatc
     """The x8 cruises at 18 m/s; the lowest that is tried is a tenth above its slowest of 12 m/s, 13.2 m/s."""
     [both] = judged_by(monkeypatch, lambda setup, m: m >= 130.0 and setup.route.leg_airspeeds[0] < 17.0).remedies
     assert (both.kind, both.current, both.value, both.turn_around) == ("airspeed", 18.0, 13.2, 150.0)
-    assert "13.2 m/s instead of 18 m/s (--airspeed 13.2), with turn-arounds of 150 m" in remedy_text(both, 3000.0)
+    assert "13.2 m/s instead of 18 m/s (DO_CHANGE_SPEED), with turn-arounds of 150 m" in remedy_text(both, 3000.0)
 
 
 @pytest.mark.parametrize(
@@ -225,7 +225,7 @@ def test_a_mission_slower_than_the_aircraft_flies_is_made_faster(
     [faster] = found.remedies
     assert (faster.kind, faster.current, faster.value, faster.turn_around) == ("airspeed", 2.0, 18.0, 150.0)
     assert speeds(faster.mission) == [18.0, 16.0]
-    assert "18 m/s instead of 2 m/s, with turn-arounds of 150 m" in remedy_text(faster, 3000.0)
+    assert "18 m/s instead of 2 m/s (DO_CHANGE_SPEED), with turn-arounds of 150 m" in remedy_text(faster, 3000.0)
 
 
 def test_nearest_trial_is_the_one_that_makes_more_of_each_line_usable(monkeypatch: pytest.MonkeyPatch) -> None:
