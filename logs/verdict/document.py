@@ -32,10 +32,7 @@ class FindingDocument(DocumentConfig):
     at_least: bool
     """True if values of at least the limit pass; false if values of at most the limit pass."""
     passes: str
-    """The values that pass in words, with the tolerance: "≤ 8.29 m"; "" without a limit.
-
-    If the value passes only by the tolerance, it is stated apart: "≥ -5.09°, within the tolerance of 0.5°".
-    """
+    """The values that pass in words, with the tolerance: "≤ 8.29 m"; "" without a limit."""
     tolerance: float | None
     margin: float | None
     """Distance inside the limit, without the tolerance; negative beyond the limit, even within the tolerance."""

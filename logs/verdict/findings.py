@@ -154,16 +154,23 @@ class Finding:
 
     @property
     def limit_text(self) -> str:
-        """Text of the values that pass, with the tolerance if the value passes only by it; "" without a limit.
+        """Text of the values that pass, always with the tolerance; "" without a limit.
 
         >>> make_finding("stall", Place("flight"), ok=True, reason="", limit=9.5, unit="m/s", at_least=True).limit_text
         '≥ 9.5 m/s'
         """
-        return ", ".join(filter(None, (self.compared_texts()[1], self.tolerance_note)))
+        return self._texts_with(self.effective_limit)[1]
 
     def compared_texts(self) -> tuple[str, str]:
-        """Return the value and the range of passing values as texts, with enough digits to tell the two apart."""
-        value, limit = self.value, self.shown_limit
+        """Return the value and the range of passing values as texts, with enough digits to tell the two apart.
+
+        The range includes the tolerance, unless `tolerance_note` states it.
+        """
+        return self._texts_with(self.shown_limit)
+
+    def _texts_with(self, limit: float | None) -> tuple[str, str]:
+        """Return the value and the values within a limit as texts, with enough digits to tell the two apart."""
+        value = self.value
         if value is None or limit is None:
             texts = ["" if number is None else quantity_text(number, self.unit) for number in (value, limit)]
         else:

@@ -542,7 +542,9 @@ class Px4(Autopilot):
         return (
             f"RTL_TYPE {return_type:g}: a return goes to {_DESTINATION_TEXTS[int(return_type)]}. An aircraft below"
             f" RTL_RETURN_ALT ({first_height} above the destination) first climbs to this height in a loiter. Then it"
-            f" flies level. Over home or a rally point it descends in a loiter to RTL_DESCEND_ALT ({last_height})"
+            " flies level: to the loiter of a landing sequence up to NAV_FW_ALT_RAD"
+            f" ({parameters['NAV_FW_ALT_RAD']:g} m) lower, because the climb ends there. Over home or a rally point it"
+            f" descends in a loiter to RTL_DESCEND_ALT ({last_height})"
         )
 
     @property

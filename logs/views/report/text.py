@@ -144,9 +144,7 @@ _MAX_DECIMALS = 6
 
 def _count_needed_decimals(finding: Finding) -> int | None:
     """Return the decimals needed to distinguish a value from its limit; None if the usual number suffices."""
-    value, limit = (
-        in_unit(quantity_value, finding.unit)[0] for quantity_value in (finding.value, finding.shown_limit)
-    )
+    value, limit = (in_unit(quantity_value, finding.unit)[0] for quantity_value in (finding.value, finding.shown_limit))
     if value is None or limit is None or value == limit or number(value) != number(limit):
         return None
     sufficient_decimals = (

@@ -166,6 +166,29 @@ def test_a_slower_flight_with_longer_turn_arounds(monkeypatch: pytest.MonkeyPatc
     assert "13.2 m/s instead of 18 m/s (DO_CHANGE_SPEED), with turn-arounds of 150 m" in remedy_text(both, 3000.0)
 
 
+@pytest.mark.parametrize("needed_turn_around", [0.0, 130.0])
+def test_a_suggested_airspeed_is_written_into_the_mission(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, needed_turn_around: float
+) -> None:
+    """The written file, opened with the same options, is flown at the airspeeds of the trial that passed."""
+    trials: list[FlightSetup] = []
+
+    def passes(setup: FlightSetup, metres: float) -> bool:
+        trials.append(setup)
+        survey = judged_surveys(setup)[0]
+        return metres >= needed_turn_around and max(setup.route.leg_airspeeds[survey.first : survey.last]) < 17.0
+
+    remedy = judged_by(monkeypatch, passes).remedies[-1]
+    assert remedy.kind == "airspeed"
+    for kind in ("waypoints", "plan"):
+        file = tmp_path / f"airspeed.{kind}"
+        file.write_text(mission_text(remedy.mission, "plan" if kind == "plan" else "waypoints"), encoding="utf-8")
+        again = opened(file)
+        trial = next(each for each in trials if each.mission == remedy.mission)
+        assert again.route.leg_airspeeds.tolist() == trial.route.leg_airspeeds.tolist()
+        assert passes(again, min_turn_around(again.route, judged_surveys(again)[0]))
+
+
 @pytest.mark.parametrize(
     ("flown_mps", "autopilot", "speed"), [(22.0, "planfly", 15.5), (22.0, "ardupilot", 15.5), (26.0, "planfly", 13.2)]
 )
