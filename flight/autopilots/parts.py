@@ -95,6 +95,8 @@ class TurnRules:
         the waypoint perpendicular to the leg.
     distance: returns the maximum distance before a waypoint at which the autopilot turns, m; the arguments are the turn
         at the waypoint, rad, positive (pi at the mission's end), and its altitude, m AMSL.
+    radii_at: returns the acceptance radii at ground speeds (n,), m/s, as (n,) m; None if the radius does not depend on
+        the ground speed.
     reads_acceptance: True if the acceptance radius in a waypoint's item decides where the autopilot turns.
     acceptance_limit: maximum acceptance radius that the autopilot reads from an item, m.
     keeps_to_arcs: True if the autopilot flies each turn as an arc whose radius follows from the turn distance.
@@ -104,6 +106,7 @@ class TurnRules:
 
     acceptance_radius: float | None = None
     distance: Callable[[float, float], float] = _turn_at_waypoint
+    radii_at: Callable[[Floats], Floats] | None = None
     reads_acceptance: bool = True
     acceptance_limit: float = math.inf
     keeps_to_arcs: bool = True

@@ -180,24 +180,28 @@ def delete_item(mission: Mission, index: int) -> Mission:
     return replace(mission, items=tuple(_renumber(item, seq, -1) for item in items))
 
 
-def set_airspeed(mission: Mission, index: int, airspeed: float, next_airspeed: float) -> Mission:
-    """Return the mission with another airspeed on the leg to an item.
+def set_airspeed(
+    mission: Mission, index: int, airspeed: float, next_airspeed: float, last_index: int | None = None
+) -> Mission:
+    """Return the mission with another airspeed on the leg to an item, or on all legs up to a last item.
 
     airspeed: new airspeed on the leg to the item, m/s.
-    next_airspeed: airspeed to restore after the item, m/s.
+    next_airspeed: airspeed to restore after the last item, m/s.
+    last_index: index of the last item; None for the item itself.
 
-    A speed change directly before the item is edited, or else one is inserted. A second speed change after the item
-    restores ``next_airspeed``. It is omitted after the last item with a position, and before another speed change.
+    A speed change directly before the item is edited, or else one is inserted. A second speed change after the last
+    item restores ``next_airspeed``. It is omitted after the last item with a position, and before another speed change.
     """
     movable_item(mission, index)
+    item_index = index if last_index is None else last_index
     has_speed_change = index > 0 and mission.items[index - 1].command == Command.DO_CHANGE_SPEED
     if has_speed_change:
         change = mission.items[index - 1]
         new_change = replace(change, params=(change.params[0], _round_to_milli(airspeed), *change.params[2:]))
-        mission, item_index = _with_replaced_item(mission, index - 1, new_change), index
+        mission = _with_replaced_item(mission, index - 1, new_change)
     else:
         mission = _with_inserted_item(mission, index, _speed_item(mission.items[index].seq, airspeed))
-        item_index = index + 1
+        item_index += 1
     later_items = mission.items[item_index + 1 :]
     if not any(is_movable(item) for item in later_items) or later_items[0].command == Command.DO_CHANGE_SPEED:
         return mission

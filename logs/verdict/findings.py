@@ -124,6 +124,11 @@ class Finding:
         return self.limit - tolerance if self.at_least else self.limit + tolerance
 
     @property
+    def shown_limit(self) -> float | None:
+        """Limit to show beside the value: extended by its tolerance, unless `tolerance_note` states the tolerance."""
+        return self.limit if self.tolerance_note else self.effective_limit
+
+    @property
     def limit_sign(self) -> str:
         """Comparison sign between a passing value and the limit."""
         return "≥" if self.at_least else "≤"
@@ -149,16 +154,23 @@ class Finding:
 
     @property
     def limit_text(self) -> str:
-        """Text of the values that pass; "" without a limit.
+        """Text of the values that pass, always with the tolerance; "" without a limit.
 
         >>> make_finding("stall", Place("flight"), ok=True, reason="", limit=9.5, unit="m/s", at_least=True).limit_text
         '≥ 9.5 m/s'
         """
-        return self.compared_texts()[1]
+        return self._texts_with(self.effective_limit)[1]
 
     def compared_texts(self) -> tuple[str, str]:
-        """Return the value and the range of passing values as texts, with enough digits to tell the two apart."""
-        value, limit = self.value, self.effective_limit
+        """Return the value and the range of passing values as texts, with enough digits to tell the two apart.
+
+        The range includes the tolerance, unless `tolerance_note` states it.
+        """
+        return self._texts_with(self.shown_limit)
+
+    def _texts_with(self, limit: float | None) -> tuple[str, str]:
+        """Return the value and the values within a limit as texts, with enough digits to tell the two apart."""
+        value = self.value
         if value is None or limit is None:
             texts = ["" if number is None else quantity_text(number, self.unit) for number in (value, limit)]
         else:

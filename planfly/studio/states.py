@@ -157,6 +157,6 @@ def _value_text(finding: Finding) -> str:
     """
     value, limit_text = finding.compared_texts()
     is_only_tolerated = _closeness(finding) < 1.0 <= _closeness(finding, finding.tolerance or 0.0)
-    if finding.limit is not None and is_only_tolerated:
+    if finding.limit is not None and (is_only_tolerated or finding.tolerance_note):
         limit_text = limit_with_tolerance_text(finding)
     return f"{finding_words(finding).word} {value}" + (f" ({limit_text})" if limit_text else "")

@@ -2,14 +2,13 @@
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import suppress
 from copy import copy
 from dataclasses import dataclass, replace
 from typing import Literal, TypeGuard
 
 from flight.autopilots.autopilot import Autopilot
 from flight.autopilots.parts import Candidate
-from flight.mission.edits import movable_indices, raise_items
+from flight.mission.edits import movable_indices, raise_items, set_airspeed
 from flight.mission.items import Command, Mission, MissionItem
 from flight.mission.placing import place_stops
 from flight.mission.survey_layout import SurveyLayout, fixed_layout_reason, min_turn_around, with_layout
@@ -25,9 +24,8 @@ from logs.verdict.verdict import Verdict
 from planfly.workflow.open_flight import make_setup
 from planfly.workflow.reference_flights import find_passing_parameter
 from planfly.workflow.trial_flight import Trial
-from planfly.workflow.uav import Uav, load_uav
+from planfly.workflow.uav import Uav
 from world.errors import PlanflyError
-from world.scenario import with_flight
 
 RemedyKind = Literal["trigger", "height", "side", "turn-around", "gates", "every", "course", "parameter", "airspeed"]
 
@@ -219,7 +217,7 @@ class _Trials:
     ) -> None:
         self._setup, self._uav, self._on_trial = setup, uav, on_trial
         self._original_worst_margins, self._verdict, self._change_prefix = _worst_margins(verdict), verdict, ""
-        self._has_gates = False
+        self._has_gates, self._airspeed = False, 0.0
         lost_legs = {
             finding.place.index for finding in verdict.findings if finding.rule == "survey" and finding.ok is not True
         }
@@ -281,6 +279,8 @@ class _Trials:
                 return None
         if self._has_gates:
             mission = _with_gates(setup, judged_surveys(setup))
+        if self._airspeed > 0.0:
+            mission = _with_airspeed(setup, judged_surveys(setup), self._airspeed, self._uav.airspeed)
         return self._fly_trial(mission, self._uav, description)
 
     def _is_remedy(self, flight: _TrialFlight | None) -> TypeGuard[_TrialFlight]:
@@ -472,10 +472,11 @@ class _Trials:
     def find_airspeed(self) -> SurveyRemedy | None:
         """Find the highest of the reduced airspeeds that passes, or None.
 
-        Nothing is tried if the mission sets an airspeed.
+        Nothing is tried if the mission sets an airspeed.  The airspeed is set by items of the mission.
         """
-        for speed, uav in self._slower_airspeeds():
-            flight = self._fly_trial(self._setup.mission, uav, f"{speed:g} m/s")
+        for speed in self._slower_airspeeds():
+            mission = _with_airspeed(self._setup, self._surveys, speed, self._uav.airspeed)
+            flight = self._fly_trial(mission, self._uav, f"{speed:g} m/s")
             if self._is_remedy(flight):
                 return SurveyRemedy("airspeed", "", self._uav.airspeed, speed, "m/s", *flight)
         return None
@@ -491,6 +492,7 @@ class _Trials:
         mission: Mission | None = None,
         *,
         has_gates: bool = False,
+        airspeed: float = 0.0,
     ) -> SurveyRemedy | None:
         """Find the shortest turn-around distance that passes in combination with another change.
 
@@ -498,9 +500,11 @@ class _Trials:
         uav, mission: changed uav, and changed mission or None.
         turn_arounds: distances to try, in increasing order, m.
         has_gates: True for gates at the ends of the lines.
+        airspeed: airspeed on the surveys, m/s; 0 if it is not changed.
         """
         trials = copy(self)
         trials._uav, trials._change_prefix, trials._has_gates = uav, f"{change}, ", has_gates
+        trials._airspeed = airspeed
         if mission is not None:
             trials._setup = replace(self._setup, mission=mission)
         remedy = trials._find_shortest_turn_around(1, turn_arounds, 0.0)
@@ -567,8 +571,10 @@ class _Trials:
 
         Return None if none of them passes.
         """
-        for speed, uav in [*self._slower_airspeeds()][-1:]:
-            remedy = self._find_turn_around_with(f"{speed:g} m/s", uav, self._longer_turn_arounds())
+        for speed in [*self._slower_airspeeds()][-1:]:
+            remedy = self._find_turn_around_with(
+                f"{speed:g} m/s", self._uav, self._longer_turn_arounds(), airspeed=speed
+            )
             if remedy is not None:
                 return replace(remedy, kind="airspeed", current=self._uav.airspeed, value=speed, unit="m/s")
         return None
@@ -601,8 +607,8 @@ class _Trials:
             unit="m/s",
         )
 
-    def _slower_airspeeds(self) -> Iterator[tuple[float, Uav]]:
-        """Yield each reduced airspeed (m/s) with its UAV, the fastest first, down to the lowest allowed.
+    def _slower_airspeeds(self) -> Iterator[float]:
+        """Yield each reduced airspeed (m/s), the fastest first, down to the lowest allowed.
 
         Yields nothing if the mission itself sets an airspeed.
         """
@@ -619,8 +625,7 @@ class _Trials:
             speeds.add(math.floor(max_speed * steps + 1e-6) / steps)
         for speed in sorted(speeds, reverse=True):
             if lowest <= speed <= max(lowest, max_speed) and speed < self._uav.airspeed:
-                with suppress(PlanflyError):
-                    yield speed, load_uav(with_flight(self._setup.scenario, airspeed_mps=speed))
+                yield speed
 
     def _max_airspeed_for_photos(self) -> float:
         """Return the highest airspeed at which a slow camera takes photos with the required front overlap, m/s.
@@ -676,6 +681,22 @@ def _with_gates(setup: FlightSetup, surveys: Sequence[Survey]) -> Mission:
         for item in mission.items
     )
     return replace(mission, items=items)
+
+
+def _with_airspeed(setup: FlightSetup, surveys: Sequence[Survey], airspeed: float, next_airspeed: float) -> Mission:
+    """Return a setup's mission with another airspeed, m/s, from the start to the end of each survey.
+
+    next_airspeed: airspeed after each survey, m/s.
+    """
+    mission, items = setup.mission, setup.route.items
+    # Start with the last survey, because inserted items renumber later ones.
+    for survey in reversed(surveys):
+        first, last = (
+            next(index for index, item in enumerate(mission.items) if item.seq == items[waypoint])
+            for waypoint in (survey.lines[0].begins, survey.lines[-1].ends)
+        )
+        mission = set_airspeed(mission, first, airspeed, next_airspeed, last)
+    return mission
 
 
 def ordinal_text(number: int) -> str:

@@ -215,9 +215,7 @@ def remedy_text(remedy: SurveyRemedy, length: float) -> str:
         case "parameter":
             change = f"{remedy.name} {remedy.value:g} instead of {remedy.current:g} (--params)"
         case "airspeed":
-            # A mission that is too slow is made faster by its items, not by an option.
-            option_text = f" (--airspeed {remedy.value:g})" if remedy.value < remedy.current else ""
-            change = f"{remedy.value:g} m/s instead of {remedy.current:g} m/s{option_text}"
+            change = f"{remedy.value:g} m/s instead of {remedy.current:g} m/s (DO_CHANGE_SPEED)"
     if remedy.kind in ("gates", "parameter", "airspeed") and not math.isnan(remedy.turn_around):
         change += f", with turn-arounds of {remedy.turn_around:.0f} m"
     new_length, old_length = (f"{value / 1000.0:.1f} km" for value in (remedy.length, length))

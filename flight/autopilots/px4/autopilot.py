@@ -7,6 +7,8 @@ from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, NamedTuple, Self, get_args
 
+import numpy as np
+
 from aircraft.catalog import Aircraft
 from aircraft.tracking import TrackingError
 from flight.autopilots.autopilot import Autopilot, Origin, StoredAutopilot, StoredParameters
@@ -388,6 +390,7 @@ class Px4(Autopilot):
         return TurnRules(
             acceptance_radius=self._turn_distance(math.pi, 0.0),
             distance=self._turn_distance,
+            radii_at=self._acceptance_radii if self.parameters.uses_switch_distance else None,
             reads_acceptance=False,
             max_bank=self.parameters["FW_R_LIM"],
             bank_parameter="FW_R_LIM",
@@ -401,15 +404,24 @@ class Px4(Autopilot):
         parameters = self.parameters
         if not parameters.uses_switch_distance:
             return parameters["NAV_ACC_RAD"]
+        speed = parameters["FW_AIRSPD_TRIM"] * float(eas_to_tas_ratio(amsl))
+        return float(self._acceptance_radii(np.array([speed]))[0])
+
+    def _acceptance_radii(self, ground_speeds: Floats) -> Floats:
+        """Return the acceptance radii at ground speeds (n,), m/s, up to PX4 1.16, as (n,) m.
+
+        The radius is the switch distance of the guidance, but at least NAV_ACC_RAD.
+        """
+        parameters = self.parameters
         period = parameters["NPFG_PERIOD"]
         if parameters["NPFG_LB_PERIOD"] > 0.0:
             min_period = (
                 math.pi * parameters["NPFG_ROLL_TC"] / parameters["NPFG_DAMPING"] * parameters["NPFG_PERIOD_SF"]
             )
             period = max(period, min_period)
-        speed = parameters["FW_AIRSPD_TRIM"] * float(eas_to_tas_ratio(amsl))
-        switch_distance = parameters["NPFG_SW_DST_MLT"] * period * parameters["NPFG_DAMPING"] * speed
-        return max(parameters["NAV_ACC_RAD"], round(min(MAX_SWITCH_DISTANCE_M, switch_distance), 6))
+        switch_distances = parameters["NPFG_SW_DST_MLT"] * period * parameters["NPFG_DAMPING"] * ground_speeds
+        limited_distances = np.minimum(MAX_SWITCH_DISTANCE_M, switch_distances).round(6)
+        return np.maximum(parameters["NAV_ACC_RAD"], limited_distances)
 
     @property
     def speeds(self) -> SpeedRules:
@@ -530,7 +542,9 @@ class Px4(Autopilot):
         return (
             f"RTL_TYPE {return_type:g}: a return goes to {_DESTINATION_TEXTS[int(return_type)]}. An aircraft below"
             f" RTL_RETURN_ALT ({first_height} above the destination) first climbs to this height in a loiter. Then it"
-            f" flies level. Over home or a rally point it descends in a loiter to RTL_DESCEND_ALT ({last_height})"
+            " flies level: to the loiter of a landing sequence up to NAV_FW_ALT_RAD"
+            f" ({parameters['NAV_FW_ALT_RAD']:g} m) lower, because the climb ends there. Over home or a rally point it"
+            f" descends in a loiter to RTL_DESCEND_ALT ({last_height})"
         )
 
     @property

@@ -132,7 +132,7 @@ def _line_rows(
         "banked": np.abs(aligned.track.attitude[window, ROLL]) <= MAX_PHOTO_BANK_RAD,
         # An unknown height error (NaN) does not count as too large; the condition "unknown" handles it.
         "off_height": ~(np.abs(height_error) > height_tolerance),
-        "camera_off": _camera_on_rows(requirements, line, axis, position, is_ahead),
+        "camera_off": _camera_on_rows(requirements, aligned, line, axis, window, is_ahead),
         "unknown": np.isfinite(height_error),
     }
     return _LineRows(axis, window, position, along, across, is_ahead, height_error, height_tolerance, conditions)
@@ -225,25 +225,31 @@ def heights_over_ground(requirements: RouteRequirements, positions: Floats) -> F
 
 
 def _camera_on_rows(
-    requirements: RouteRequirements, line: PhotoLine, axis: LineAxis, position: Floats, is_ahead: Flags
+    requirements: RouteRequirements,
+    aligned: AlignedTrack,
+    line: PhotoLine,
+    axis: LineAxis,
+    track_rows: slice,
+    is_ahead: Flags,
 ) -> Flags:
-    """Return a mask (n,): True for each row at which the camera is on.
+    """Return a mask (n,): True for each row of a range of the track at which the camera is on.
 
     axis: axis of the line, onto which positions are projected.
-    position: positions of the track, m, (n, 3).
+    track_rows: the range of n rows.
     is_ahead: True for each row that flies along the line.
 
     The camera is on between two rows: the row that reaches the waypoint where the mission switches it on, and the row
     that reaches the waypoint where it is switched off.  Both waypoints may lie beyond the line's ends, and either may
     be missing.
     """
+    position = aligned.track.position[track_rows]
     rows, distance_along = np.arange(len(position)), axis.project(position)[0]
 
     def first_row_at(waypoint: int, first_row: int = 0) -> int:
         """Return the first row, from `first_row` on, that reaches or passes a waypoint."""
         point = requirements.points[waypoint]
         distances = np.hypot(*(position[:, :2] - point[:2]).T)
-        is_at_waypoint = (distances <= _switch_radius(requirements, waypoint)) | (
+        is_at_waypoint = (distances <= _switch_radii(requirements, aligned, waypoint, track_rows)) | (
             distance_along >= axis.project(point[None])[0][0]
         )
         indices = np.flatnonzero(is_at_waypoint & is_ahead & (rows >= first_row))
@@ -254,13 +260,20 @@ def _camera_on_rows(
     return (rows >= on_row) & (rows <= off_row)
 
 
-def _switch_radius(requirements: RouteRequirements, waypoint: int) -> float:
+def _switch_radii(
+    requirements: RouteRequirements, aligned: AlignedTrack, waypoint: int, track_rows: slice
+) -> Floats | float:
     """Return the distance before a waypoint at which the items after it switch the camera, m.
 
-    The distance is 0 at a gate, which is passed at its plane, and for an autopilot that follows a path.
+    The distance is 0 at a gate, which is passed at its plane, and for an autopilot that follows a path.  If it depends
+    on the ground speed, it is returned for each of a range of n rows, (n,).
     """
-    is_exact = requirements.setup.autopilot.turns.follows_path or _is_gate(requirements, waypoint)
-    return 0.0 if is_exact else acceptance_condition(requirements, waypoint).radius
+    turns = requirements.setup.autopilot.turns
+    if turns.follows_path or _is_gate(requirements, waypoint):
+        return 0.0
+    if turns.radii_at is not None:
+        return turns.radii_at(np.hypot(*aligned.track.velocity[track_rows, :2].T))
+    return acceptance_condition(requirements, waypoint).radius
 
 
 def _is_gate(requirements: RouteRequirements, waypoint: int) -> bool:
@@ -330,7 +343,8 @@ def _switch_row(requirements: RouteRequirements, aligned: AlignedTrack, waypoint
         course = requirements.points[waypoint + 1, :2] - requirements.points[waypoint, :2]
         rows_before = np.flatnonzero(offsets @ course < 0.0)
         return min(last - 1, first + int(rows_before[-1]) + 1) if rows_before.size else last - 1
-    indices = np.flatnonzero(np.hypot(*offsets.T) <= _switch_radius(requirements, waypoint))
+    switch_radii = _switch_radii(requirements, aligned, waypoint, slice(first, last))
+    indices = np.flatnonzero(np.hypot(*offsets.T) <= switch_radii)
     return first + int(indices[0]) if indices.size else last - 1
 
 

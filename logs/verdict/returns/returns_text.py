@@ -17,7 +17,8 @@ from logs.verdict.returns.judge_returns import (
     SimulatedReturn,
 )
 from logs.verdict.returns.suggest_returns import Remedy
-from logs.verdict.wording import energy_left_text, quantity_text
+from logs.verdict.tolerances import CLEARANCE_TOLERANCE_M
+from logs.verdict.wording import compared_texts, energy_left_text, quantity_text
 from world.frames import to_geo
 from world.scenario import Scenario
 from world.wording import count_text
@@ -125,7 +126,7 @@ def measured_text(ret: SimulatedReturn, limit: float, scenario: Scenario) -> str
     if ret.kind == "ground":
         parts[-1] += f" at {position_text}"
     elif math.isfinite(ret.clearance):
-        parts.append(f"{ret.clearance:.0f} m above ground at the lowest point, at {position_text}")
+        parts.append(f"{_height_text(ret, limit)} at the lowest point, at {position_text}")
     if ret.threat >= 0 and ret.sphere_distance <= 0.0:
         parts.append(f"{-ret.sphere_distance:.0f} m inside the sphere of {scenario.threats.names[ret.threat]}")
     elif math.isfinite(ret.sphere_distance):
@@ -318,6 +319,20 @@ def _judgement_text(ret: SimulatedReturn) -> str:
     return "safe" if ret.safe else "unsafe" if ret.kind in UNSAFE else "too low"
 
 
+def _height_text(ret: SimulatedReturn, limit: float) -> str:
+    """Return the lowest height of a return above ground, near the required height with the digits that decide.
+
+    Near the limit, the text also states the limit and its tolerance.
+    """
+    if not abs(ret.clearance - ret.required_height) < 1.0:
+        return f"{ret.clearance:.0f} m above ground"
+    text, _ = compared_texts(ret.clearance, ret.required_height - CLEARANCE_TOLERANCE_M, "m")
+    if ret.required_height < limit:
+        return f"{text} above ground"
+    tolerance_text = quantity_text(CLEARANCE_TOLERANCE_M, "m")
+    return f"{text} above ground (required: {quantity_text(limit, 'm')}, with a tolerance of {tolerance_text})"
+
+
 def _energy_outcome_text(ret: SimulatedReturn, returns: Returns) -> str:
     """Describe the energy that a return leaves, compared with the required reserve."""
     if ret.kind == "used":
@@ -334,8 +349,7 @@ def _range_outcome_text(worst_return: SimulatedReturn, returns: Returns, scenari
     """Describe the outcome of the worst return of a time range, with its position, height or energy."""
     east, north, up = worst_return.lowest_position
     position_text = f"{east:.0f} m east, {north:.0f} m north"
-    digits = 1 if abs(worst_return.clearance - returns.limit) < 1.0 else 0
-    height_text = f"{worst_return.clearance:.{digits}f} m above ground at {position_text}"
+    height_text = f"{_height_text(worst_return, returns.limit)} at {position_text}"
     match worst_return.kind:
         case "ground":
             return f"hits the ground at {position_text}, {up:.0f} m AMSL"

@@ -281,6 +281,8 @@ def _turn_lead(requirements: RouteRequirements, line: PhotoLine) -> float:
     setup, last = requirements.setup, line.ends
     if setup.autopilot.turns.follows_path or not 0 < last < requirements.legs:
         return float(requirements.length_before[last])
+    if setup.autopilot.turns.radii_at is not None:
+        return float(setup.autopilot.turns.radii_at(requirements.ground_speed[last - 1 : last])[0])
     turn = abs(float(requirements.turns[last]))
     mission_radius = (
         float(setup.route.points["acceptance_radius"][last]) if setup.autopilot.turns.reads_acceptance else 0.0

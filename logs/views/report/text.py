@@ -116,12 +116,14 @@ def _make_finding_row(finding: Finding) -> FindingRow:
     planned_value, flown_value, margin = (
         in_unit(value, finding.unit)[0] for value in (finding.planned, finding.flown, finding.margin)
     )
-    margin_with_tolerance = None if margin is None else margin + (in_unit(finding.tolerance, finding.unit)[0] or 0.0)
+    # The margin is the distance from the shown limit.
+    tolerance_in_limit = 0.0 if finding.tolerance_note else in_unit(finding.tolerance, finding.unit)[0] or 0.0
+    shown_margin = None if margin is None else margin + tolerance_in_limit
     method, digits = finding.method, _count_needed_decimals(finding)
     if finding.tolerance and method and finding.limit is not None:
         limit_text, tolerance = (quantity(value, finding.unit) for value in (finding.limit, finding.tolerance))
         method = f"{method}; limit {limit_text} with a tolerance of {tolerance}"
-    limit = number(in_unit(finding.effective_limit, finding.unit)[0], digits=digits)
+    limit = number(in_unit(finding.shown_limit, finding.unit)[0], digits=digits)
     return FindingRow(
         finding=finding,
         state=finding.state,
@@ -130,7 +132,7 @@ def _make_finding_row(finding: Finding) -> FindingRow:
         planned=number(planned_value, digits=digits),
         flown=number(flown_value, digits=digits),
         limit=limit if limit == NOTHING else f"{finding.limit_sign}\u00a0{limit}",
-        margin=number(margin_with_tolerance, signed=True),
+        margin=number(shown_margin, signed=True),
         unit=in_unit(value=None, unit=finding.unit)[1],
         method=method,
     )
@@ -142,9 +144,7 @@ _MAX_DECIMALS = 6
 
 def _count_needed_decimals(finding: Finding) -> int | None:
     """Return the decimals needed to distinguish a value from its limit; None if the usual number suffices."""
-    value, limit = (
-        in_unit(quantity_value, finding.unit)[0] for quantity_value in (finding.value, finding.effective_limit)
-    )
+    value, limit = (in_unit(quantity_value, finding.unit)[0] for quantity_value in (finding.value, finding.shown_limit))
     if value is None or limit is None or value == limit or number(value) != number(limit):
         return None
     sufficient_decimals = (

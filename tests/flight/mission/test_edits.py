@@ -97,6 +97,12 @@ def test_the_last_leg_needs_no_speed_after_it() -> None:
     assert [one.command for one in after.items] == [16, Command.DO_CHANGE_SPEED, 16]
 
 
+def test_an_airspeed_for_several_legs_is_restored_after_the_last() -> None:
+    after = edits.set_airspeed(mission(*(item(k) for k in range(1, 6))), 1, 20.0, 25.0, 3)
+    assert [(one.command, one.params[1]) for one in after.items if one.command == 178] == [(178, 20.0), (178, 25.0)]
+    assert [one.command for one in after.items] == [16, 178, 16, 16, 16, 178, 16]
+
+
 def test_a_mission_has_its_most_items() -> None:
     full = mission(*(item(k) for k in range(1, edits.MAX_EDITED_ITEMS + 1)))
     with pytest.raises(MissionError, match="the most that can be edited"):

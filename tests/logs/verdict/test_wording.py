@@ -16,6 +16,7 @@ from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.verdict import Verdict
 from logs.verdict.wording import change_text, place_text, shorten_statement, suggestion_text, suggestions_text
 from logs.views.report.text import finding_rows
+from planfly.studio.states import finding_state
 from planfly.terminal.verdict_lines import verdict_lines
 from tests.logs.verdict.judging import leg, missile, of, suggested, waypoint
 from tests.synthetic import envelope, make_setup
@@ -53,15 +54,43 @@ DESCENT = make_finding(
 
 @pytest.mark.parametrize(
     ("finding", "texts"),
-    [(PASSED, ("4.42 m", "≤ 8.29 m")), (STALL, ("14.2 m/s", "≥ 9.5 m/s")), (DESCENT, ("-7.04°", "≥ -7.02°"))],
+    [(PASSED, ("4.42 m", "≤ 2.99 m")), (STALL, ("14.2 m/s", "≥ 9.5 m/s")), (DESCENT, ("-7.04°", "≥ -7.02°"))],
 )
 def test_a_limit_is_stated_with_its_side_and_its_tolerance(finding: Finding, texts: tuple[str, str]) -> None:
     assert finding.compared_texts() == texts
     verdict = Verdict((finding,), flyable=False, complete=True, lines=("",), level="flown")
     shown = texts[1].replace("-", "\N{MINUS SIGN}").replace(" ", "\u00a0", 1)
-    assert finding_document(finding).passes == texts[1]
+    assert finding_document(finding).passes == ("≤ 8.29 m" if finding is PASSED else texts[1])
     assert finding_rows([finding])[0].limit.split()[0] == shown.split("\u00a0")[0]
     assert f"{texts[0]} (limit {texts[1]}" in "\n".join(verdict_lines(verdict, ()))
+
+
+def test_limit_of_a_value_within_its_tolerance_is_shown_without_it() -> None:
+    """A descent of 5.38° at a limit of 5.09° and a tolerance of 0.5°: everywhere the limit is 5.09°."""
+    place = Place("leg", 1)
+    finding = make_finding(
+        "slope",
+        place,
+        ok=True,
+        reason="",
+        planned=-5.38,
+        limit=-5.09,
+        tolerance=0.5,
+        margin=-0.29,
+        unit="deg",
+        at_least=True,
+    )
+    note = "within the tolerance of 0.5°"
+    verdict = Verdict((finding,), flyable=True, complete=True, lines=("",), level="flown")
+    assert f"-5.38° (limit ≥ -5.09°; {note})" in "\n".join(verdict_lines(verdict, ()))
+    # The values that pass include the tolerance.
+    document = finding_document(finding)
+    assert (document.limit, document.passes) == (-5.09, "≥ -5.59°")
+    (row,) = finding_rows([finding])
+    assert (row.limit, row.margin) == ("≥\u00a0\N{MINUS SIGN}5.09", "\N{MINUS SIGN}0.29")
+    state = finding_state(finding)
+    assert state is not None
+    assert state.text == "slope -5.38° (≥ -5.09°, less a tolerance of 0.5°)"
 
 
 @pytest.mark.parametrize("beyond", [0.04, 0.004, 0.0004, 0.00004])

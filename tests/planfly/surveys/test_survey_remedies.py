@@ -163,7 +163,30 @@ def test_a_slower_flight_with_longer_turn_arounds(monkeypatch: pytest.MonkeyPatc
     """The x8 cruises at 18 m/s; the lowest that is tried is a tenth above its slowest of 12 m/s, 13.2 m/s."""
     [both] = judged_by(monkeypatch, lambda setup, m: m >= 130.0 and setup.route.leg_airspeeds[0] < 17.0).remedies
     assert (both.kind, both.current, both.value, both.turn_around) == ("airspeed", 18.0, 13.2, 150.0)
-    assert "13.2 m/s instead of 18 m/s (--airspeed 13.2), with turn-arounds of 150 m" in remedy_text(both, 3000.0)
+    assert "13.2 m/s instead of 18 m/s (DO_CHANGE_SPEED), with turn-arounds of 150 m" in remedy_text(both, 3000.0)
+
+
+@pytest.mark.parametrize("needed_turn_around", [0.0, 130.0])
+def test_a_suggested_airspeed_is_written_into_the_mission(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, needed_turn_around: float
+) -> None:
+    """The written file, opened with the same options, is flown at the airspeeds of the trial that passed."""
+    trials: list[FlightSetup] = []
+
+    def passes(setup: FlightSetup, metres: float) -> bool:
+        trials.append(setup)
+        survey = judged_surveys(setup)[0]
+        return metres >= needed_turn_around and max(setup.route.leg_airspeeds[survey.first : survey.last]) < 17.0
+
+    remedy = judged_by(monkeypatch, passes).remedies[-1]
+    assert remedy.kind == "airspeed"
+    for kind in ("waypoints", "plan"):
+        file = tmp_path / f"airspeed.{kind}"
+        file.write_text(mission_text(remedy.mission, "plan" if kind == "plan" else "waypoints"), encoding="utf-8")
+        again = opened(file)
+        trial = next(each for each in trials if each.mission == remedy.mission)
+        assert again.route.leg_airspeeds.tolist() == trial.route.leg_airspeeds.tolist()
+        assert passes(again, min_turn_around(again.route, judged_surveys(again)[0]))
 
 
 @pytest.mark.parametrize(
@@ -225,7 +248,7 @@ def test_a_mission_slower_than_the_aircraft_flies_is_made_faster(
     [faster] = found.remedies
     assert (faster.kind, faster.current, faster.value, faster.turn_around) == ("airspeed", 2.0, 18.0, 150.0)
     assert speeds(faster.mission) == [18.0, 16.0]
-    assert "18 m/s instead of 2 m/s, with turn-arounds of 150 m" in remedy_text(faster, 3000.0)
+    assert "18 m/s instead of 2 m/s (DO_CHANGE_SPEED), with turn-arounds of 150 m" in remedy_text(faster, 3000.0)
 
 
 def test_nearest_trial_is_the_one_that_makes_more_of_each_line_usable(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -65,7 +65,7 @@ def test_a_value_beyond_its_limit_that_passes_is_within_its_tolerance(capsys: py
     """4.06° flown where 4° are the limit, with a tolerance of 0.1°: it passes, and says by what."""
     beyond = replace(slope(1, 4.06, 4.0), ok=True)
     lines = printed(capsys, Verdict((beyond,), flyable=True, complete=True, lines=("flyable",), level="flown"))
-    assert "4.06° (limit ≤ 4.1°, aircraft; within the tolerance of 0.1°)" in lines[-1]
+    assert "4.06° (limit ≤ 4°, aircraft; within the tolerance of 0.1°)" in lines[-1]
     inside = Verdict((slope(1, 3.9, 4.0),), flyable=True, complete=True, lines=("flyable",), level="flown")
     assert "tolerance" not in printed(capsys, inside)[-1]
 

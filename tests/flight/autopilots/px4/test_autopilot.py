@@ -92,6 +92,16 @@ def test_it_turns_earlier_in_thin_air_up_to_1_16(aerosonde: Aircraft) -> None:
     assert newer.turns.distance(1.0, 2000.0) == 10.0
 
 
+def test_its_acceptance_radius_grows_with_the_ground_speed_up_to_1_16() -> None:
+    """2.24 s (0.32 of a period of 10 s damped by 0.7): at 27.3 and 7.4 m/s, and never below NAV_ACC_RAD."""
+    older, newer = (
+        Px4(Px4Parameters.defaults(version)).with_parameters(NAV_ACC_RAD=15.0) for version in ("1.16", "1.17")
+    )
+    assert older.turns.radii_at is not None
+    assert older.turns.radii_at(np.array([27.3, 7.4, 2.0])).tolist() == pytest.approx([61.152, 16.576, 15.0])
+    assert newer.turns.radii_at is None
+
+
 def test_speeds_beyond_its_limits_are_flown_at_them() -> None:
     made = Px4(
         Px4Parameters.from_text("FW_AIRSPD_MIN 18\nFW_AIRSPD_MAX 31\nFW_AIRSPD_TRIM 25\nFW_R_LIM 40\n", "a.params")

@@ -456,3 +456,16 @@ def test_a_log_without_legs_has_a_take_off_if_it_begins_near_the_ground(
     position = np.stack([np.zeros(61), np.zeros(61), up], axis=1)
     found = time[_ground_phase_starts(setup, time, position, None, time)].tolist()
     assert found == [*(range(10) if has_take_off else ()), *range(45, 61)]
+
+
+def test_returns_on_either_side_of_the_limit_have_different_heights(tmp_path: Path) -> None:
+    """30 m are required, with a tolerance of 0.1 m: 29.93 m are enough and 29.87 m are not, and both are 29.9 m."""
+    setup = hill_setup(tmp_path)
+    found = judged(setup)
+    texts = []
+    for clearance, kind in ((29.93, "safe"), (29.87, "low")):
+        worst = replace(found.ranges[0].worst, clearance=clearance, required_height=30.0, kind=kind)
+        texts.append(range_text(replace(found.ranges[0], worst=worst), found, setup.scenario))
+        assert f"{clearance} m above ground (required: 30 m, with a tolerance of 0.1 m)" in texts[-1]
+    assert "safe; " in texts[0]
+    assert "too low; " in texts[1]

@@ -183,6 +183,23 @@ def test_the_default_returns_to_the_landing_of_the_mission(tmp_path: Path) -> No
     assert {one.target.name for one in at_home.each} == {"home"}
 
 
+def test_a_return_to_a_landing_stays_below_rtl_return_alt_by_nav_fw_alt_rad(tmp_path: Path) -> None:
+    """Where the climb ends it flies level to the loiter of a landing, and climbs on to RTL_RETURN_ALT to home."""
+    for return_type, lower_m in ((1, 30.0), (0, 0.0)):
+        near, far = (
+            judged(
+                tmp_path,
+                f"RTL_RETURN_ALT 480\nRTL_DESCEND_ALT 300\nRTL_TYPE {return_type}\nNAV_FW_ALT_RAD {radius}",
+                LANDING.replace("\t60\t", "\t300\t"),
+            )
+            for radius in (10, 40)
+        )
+        # Behind the hill, which is 400 m high; the circles are left at other places, which moves the paths over it.
+        heights = [min(one.clearance for one in found.each if one.start[0] > 4500.0) for found in (near, far)]
+        assert heights[0] - heights[1] == pytest.approx(lower_m, abs=8.0)
+    assert "to the loiter of a landing sequence up to NAV_FW_ALT_RAD (40 m) lower" in describe_landing(far)[-1]
+
+
 @pytest.mark.parametrize(
     ("stated", "mission", "said", "is_simulated"),
     [

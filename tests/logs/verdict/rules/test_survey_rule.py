@@ -191,6 +191,31 @@ def test_photos_that_a_waypoint_counted_early_costs() -> None:
     assert "its first 0 m and last 91 m are lost" in first.reason
 
 
+@pytest.mark.parametrize(("version", "speed", "lost"), [("1.16", 27.3, 61), ("1.16", 7.4, 17), ("1.17", 27.3, 15)])
+def test_px4_switches_the_camera_at_its_ground_speed(version: str, speed: float, lost: float) -> None:
+    """2.24 s before the line's end up to 1.16: 61.2 m at 27.3 m/s and 16.6 m at 7.4 m/s; from 1.17 on NAV_ACC_RAD."""
+    setup = with_camera(1, 2)
+    law = Px4(Px4Parameters.defaults(version)).with_parameters(NAV_ACC_RAD=15.0)
+    setup = replace(setup, autopilot=law, nav="perfect")
+    track = fly_path(setup, radius=FITS)
+    velocity = track.velocity * (speed / np.hypot(*track.velocity[:, :2].T).max())
+    requirements = route_requirements(setup)
+    aligned = align_track(requirements, replace(track, velocity=velocity))
+    assert aligned is not None
+    measure = measure_line(requirements, aligned, requirements.surveys[0], requirements.surveys[0].lines[0])
+    assert measure is not None
+    assert measure.lost_at_end == pytest.approx(lost, abs=2.0)
+
+
+@pytest.mark.parametrize(("from_deg", "speed"), [(0.0, 15.0), (180.0, 35.0)])
+def test_px4_turns_by_the_ground_speed_of_the_planned_line(from_deg: float, speed: float) -> None:
+    """North at 25 m/s against and with 10 m/s of wind: the turn at the first line's end begins 2.24 s before it."""
+    setup = survey(lead=0.0, wind={"speed_mps": 10.0, "from_deg": from_deg})
+    law = Px4(Px4Parameters.defaults("1.16")).with_parameters(FW_AIRSPD_MAX=30.0)
+    first = photo_lines(judge_geometry(replace(setup, autopilot=law)))[0]
+    assert first.planned == pytest.approx(100.0 * (1.0 - 2.24 * speed / LENGTH), abs=0.2)
+
+
 @pytest.mark.parametrize(("lead", "lost"), [(LEAD, 0.0), (60.0, 30.0)])
 def test_camera_switched_off_behind_the_last_lead_costs_only_what_the_lead_is_too_short(
     lead: float, lost: float
