@@ -635,7 +635,7 @@ class ArduPlaneFromGround:
         glide = self.autopilot.ground.glide(
             approach.start_altitude - landing_altitude, approach.length, approach.tail_wind, landing_altitude
         )
-        ground.has_landing_sequence, ground.landing_leg = True, approach.leg
+        ground.has_landing, ground.landing_leg = True, approach.leg
         ground.east, ground.north, ground.up = approach.point
         ground.glide_start_altitude, ground.slope = approach.start_altitude, glide.slope
         # `AP_TECS::_update_height_demand`.
