@@ -358,11 +358,14 @@ class SizedAircraft:
     numbers: numbers of the model.
     sheet: the sheet with all missing values filled in.
     guessed: fields that were filled in.
+    partial_climb: stated climb at less than full throttle, rad; NaN if none was stated. The sheet's climb is that at
+        full throttle.
     """
 
     numbers: ModelNumbers
     sheet: DataSheet
     guessed: tuple[str, ...]
+    partial_climb: float = math.nan
 
 
 def size_aircraft(
@@ -409,7 +412,8 @@ def size_aircraft(
         # A fuel engine drives its own generator.
         factors=(*FACTORS, *(name for name in POWER_FACTORS if name != "avionics-power" or not sheet.burns_fuel)),
     )
-    return SizedAircraft(numbers, full_sheet, guessed_fields)
+    partial_climb = sheet.climb if sheet.climb and sheet.climb_throttle < 1.0 else math.nan
+    return SizedAircraft(numbers, full_sheet, guessed_fields, partial_climb)
 
 
 # Words for each layout.
@@ -576,8 +580,15 @@ def _size_any_motor(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> tu
     """Size the engine or the electric motor of an aircraft, and its propeller.
 
     Arguments and result are as for `_size_propulsion`. Raises _NoPropellerError if no propeller meets the sheet.
+
+    A climb at reduced throttle may imply a climb at full throttle beyond `MAX_CLIMB`; the climb at full throttle is
+    then this limit.
     """
     size_function = _size_engine if sheet.burns_fuel else _size_motor
+    propulsion, result = size_function(stated_sheet, sheet, drag)
+    if not stated_sheet.climb or result.climb <= MAX_CLIMB * (1.0 + _EDGE_ROUNDING):
+        return propulsion, result
+    stated_sheet, sheet = (replace(given, climb=MAX_CLIMB, climb_throttle=1.0) for given in (stated_sheet, sheet))
     return size_function(stated_sheet, sheet, drag)
 
 

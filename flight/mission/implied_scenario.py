@@ -14,6 +14,7 @@ from world.arrays import Floats
 from world.errors import MissionError, TerrainError
 from world.frames import GeoOrigin, to_geo, to_map
 from world.raster import cover_text, open_raster, read_terrain
+from world.raster_file import RasterFile
 from world.scenario import GROUND_BUFFER, Scenario, scenario_from_spec
 from world.scenario_tables import MAP_EXTENT, AreaTable, EndTable, FlightTable, OriginTable, ScenarioFile, TerrainTable
 from world.terrain import Terrain
@@ -149,18 +150,28 @@ def _load_terrain(
     file = Path(path)
     table = TerrainTable(kind="dem", path=str(file.resolve()) if file.is_file() else path, sha256=raster.sha256)
     lat, lon = to_geo(origin, *points.T)
-    (cols, rows), (row_count, col_count) = raster.to_pixels(lon, lat), raster.shape
-    # False for a position that the file's coordinate system cannot express (NaN or inf).
-    if ((cols >= 0.0) & (cols <= col_count - 1.0) & (rows >= 0.0) & (rows <= row_count - 1.0)).any():
+    if _covers_any(raster, lat, lon):
         terrain = read_terrain(raster, origin, area, GROUND_BUFFER)
         if np.isfinite(terrain.height(points[:, 0], points[:, 1])).any():
             return terrain, table
     positions_text = f"latitude {lat.min():.4f}..{lat.max():.4f}, longitude {lon.min():.4f}..{lon.max():.4f}"
+    swap_text = (
+        ". With latitude and longitude swapped, the mission would lie in this terrain"
+        if _covers_any(raster, lon, lat)
+        else ""
+    )
     raise TerrainError(
         f"{path}: no data at any position of the mission, which flies to {positions_text};"
-        f" the terrain covers {cover_text(raster)}",
+        f" the terrain covers {cover_text(raster)}{swap_text}",
         file=path,
     )
+
+
+def _covers_any(raster: RasterFile, lat: Floats, lon: Floats) -> bool:
+    """Return True if a raster covers any of some positions; lat, lon: degrees, (n,)."""
+    (cols, rows), (row_count, col_count) = raster.to_pixels(lon, lat), raster.shape
+    # False for a position that the file's coordinate system cannot express (NaN or inf).
+    return bool(((cols >= 0.0) & (cols <= col_count - 1.0) & (rows >= 0.0) & (rows <= row_count - 1.0)).any())
 
 
 def _end_table_above_ground(position: Position, terrain: Terrain | None) -> EndTable:

@@ -45,8 +45,9 @@ VERTICAL_LEG_LENGTH_M = 0.01
 MIN_ALTITUDE_M = -500.0
 # Maximum altitude of a flight, m AMSL.
 MAX_ALTITUDE_M = 9000.0
-# Maximum difference between home's altitude and the ground there without a note, m.
-_HOME_ALTITUDE_TOLERANCE_M = 30.0
+# Maximum difference between home's altitude and the ground there without a note, m: nine in ten heights of the usual
+# elevation files are within 9 m of the truth.
+HOME_ALTITUDE_TOLERANCE_M = 10.0
 
 
 class PlacedLanding(NamedTuple):
@@ -517,12 +518,13 @@ class _AltitudeConverter:
         """
         ground = self.ground_at_home()
         if not math.isnan(home.alt):
-            if abs(home.alt - ground) > _HOME_ALTITUDE_TOLERANCE_M:
+            if abs(home.alt - ground) > HOME_ALTITUDE_TOLERANCE_M:
                 hint = "" if home.alt else ". Ground stations write 0 if no home was set"
+                shift_text = f"{abs(home.alt - ground):.0f} m {'lower' if home.alt > ground else 'higher'}"
                 self.notes.add(
-                    f"home is at {home.alt:.1f} m AMSL, but the ground there is at {ground:.1f} m AMSL. "
-                    "Heights above home are measured from home's altitude. For a launch from that ground, set home to"
-                    f" {ground:.1f} m AMSL{hint}"
+                    f"home is at {home.alt:.1f} m AMSL, but the ground there is at {ground:.1f} m AMSL, {shift_text}."
+                    " Heights above home are measured from home's altitude: after arming on that ground they are"
+                    f" {shift_text} than here. For a launch from that ground, set home to {ground:.1f} m AMSL{hint}"
                 )
             return home.alt
         if math.isnan(ground):

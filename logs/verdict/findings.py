@@ -18,6 +18,8 @@ from world.json_schema import DocumentConfig
 
 # Fact of a slope finding: the largest error of the height above ground that its leg follows.
 GROUND_FOLLOWING_ERROR = "error of the height above ground"
+# Fact: altitude error where a failed leg is lowest above its required height, m, positive above the leg.
+LOWEST_POINT_ERROR = "height error at the lowest point"
 # Fact of a slope finding: time with the pitch at the autopilot's limit.
 PITCH_LIMIT_TIME = "pitch at its limit"
 # Fact of a slope finding: steepest slope that the aircraft can fly, if the leg or its arc exceeds it.

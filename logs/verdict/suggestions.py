@@ -6,6 +6,7 @@ smallest relative change first; the tuple is empty if no change helps.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,6 +15,7 @@ from aircraft.path_limits import aircraft_slopes, turn_radius_between
 from flight.mission.altitude_frames import find_misread_altitudes
 from flight.mission.items import OVER_HOME, PLACES, Frame
 from flight.mission.itinerary import stated_loiter
+from flight.mission.placing import HOME_ALTITUDE_TOLERANCE_M
 from flight.mission_files.wpl import HOME_LINE_MISSING_TEXT
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import UNKNOWN_AIRCRAFT, Finding
@@ -510,13 +512,36 @@ def home_height(setup: FlightSetup) -> float:
     return home.alt - float(terrain.height(float(east), float(north)))
 
 
+def home_height_text(setup: FlightSetup) -> str:
+    """Describe a mission's home that is clearly above or below the ground there; "" for any other home.
+
+    An imported log records the home of its flight, so its altitude is described only beyond `HOME_ERROR_M`.
+    """
+    height = home_height(setup)
+    tolerance = HOME_ALTITUDE_TOLERANCE_M if setup.imported_log is None else HOME_ERROR_M
+    # The height is NaN if it is unknown.
+    if not abs(height) > tolerance:
+        return ""
+    return f"home is {abs(height):.0f} m {'above' if height > 0.0 else 'below'} the ground there"
+
+
+def lowest_clearance(findings: Sequence[Finding]) -> float:
+    """Return the minimum height above ground in the clearance findings of a verdict, m; NaN without any."""
+    heights = [
+        finding.margin + (finding.limit or 0.0)
+        for finding in findings
+        if finding.rule == "clearance" and finding.margin is not None
+    ]
+    return min(heights, default=math.nan)
+
+
 def _suggest_home_on_ground(setup: FlightSetup) -> tuple[Suggestion, ...]:
-    """Suggest setting home on the ground if it is far above or below the ground; otherwise return ()."""
+    """Suggest setting home on the ground if it is clearly above or below the ground; otherwise return ()."""
     home, height = setup.mission.home, home_height(setup)
     # The height is NaN if it is unknown.  If the file has no home line, its first item was probably taken for home, and
     # another altitude of this item would not help.
     is_first_item = any(HOME_LINE_MISSING_TEXT in warning for warning in setup.mission.warnings)
-    if home is None or not abs(height) > HOME_ERROR_M or is_first_item:
+    if home is None or not abs(height) > HOME_ALTITUDE_TOLERANCE_M or is_first_item:
         return ()
     return ((Change("home altitude", MISSION, home.alt, round(home.alt - height, 1), "m"),),)
 
@@ -560,15 +585,23 @@ def _suggest_lower_reading(setup: FlightSetup) -> tuple[Suggestion, ...]:
     return (*home_on_ground, *_suggest_other_frame(setup, Frame.GLOBAL))
 
 
+def _is_above_home(setup: FlightSetup, leg: int | None) -> bool:
+    """Return True if an end of a leg is placed at a height above home, as an RTL is."""
+    if leg is None or leg in setup.route.rtl_legs:
+        return True
+    items_above_home = {item.seq for item in setup.mission.items if item.frame in OVER_HOME}
+    return not items_above_home.isdisjoint(setup.route.items[leg : leg + 2].tolist())
+
+
 def suggest_flying_higher(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
     """Suggest flying a leg higher above the ground.
 
-    Two suggestions come first if they apply.  A home far from the ground is set on the ground.  Altitudes of items
-    below the ground are read as heights above home if they then fit the terrain.  Over varied ground, following the
-    terrain is also suggested.  A leg of an RTL is raised by the parameter of
-    the RTL altitude.
+    Two suggestions come first if they apply.  A home below the ground is set on the ground, if the leg is flown at
+    heights above home.  Altitudes of items below the ground are read as heights above home if they then fit the
+    terrain.  Over varied ground, following the terrain is also suggested.  A leg of an RTL is raised by the parameter
+    of the RTL altitude.
     """
     if finding.place == FLIGHT:
         return _suggest_launch_from_ground(requirements)
@@ -579,7 +612,7 @@ def suggest_flying_higher(
         # A flight that ended early did not reach the lowest point.
         shortfall = max(shortfall, finding.limit - finding.planned + SUGGESTION_LENGTH_MARGIN_M)
     setup, depth = requirements.setup, -home_height(requirements.setup)
-    if depth > HOME_ERROR_M:
+    if depth > HOME_ALTITUDE_TOLERANCE_M and _is_above_home(setup, finding.place.index):
         home_on_ground = _suggest_home_on_ground(setup)
         remaining_shortfall = shortfall - depth
         if remaining_shortfall <= SUGGESTION_LENGTH_MARGIN_M or not home_on_ground:

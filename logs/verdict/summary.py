@@ -24,8 +24,8 @@ from logs.verdict.findings import (
 from logs.verdict.measures.mission_ends import missing_ends_text, unjudged_return_text
 from logs.verdict.places import FLIGHT, DecidingParameter, LevelAnswer, Place
 from logs.verdict.rule_words import GROUND_RULES, RULE_WORDS, TAKE_OFF_RULES, RuleWords
-from logs.verdict.suggestions import home_height
-from logs.verdict.tolerances import HOME_ERROR_M, NOTABLE_HEIGHT_ERROR_M
+from logs.verdict.suggestions import home_height, home_height_text, lowest_clearance
+from logs.verdict.tolerances import NOTABLE_HEIGHT_ERROR_M
 from logs.verdict.wording import deciding_text, disagreement_text, place_text
 from world.wording import count_text, is_one_edit
 
@@ -45,13 +45,19 @@ def setup_notes(setup: FlightSetup, findings: Sequence[Finding]) -> tuple[str, .
 
     There is no note on home's altitude if a finding already reports it.
     """
-    source, height = setup.envelope.source, home_height(setup)
+    source, home_text = setup.envelope.source, home_height_text(setup)
     notes = [f"the aircraft's model is from {source}"] if source else []
     is_found = any(finding.rule == "clearance" and finding.place == FLIGHT for finding in findings)
-    # The height is NaN if it is unknown.
-    if abs(height) > HOME_ERROR_M and not is_found:
-        side = "above" if height > 0.0 else "below"
-        notes.append(f"home is {abs(height):.0f} m {side} the ground there, which shifts all heights above home")
+    if home_text and not is_found:
+        # With home on the ground the flight is lower by the height of the mission's home.
+        clearance = lowest_clearance(findings) - max(0.0, home_height(setup))
+        is_stated = home_height(setup) > 0.0 and math.isfinite(clearance)
+        effect_text = (
+            f"; with home on the ground the lowest clearance is {clearance:.1f} m"
+            if is_stated
+            else ", which shifts all heights above home"
+        )
+        notes.append(home_text + effect_text)
     return tuple(notes)
 
 

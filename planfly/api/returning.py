@@ -33,6 +33,7 @@ from logs.verdict.returns.returns_text import (
     remedy_text,
 )
 from logs.verdict.returns.suggest_returns import Remedy, is_improvement, suggest_parameters, suggest_rally_points
+from logs.verdict.suggestions import home_height, home_height_text
 from logs.views.exports.map_files import glide_shapes, kml_text, map_zones, plan_line, return_lines, track_line
 from planfly.api.flying import check_keywords_not_given, check_program
 from planfly.arguments import check_arguments
@@ -162,6 +163,10 @@ class ReturnsResult:
                 f"{reflown_text} close to a limit {verb} also flown in JSBSim; the heights of the two simulations"
                 f" differ by up to {max_difference:.0f} m"
             )
+        home = self.setup.mission.home
+        if home is not None and (home_text := home_height_text(self.setup)):
+            ground = home.alt - home_height(self.setup)
+            notes.append(f"{home_text}; for a launch from that ground, set home to {ground:.1f} m AMSL")
         if self.returns.stands_in:
             notes.append(
                 f"the return of {self.setup.autopilot.title} is not simulated; ArduPlane's return is used instead"

@@ -11,6 +11,7 @@ import numpy as np
 from aircraft.catalog import Aircraft, check_new_folder, read_aircraft, write_aircraft_folder
 from aircraft.data_sheet import (
     FUEL_HEAT,
+    MAX_CLIMB,
     RANGES,
     SEA_LEVEL,
     SHEET_DENSITY,
@@ -304,6 +305,9 @@ _SPREADS = {
 GUESSED_CLIMB_SD_RAD = math.radians(6.0)
 # Standard deviation of a steepest climb angle that the sheet states, rad: 0.4 m/s at 15 m/s.
 STATED_CLIMB_SD_RAD = math.radians(1.5)
+# Standard deviation of the part of the climb between a stated throttle and full throttle, as a fraction of this part:
+# that of the guessed thrust in `_SPREADS`.
+EXTRAPOLATED_CLIMB_SD_FRACTION = 0.20
 # Standard deviation of the logarithm of the least drag if the sheet states the power-off sink rate.
 STATED_DRAG_LOG_SD = 0.15
 
@@ -322,7 +326,7 @@ def _make_uncertainty(sized: SizedAircraft, aircraft: Aircraft) -> tuple[Uncerta
     spreads = {name: sd for name, (sd, _) in _SPREADS.items() if name in sized.numbers.factors}
     if sized.sheet.sink:
         spreads["zero-lift-drag"] = STATED_DRAG_LOG_SD
-    climb_sd = GUESSED_CLIMB_SD_RAD if "climb" in sized.guessed else STATED_CLIMB_SD_RAD
+    climb_sd = climb_deviation(sized)
     slopes = {name: _effect_of_factor(aircraft, estimated, name, sd) / sd for name, sd in spreads.items()}
     thrust_slopes = slopes.pop("thrust")
     # Change of the logarithm of the thrust per factor that keeps the climb.
@@ -356,6 +360,19 @@ def _make_uncertainty(sized: SizedAircraft, aircraft: Aircraft) -> tuple[Uncerta
         bank_guessed="bank" in sized.guessed,
     )
     return uncertainty, _draw_with_balanced_thrust(uncertainty, balance, climb_sd / thrust_slopes[0])
+
+
+def climb_deviation(sized: SizedAircraft) -> float:
+    """Return the standard deviation of the climb at full throttle, rad.
+
+    A climb that is stated at less throttle is less certain at full throttle, but not less than a guess.
+    """
+    if "climb" in sized.guessed:
+        return GUESSED_CLIMB_SD_RAD
+    if math.isnan(sized.partial_climb):
+        return STATED_CLIMB_SD_RAD
+    extrapolated_sd = EXTRAPOLATED_CLIMB_SD_FRACTION * (sized.sheet.climb - sized.partial_climb)
+    return min(GUESSED_CLIMB_SD_RAD, math.hypot(STATED_CLIMB_SD_RAD, extrapolated_sd))
 
 
 def _draw_with_balanced_thrust(uncertainty: Uncertainty, balance: Mapping[str, float], thrust_sd: float) -> Draws:
@@ -501,7 +518,8 @@ def make_data_sheet_folder(
         _check_required_numbers(sheet)
         sized = size_aircraft(check_sheet(sheet))
     with temporary_folder("planfly-sheet-") as draft_folder:
-        files = _file_texts(sized, target.name, draft_folder, file_parameters, readme_lines)
+        climb_names = " and ".join(_climb_names(parameter_values))
+        files = _file_texts(sized, target.name, draft_folder, file_parameters, readme_lines, climb_names)
     write_aircraft_folder(target, {name: text.encode() for name, text in files.items()})
     return read_aircraft(target)
 
@@ -542,11 +560,13 @@ def _file_texts(
     draft_folder: Path,
     file_parameters: Mapping[str, float],
     readme_lines: Sequence[str],
+    climb_names: str,
 ) -> dict[str, str]:
     """Return the text of each file of the aircraft's folder, by file name.
 
     draft_folder: temporary folder for a draft of the aircraft, from which trims and gains are computed.
     readme_lines: lines of ``README.md`` on the parameter file.
+    climb_names: parameters from which the climb is derived.
     """
     folder = draft_folder / name
     folder.mkdir()
@@ -580,7 +600,13 @@ def _file_texts(
         "uncertainty.toml": uncertainty_text(uncertainty),
         DRAWS_FILE: draws_text(draws),
         "README.md": _readme_text(
-            aircraft, sized, performance, uncertainty, readme_lines, _trim_throttle_lines(file_parameters, performance)
+            aircraft,
+            sized,
+            performance,
+            uncertainty,
+            readme_lines,
+            _trim_throttle_lines(file_parameters, performance),
+            climb_names,
         ),
     }
 
@@ -796,12 +822,17 @@ def _trim_throttle_lines(file_parameters: Mapping[str, float], performance: Perf
     ]
 
 
+def _climb_names(stated: AircraftParameters) -> list[str]:
+    """Return the file's names of the climb rate and its throttle if that is not full throttle; otherwise []."""
+    names = ("TECS_CLMB_MAX", "THR_MAX")
+    return [stated.texts[name].split()[0] for name in names] if stated.values.keys() >= set(names) else []
+
+
 def _climb_lines(stated: AircraftParameters) -> list[str]:
     """Return a line of ``README.md`` if the file's climb rate is not at full throttle; otherwise []."""
-    if not {"TECS_CLMB_MAX", "THR_MAX"} <= stated.values.keys():
+    if not (names := _climb_names(stated)):
         return []
-    climb_name, throttle_name = (stated.texts[name].split()[0] for name in ("TECS_CLMB_MAX", "THR_MAX"))
-    climb_text = f"{climb_name} is the climb rate with the throttle at {throttle_name}"
+    climb_text = f"{names[0]} is the climb rate with the throttle at {names[1]}"
     return [f"{climb_text}; the table has the climb at full throttle."]
 
 
@@ -819,6 +850,23 @@ def _performance_lines(aircraft: Aircraft, performance: Performance) -> list[str
     ]
 
 
+def _value_lines(sized: SizedAircraft, climb_names: str) -> list[str]:
+    """Return the rows of the table in ``README.md``: the values of the sheet and their sources.
+
+    climb_names: parameters from which the climb is derived.
+    """
+    lines = []
+    for field, title, unit, factor in _README_ROWS:
+        if value := factor * getattr(sized.sheet, field):
+            source = "guessed" if field in sized.guessed else "stated"
+            if field == "climb" and math.isfinite(sized.partial_climb):
+                is_limited = math.isclose(sized.sheet.climb, MAX_CLIMB, rel_tol=1e-3)
+                limit_text = ", limited to the greatest climb of a model" if is_limited else ""
+                source = f"derived from {climb_names}{limit_text}"
+            lines.append(f"| {title} | {value:.4g} {unit} | {source} |")
+    return lines
+
+
 def _readme_text(
     aircraft: Aircraft,
     sized: SizedAircraft,
@@ -826,11 +874,13 @@ def _readme_text(
     uncertainty: Uncertainty,
     parameter_lines: Sequence[str],
     throttle_lines: Sequence[str],
+    climb_names: str,
 ) -> str:
     """Return the text of ``README.md``: stated and guessed values, performance, uncertainties and files.
 
     parameter_lines: lines on the values of the parameter file.
     throttle_lines: lines on the parameter file's throttle in level flight.
+    climb_names: parameters from which the climb is derived.
     """
     sheet, name = sized.sheet, aircraft.name
     propulsion = "burns fuel; its mass stays the same" if sheet.burns_fuel else "is electric"
@@ -845,10 +895,8 @@ def _readme_text(
         "| | | |",
         "|---|---|---|",
     ]
-    for field, title, unit, factor in _README_ROWS:
-        if value := factor * getattr(sheet, field):
-            lines.append(f"| {title} | {value:.4g} {unit} | {'guessed' if field in sized.guessed else 'stated'} |")
     lines += [
+        *_value_lines(sized, climb_names),
         *parameter_lines,
         "",
         *_performance_lines(aircraft, performance),

@@ -11,7 +11,7 @@ from flight.autopilots.autopilot import Autopilot
 from flight.autopilots.parts import Candidate
 from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from flight.simulation.setup import FlightSetup
-from logs.verdict.findings import GROUND_FOLLOWING_ERROR, PITCH_LIMIT_TIME, Finding
+from logs.verdict.findings import GROUND_FOLLOWING_ERROR, LOWEST_POINT_ERROR, PITCH_LIMIT_TIME, Finding
 from logs.verdict.judge_flight import with_reference
 from logs.verdict.measures.route_requirements import RouteRequirements, true_airspeed_route
 from logs.verdict.places import FLIGHT, AirframeAnswer, Change, DecidingParameter, ReferenceFlights
@@ -123,17 +123,26 @@ def _nearest_passing_value(
 
 
 def _deviation_at_failure(failed_finding: Finding, findings: tuple[Finding, ...]) -> float | None:
-    """Return the cross-track or altitude error at the place of the failure, m, or None if unknown."""
-    if failed_finding.rule == "corridor":
+    """Return the cross-track or altitude error at the place of the failure, m, or None if unknown.
+
+    The result is also None for an altitude error in the other direction, which does not explain the failure: an
+    aircraft that is too near to the ground may be above its leg.
+    """
+    place, rule = failed_finding.place, failed_finding.rule
+    if rule == "corridor":
         return failed_finding.flown
-    if failed_finding.place.kind != "leg" or failed_finding.rule not in ("clearance", "height"):
+    if place.kind != "leg" or rule not in ("clearance", "height"):
         return None
-    slope_findings = [
-        finding for finding in findings if finding.rule == "slope" and finding.place == failed_finding.place
+    names = (LOWEST_POINT_ERROR,) if rule == "clearance" else ("height error", GROUND_FOLLOWING_ERROR)
+    source_rule = "clearance" if rule == "clearance" else "slope"
+    errors = [
+        fact.value
+        for finding in findings
+        for fact in finding.facts
+        if (finding.rule, finding.place) == (source_rule, place) and fact.what in names
     ]
-    names = ("height error", GROUND_FOLLOWING_ERROR)
-    errors = [fact.value for finding in slope_findings for fact in finding.facts if fact.what in names]
-    return errors[0] if errors else None
+    is_explained = bool(errors) and (errors[0] < 0.0 if rule == "clearance" else errors[0] > 0.0)
+    return errors[0] if is_explained else None
 
 
 def judge_airframe_flight(

@@ -64,6 +64,18 @@ def demanded_altitudes(requirements: RouteRequirements, leg: int, positions: Flo
     return ground + start_height + fraction * (end_height - start_height)
 
 
+def altitude_error(requirements: RouteRequirements, leg: int, position: Floats) -> float:
+    """Return the altitude above a leg's line, or above the altitude demanded over the ground that it follows, m.
+
+    position: east, north and up, m, (3,).
+    """
+    if follows_ground(requirements, leg):
+        return float(position[2] - demanded_altitudes(requirements, leg, position[None])[0])
+    distance, _ = project_onto_leg(requirements, leg, position[None])
+    run, (start, end) = float(requirements.runs[leg]), requirements.points[leg : leg + 2, 2]
+    return float(position[2] - np.interp(distance[0], [0.0, max(run, 1e-6)], [start, end]))
+
+
 def steepest_ground(requirements: RouteRequirements, leg: int, limit: float) -> GroundSlope | None:
     """Find the part of a ground-following leg on which an aircraft with a limited climb gets lowest.
 

@@ -45,7 +45,13 @@ from logs.verdict.measures.path_moves import MOVE
 from logs.verdict.measures.route_requirements import Airspace, judged_airspace
 from logs.verdict.measures.zone_visits import path_zones
 from logs.verdict.returns.return_starts import ReturnStarts
-from logs.verdict.tolerances import CLEARANCE_TOLERANCE_M, ENERGY_RESERVE_FRACTION, UNDECIDED_FRACTION
+from logs.verdict.suggestions import home_height, home_height_text
+from logs.verdict.tolerances import (
+    CLEARANCE_TOLERANCE_M,
+    ENERGY_RESERVE_FRACTION,
+    HOME_ERROR_M,
+    UNDECIDED_FRACTION,
+)
 from world.arrays import Floats
 from world.errors import MissionError
 from world.kernels import Record, Records
@@ -419,6 +425,8 @@ class ReturnWorld:
         begins_with_landing = any(landing.is_landing for landing in self.landings)
         if begins_with_landing and any(ending != "circle" for ending in self.endings):
             parts.append("landing")
+        if self.setup.imported_log is None and home_height(self.setup) > HOME_ERROR_M:
+            parts.append(f"{home_height_text(self.setup)}; after arming on that ground, every return is so much lower")
         return tuple(parts)
 
     def target(self, row: Record, ending: Ending | None = None) -> ReturnTarget:

@@ -5,7 +5,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from logs.verdict.findings import GROUND_PATH, Finding, Message, make_finding, message
+from logs.verdict.findings import (
+    GROUND_PATH,
+    LOWEST_POINT_ERROR,
+    Fact,
+    Finding,
+    Message,
+    make_finding,
+    message,
+)
+from logs.verdict.measures.ground_following import altitude_error
 from logs.verdict.measures.ground_paths import (
     first_landing_leg,
     has_ground_paths,
@@ -17,7 +26,7 @@ from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
 from logs.verdict.rule import LogNeeds, Rule
-from logs.verdict.suggestions import home_height, suggest_flying_higher
+from logs.verdict.suggestions import home_height, lowest_clearance, suggest_flying_higher
 from logs.verdict.tolerances import (
     BELOW_HOME_M,
     CLEARANCE_TOLERANCE_M,
@@ -154,9 +163,7 @@ def _home_above_ground_findings(requirements: RouteRequirements, leg_findings: l
         finding.margin is not None and 0.0 <= finding.margin < height for finding in leg_findings
     ):
         return []
-    min_height = (
-        min(finding.margin + (finding.limit or 0.0) for finding in leg_findings if finding.margin is not None) - height
-    )
+    min_height = lowest_clearance(leg_findings) - height
     brief = f"the mission's home is {height:.0f} m above the ground there"
     explanation = (
         f"; if the aircraft is armed on that ground, the whole flight is {height:.0f} m lower. Its lowest point is then"
@@ -374,31 +381,30 @@ def _flown_finding(
     is_planned_short: True if the planned path is lower than required.
     """
     min_clearance, ok, reason, limit = math.nan, None, "the leg was not flown", requirement.limit
-    terrain, off_text = requirements.setup.scenario.terrain, ""
+    terrain, off_text, facts = requirements.setup.scenario.terrain, "", list[Fact]()
     first, last = (0, 0) if aligned is None else aligned.leg_segments(leg)
     if aligned is not None and last > first:
         first = _first_airborne_segment(requirements, aligned, leg)
         clearances = aligned.clearance[first:last]
         is_known = np.isfinite(clearances)
         if is_known.any():
-            positions = np.asarray(aligned.track.position[first:last], dtype=np.float64)
-            row, limit = requirement.smallest_margin(clearances, positions)
-            k = first + row
-            min_clearance = float(aligned.clearance[k])
+            row, limit = requirement.smallest_margin(clearances, aligned.track.position[first:last].astype(np.float64))
+            k, min_clearance = first + row, float(clearances[row])
             ok = min_clearance >= limit - CLEARANCE_TOLERANCE_M
             if not ok and -_CONTACT_DEPTH_M < min_clearance < 0.0:
                 # The row of a ground contact is below the surface by at most the distance flown in one tick.
                 min_clearance = 0.0
-            fraction = float(aligned.clearance_fraction[k])
-            reason = f"{_height_text(min_clearance)} {_time_and_place_text(aligned, k, fraction)}"
+            reason = f"{_height_text(min_clearance)} {_time_and_place_text(aligned, k, aligned.clearance_fraction[k])}"
         if not is_known.all():
             k = first + int(np.argmin(is_known))
             off_text = f"flown outside the terrain data {_time_and_place_text(aligned, k, 0.0)}"
             off_text += _geographic_text(requirements, *aligned.track.position[k, :2].tolist())
             reason = off_text if math.isnan(min_clearance) else f"{reason}; {off_text}"
             ok = None if ok is not False else False
-        if ok is False:
+        if aligned is not None and ok is False:
             reason += f"; {limit:.0f} m are required"
+            height_error = altitude_error(requirements, leg, aligned.track.position[first + row])
+            facts = [Fact(LOWEST_POINT_ERROR, height_error, "m")]
         reason += _terrain_error_text(min_clearance, limit, None if terrain is None else terrain.vertical_error)
     is_unknown = ok is None and bool(off_text)
     if is_planned_short:
@@ -419,6 +425,7 @@ def _flown_finding(
         unit="m",
         method="exact along the flown track",
         check=GROUND_PATH if is_unknown else "",
+        facts=facts,
     )
 
 

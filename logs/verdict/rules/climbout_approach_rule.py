@@ -18,7 +18,7 @@ from itertools import groupby
 from typing import NamedTuple
 
 from flight.mission.items import Command
-from flight.mission.placing import SAME_POSITION_DISTANCE_M
+from flight.mission.placing import HOME_ALTITUDE_TOLERANCE_M, SAME_POSITION_DISTANCE_M
 from logs.verdict.findings import GROUND_PATH, Finding, Message, make_finding, message
 from logs.verdict.measures.ground_paths import (
     GroundPath,
@@ -34,6 +34,7 @@ from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import Place
 from logs.verdict.rule import Rule
+from logs.verdict.suggestions import home_height, home_height_text
 from logs.verdict.tolerances import (
     EARLY_TOUCHDOWN_DISTANCE_M,
     FIRST_CLIMB_HEIGHT_M,
@@ -152,6 +153,8 @@ def climbout_findings(
     if takeoff_altitude <= ground_altitude:
         reason = f"the take-off ends {ground_altitude - takeoff_altitude:.0f} m below the ground at home"
         return [_unjudged_finding("climbout", place, reason, is_undecided=True)]
+    if home_height(requirements.setup) < -HOME_ALTITUDE_TOLERANCE_M:
+        return [_unjudged_finding("climbout", place, home_height_text(requirements.setup), is_undecided=False)]
     steepest, gentlest = (
         _take_off_climb(requirements, start, launch, (ground_altitude, takeoff_altitude), slope)
         for slope in (max_slope, max(_MIN_CLIMB_SLOPE, MIN_CLIMB_FRACTION * certain_slope))

@@ -115,6 +115,11 @@ def test_a_mission_off_the_tile_is_refused() -> None:
     words = r"flies to latitude 36\.5000\.\.36\.5360, longitude -84\.2000\.\.-84\.2000; the terrain covers latitude 36"
     with pytest.raises(TerrainError, match=words):
         implied_scenario(mission(wp(0, 0), wp(0, 4000), home="40 -84 0"), "jacksboro")
+    # In a file whose latitudes and longitudes are swapped, and in one that no swap brings to the terrain.
+    with pytest.raises(TerrainError, match=r"With latitude and longitude swapped, the mission would lie in this"):
+        implied_scenario(mission("0 16 0 0 0 0 -84.2 36.3 900", "0 16 0 0 0 0 -84.21 36.31 900"), "jacksboro")
+    with pytest.raises(TerrainError, match=r"longitude -84\.\d+\.\.-84\.\d+$"):
+        implied_scenario(mission("0 16 0 0 0 0 36.3 -74.2 900", "0 16 0 0 0 0 36.31 -74.21 900"), "jacksboro")
     # On the other side of the world, where the file's coordinate system may have no pixels.
     with pytest.raises(TerrainError, match="no data at any position"):
         implied_scenario(mission("0 16 0 0 0 0 -36.3 95.7 900", "0 16 0 0 0 0 -36.31 95.7 900"), "jacksboro")

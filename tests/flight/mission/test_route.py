@@ -278,6 +278,13 @@ def test_heights_of_every_frame_are_amsl() -> None:
 def test_a_home_off_the_ground_is_noted() -> None:
     flown = route(wp(0, 100), wp(0, 900), home="36.5 -84.2 0", terrain=ground())
     assert "home is at 0.0 m AMSL, but the ground there is at 300.0 m" in flown.notes[0]
+    # The difference and the altitude to set, beyond the error of elevation files.
+    flown = route(wp(0, 100), wp(0, 900), home="36.5 -84.2 328", terrain=ground())
+    assert "after arming on that ground they are 28 m lower than here" in flown.notes[0]
+    assert flown.notes[0].endswith("set home to 300.0 m AMSL")
+    for home, is_noted in ((310.1, True), (309.9, False), (290.1, False), (289.9, True)):
+        flown = route(wp(0, 100), wp(0, 900), home=f"36.5 -84.2 {home}", terrain=ground())
+        assert any("the ground there" in note for note in flown.notes) is is_noted
 
 
 def test_cruise_speed_is_no_command() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from aircraft.catalog import Aircraft
-from aircraft.data_sheet import DataSheet
+from aircraft.data_sheet import DataSheet, check_sheet, size_aircraft
 from aircraft.uncertainty import read_draws, read_uncertainty
 from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
@@ -19,6 +19,7 @@ from flight.dynamics.fdm import Fdm, Variation
 from flight.dynamics.trim import fastest_level_flight, full_throttle_climb, slowest_level_flight, steady_flight
 from flight.simulation.simulate import Flight, fly_to_end
 from planfly.workflow.data_sheets import (
+    climb_deviation,
     factor_effect,
     make_data_sheet_folder,
     read_aircraft_parameters,
@@ -234,6 +235,25 @@ def test_the_climb_of_a_parameter_file_is_that_at_its_throttle_limit(tmp_path: P
     assert math.degrees(steepest.climb) > 15.0
     assert "THR_MAX 75\n" in (made.folder / "ardupilot.parm").read_text()
     assert "TECS_CLMB_MAX is the climb rate with the throttle at THR_MAX" in (made.folder / "README.md").read_text()
+
+
+def test_a_climb_derived_from_less_throttle_stays_within_the_models_limit_and_is_less_certain(tmp_path: Path) -> None:
+    """4 m/s at 14 m/s are 16.6 degrees; by the square of the throttle, 60 % of it implies more than 35 degrees."""
+    sheets = {}
+    for throttle in (60.0, 100.0):
+        file = tmp_path / f"{throttle:.0f}.parm"
+        file.write_text(f"TECS_CLMB_MAX 4\nTHR_MAX {throttle:g}\n")
+        sheet = with_parameters(DataSheet(1.3, 1.4, 14.0, 8.3), read_aircraft_parameters(file).values)
+        sheets[throttle] = size_aircraft(check_sheet(sheet))
+    assert math.degrees(sheets[60.0].sheet.climb) == pytest.approx(35.0, abs=0.1)
+    assert math.degrees(sheets[60.0].partial_climb) == pytest.approx(math.degrees(math.asin(4.0 / 14.0)))
+    assert math.isnan(sheets[100.0].partial_climb)
+    # 1.5 degrees as stated; a fifth of the further 18.4 degrees in addition.
+    assert math.degrees(climb_deviation(sheets[100.0])) == pytest.approx(1.5)
+    assert math.degrees(climb_deviation(sheets[60.0])) == pytest.approx(math.hypot(1.5, 0.2 * 18.4), abs=0.03)
+    made = make_data_sheet_folder(tmp_path / "mine", DataSheet(1.3, 1.4, 14.0, 8.3), tmp_path / "60.parm")
+    source = "derived from TECS_CLMB_MAX and THR_MAX, limited to the greatest climb of a model"
+    assert f"| steepest climb at cruise | 35 degrees | {source} |" in (made.folder / "README.md").read_text()
 
 
 @pytest.mark.parametrize("stated", [30.0, 0.0])

@@ -18,7 +18,7 @@ from flight.autopilots.px4.parameters import Px4Parameters
 from flight.live.telemetry import AUTO
 from flight.simulation.setup import FlightSetup
 from logs.recording.reader import read_log
-from logs.verdict.findings import PITCH_LIMIT_TIME, Fact, Finding, make_finding
+from logs.verdict.findings import LOWEST_POINT_ERROR, PITCH_LIMIT_TIME, Fact, Finding, make_finding
 from logs.verdict.judge_flight import judge_flight
 from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.places import FLIGHT, Change, DecidingParameter, Place, ReferenceFlights
@@ -39,7 +39,16 @@ from planfly.workflow.suggestion_trials import PassedTrial, SuggestionTrials
 from tests.setups import setup_maker
 
 LEG = Place("leg", 4)
-LOW = make_finding("clearance", LEG, ok=False, reason="", flown=52.0, limit=60.0, margin=-8.0)
+LOW = make_finding(
+    "clearance",
+    LEG,
+    ok=False,
+    reason="",
+    flown=52.0,
+    limit=60.0,
+    margin=-8.0,
+    facts=[Fact(LOWEST_POINT_ERROR, -8.4, "m")],
+)
 HEIGHTS = make_finding("slope", LEG, ok=True, reason="", facts=[Fact("height error", -8.4, "m")])
 WIDE = make_finding("corridor", LEG, ok=False, reason="", flown=210.0, limit=180.0, margin=-30.0)
 
@@ -221,6 +230,27 @@ def test_a_value_beyond_the_farthest_is_not_tried() -> None:
 def test_findings_that_pass_are_not_blamed() -> None:
     fine: Finding = make_finding("corridor", LEG, ok=True, reason="")
     assert find_passing_parameter(ArduPlane(ArduPilotParameters.defaults()), (fine,), lambda new: True) is None
+
+
+@pytest.mark.parametrize(
+    ("rule", "at_failure", "largest", "named"),
+    [
+        # 7 m above the leg elsewhere do not explain why it is 5.9 m below it at its lowest point.
+        ("clearance", -5.9, 7.0, -5.9),
+        ("clearance", 5.9, -7.0, None),
+        ("height", -5.9, 7.0, 7.0),
+        ("height", 5.9, -7.0, None),
+    ],
+)
+def test_the_error_that_is_named_is_the_one_of_the_failure(
+    rule: str, at_failure: float, largest: float, named: float | None
+) -> None:
+    failed = make_finding(rule, LEG, ok=False, reason="", facts=[Fact(LOWEST_POINT_ERROR, at_failure, "m")])
+    slope = make_finding("slope", LEG, ok=True, reason="", facts=[Fact("height error", largest, "m")])
+    law = ArduPlane(ArduPilotParameters.defaults())
+    found = find_passing_parameter(law, (failed, slope), lambda other: other != law)
+    assert found is not None
+    assert found.off == named
 
 
 # ----------------------------------------------------------------------

@@ -149,12 +149,25 @@ def test_legs_that_are_low_because_home_is_below_the_ground_are_offered_homes_al
     mission = replace(setup.mission, warnings=(f"a.waypoints:2: {HOME_LINE_MISSING_TEXT}",))
     judged = judge_mission_geometry(replace(setup, mission=mission))
     assert {finding.suggestion for finding in judged.failed if finding.rule == "clearance"} == {""}
-    # 60 m below the ground there, home is beyond the errors of heights, and 40 m below it is within them.
-    for home, what in ((40.0, "home altitude"), (60.0, "height")):
-        lines = [wp(0, 500 + 1000 * k, 50.0) for k in range(3)]
+    # 11 m below the ground there, home is beyond the error of elevation files, and 9 m below it is within it.
+    for home, what in ((89.0, "home altitude"), (91.0, "height")):
+        lines = [wp(0, 500 + 1000 * k, 25.0) for k in range(3)]
         judged = judge_mission_geometry(setup_of(*lines, home=f"36.5 -84.2 {home}"))
         changes = {finding.suggestions[0][0].what for finding in judged.failed if finding.suggestions}
         assert changes == {what}
+
+
+def test_a_home_below_the_ground_is_mended_where_only_some_legs_are_too_low() -> None:
+    """40 m above a home 28 m below the ground are 12 m above ground, and 40 m with home on it; 160 m are enough."""
+    legs = [wp(0, 500, 40.0), wp(0, 2500, 40.0), wp(0, 4500, 160.0), wp(2000, 4500, 160.0)]
+    judged = judge_mission_geometry(setup_of(*legs, home="36.5 -84.2 72"))
+    home = "set home to 100.0 m AMSL, the ground there, instead of 72.0 m"
+    assert [finding.suggestion for finding in judged.failed if finding.rule == "clearance"] == [home, home]
+    assert judged.headline.endswith("; home is 28 m below the ground there, which shifts all heights above home")
+    # A leg between altitudes above mean sea level stays as low with any home.
+    low = [wp(0, 500, 112.0, frame=0), wp(0, 2500, 112.0, frame=0), wp(0, 4500, 160.0), wp(2000, 4500, 160.0)]
+    (finding, *_) = judge_mission_geometry(setup_of(*low, home="36.5 -84.2 72")).failed
+    assert finding.suggestion.startswith("raise both ends of leg 0")
 
 
 def test_items_that_state_heights_above_home_as_amsl_are_offered_the_other_frame() -> None:

@@ -252,6 +252,18 @@ def test_returns_that_follow_the_terrain_are_not_judged(tmp_path: Path) -> None:
     assert judged(tmp_path, WAY, TERRAIN_FOLLOW=2 + 8).unjudged_parts == ()
 
 
+@pytest.mark.parametrize(("home", "ok"), [(49.9, True), (50.1, False)])
+def test_returns_to_a_home_far_above_the_ground_are_not_judged_in_full(tmp_path: Path, home: float, ok: bool) -> None:
+    """The ground at home is at 0 m: an aircraft that is armed there returns 50 m lower."""
+    head, item = HEAD.splitlines(keepends=True)[:2], row(1, 16, 10.0, 600.0) + row(2, 16, 5000.0, 600.0)
+    fields = head[1].split("\t")
+    mission = head[0] + "\t".join([*fields[:10], f"{home}", *fields[11:]]) + item.replace("\t0\t0\t16", "\t0\t3\t16")
+    found = judged(tmp_path, mission, RTL_ALTITUDE=600)
+    assert {one.kind for one in found.each} == {"safe"}
+    assert (found.safe, found.undecided) == (ok, not ok)
+    assert headline(found).startswith("not judged in full (home is 50 m above the ground there; ") is not ok
+
+
 def test_what_is_not_judged_is_neither_kept_nor_failed_where_it_is_required(tmp_path: Path) -> None:
     law = 'params = "mine.parm"\n'
     for number, (stated, ok) in enumerate(

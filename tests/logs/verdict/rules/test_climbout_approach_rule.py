@@ -181,6 +181,14 @@ def test_a_take_off_climbs_on_until_it_is_on_its_first_leg() -> None:
         assert judged("climbout", wall(600.0, top), *lines)[0].ok is ok
 
 
+@pytest.mark.parametrize(("home", "ok"), [(90.1, True), (89.9, None)])
+def test_a_climb_out_from_a_home_below_the_ground_is_not_called_ok(home: float, ok: bool | None) -> None:
+    """The ground is at 100 m; whether the legs are high enough is judged with this home."""
+    found = of(judge_geometry(over(wall(2000.0, 100.0), *TAKEOFF, home=f"36.5 -84.2 {home}")), "climbout")
+    assert (found.ok, found.check) == (ok, "")
+    assert (found.reason == "home is 10 m below the ground there") is (ok is None)
+
+
 def test_what_stands_in_the_first_leg_is_no_matter_of_the_climb_out() -> None:
     # At its steepest it is on the leg after 1.2 km, at its least after 1.7 km.
     found, verdict = judged("climbout", wall(2000.0, 900.0), *TAKEOFF)

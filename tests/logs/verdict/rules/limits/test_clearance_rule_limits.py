@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from flight.mission.items import Home, Mission, MissionItem
-from flight.simulation.setup import FlightSetup
+from flight.simulation.setup import FlightSetup, ImportedLog
 from logs.verdict.judge_flight import judge_geometry
+from logs.verdict.suggestions import home_height_text
 from tests.logs.verdict.judging import judge, leg, of
 from tests.synthetic import bump, fly_path, make_setup
 
@@ -51,6 +52,16 @@ def test_what_was_flown_before_the_first_waypoint_and_after_the_last_counts(
     assert item.flown == pytest.approx(up, abs=0.01)
 
 
+@pytest.mark.parametrize(("alt", "is_noted"), [(9.9, False), (10.1, True), (-9.9, False), (-10.1, True)])
+def test_a_home_off_the_ground_is_named_beyond_the_error_of_elevation_files(alt: float, is_noted: bool) -> None:
+    setup = at_home(make_setup(over(75.0), limits={"min_clearance_m": 30.0}), alt)
+    verdict = judge_geometry(setup)
+    assert verdict.flyable
+    assert ("the ground there" in verdict.headline) is is_noted
+    # The home of a log is where its aircraft was armed.
+    assert not home_height_text(replace(setup, imported_log=ImportedLog("flight.bin", "", "")))
+
+
 def at_home(setup: FlightSetup, alt: float, frame: int = 3) -> FlightSetup:
     """The setup of a mission file with a home, and with one item in a frame."""
     origin = setup.scenario.origin
@@ -84,11 +95,13 @@ def test_heights_over_a_home_above_the_ground_are_open_where_they_are_too_low_fr
         assert verdict.undecided is (open_ and frame == 3)
         assert not verdict.failed
         # An altitude that leaves the verdict undecided is said once.
-        is_noted = frame == 3 and not open_ and abs(alt) > 50.0
-        side = "above" if alt > 0.0 else "below"
-        note = f"; home is {abs(alt):.0f} m {side} the ground there, which shifts all heights above home"
+        is_noted = frame == 3 and not open_
+        note = f"; home is {abs(alt):.0f} m below the ground there, which shifts all heights above home"
+        if alt > 0.0:
+            low = f"with home on the ground the lowest clearance is {up - alt:.1f} m"
+            note = f"; home is {alt:.0f} m above the ground there; {low}"
         assert verdict.headline.endswith(note) is is_noted
-        assert ("above the ground there" in verdict.headline or is_noted) is (frame == 3 and abs(alt) > 50.0)
+        assert ("the ground there" in verdict.headline) is (frame == 3)
         # From the ground, 75 m are lower by 50.1 m: 5.1 m are missing, and 1 m more is suggested.
         texts = [finding.suggestion for finding in verdict.findings if finding.suggestions]
         home = f"set home to 0.0 m AMSL, the ground there, instead of {alt:.1f} m"
