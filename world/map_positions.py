@@ -54,8 +54,9 @@ def check_in_area(key: str, point: Floats, source: str, bounds: Floats, origin: 
         min_coordinate, max_coordinate = bounds[axis]
         if not min_coordinate <= point[axis] <= max_coordinate:
             outside = max(min_coordinate - point[axis], point[axis] - max_coordinate)
+            outside_text = f"{outside:.1f}".removesuffix(".0")
             allowed = (
-                f"{outside:.0f} m outside the area, which reaches from {min_coordinate:.0f} to {max_coordinate:.0f} m"
+                f"{outside_text} m outside the area, which reaches from {min_coordinate:.0f} to {max_coordinate:.0f} m"
                 f" (the area covers {_area_text(bounds, origin)})"
             )
             raise ScenarioError.at(source, key, float(point[axis]), allowed, shown=f"{name} {point[axis]:.0f} m")

@@ -40,8 +40,8 @@ CASES: dict[str, tuple[str, str, str]] = {
         "floor_amsl_m = 450\n[start]",
         "start: 400 m AMSL: below the floor, 450 m AMSL",
     ),
-    "start outside the map": ("east_m = -4000", "east_m = -5001", "start: east -5001 m: outside the area -5000..5000"),
-    "destination outside": ("east_m = 4000", "east_m = 6000", "destination: east 6000 m: outside the area"),
+    "start outside the map": ("east_m = -4000", "east_m = -5001", "start: east -5001 m: 1 m outside the area"),
+    "destination outside": ("east_m = 4000", "east_m = 6000", "destination: east 6000 m: 1000 m outside the area"),
     "start under terrain": (
         "amsl_m = 400",
         "amsl_m = 150",

@@ -71,7 +71,7 @@ def test_a_window_around_a_storm(folder: Path, capsys: pytest.CaptureFixture[str
         (
             "08:00",
             4,
-            "take-off at 2026-05-01 08:00 UTC: no go, 0 of 10 flights are flyable, less than the required 90 %; take-off",
+            "take-off at 2026-05-01 08:00 UTC: no go, 0 of 10 flights are flyable, less than the required 90 %; take",
         ),
         ("11:00", 3, "take-off at 2026-05-01 11:00 UTC: not judged: "),
     ],
