@@ -691,7 +691,8 @@ def _with_airspeed(setup: FlightSetup, surveys: Sequence[Survey], airspeed: floa
     mission, items = setup.mission, setup.route.items
     # Start with the last survey, because inserted items renumber later ones.
     for survey in reversed(surveys):
-        ends = items[survey.lines[0].begins], items[survey.lines[-1].ends]
+        photo_lines = survey.lines
+        ends = items[photo_lines[0].begins], items[photo_lines[-1].ends]
         first, last = (next(k for k, item in enumerate(mission.items) if item.seq == end) for end in ends)
         mission = set_airspeed(mission, first, airspeed, next_airspeed, last)
     return mission

@@ -95,7 +95,7 @@ def test_an_interruption_says_what_is_kept_and_how_to_go_on(
     [
         (["--resume", "--seed", "2"], "other settings: seed 2 instead of "),
         (["--resume", "--prove", "0.9"], "target 0.9: the campaign in this file has 0.99"),
-        (["--resume", "--most", "30"], "most 30.0: expected"),
+        (["--resume", "--most", "30"], "most 30.0: the campaign in this file has"),
         (["--resume", "--out", "campaign"], "there is no campaign to continue"),
         (["--out", "campaign"], "contains another campaign; --overwrite replaces it"),
         ([], "--resume continues it"),
