@@ -257,6 +257,7 @@ def _search_repeatedly(search: Search, previous_path: Floats | None) -> tuple[Fl
             best_result = result
         if attempt == 0 and not search.is_closed and may_turn_back(search, best_result[1]):
             best_result = search_turning_back(search, best_result)
+            search.report_path(*best_result)
         if search.meets_goal(best_result[1]) or search.is_closed or search.must_end() or not may_try_again(search):
             break
     if best_result is None:  # pragma: no cover - the loop always runs

@@ -463,6 +463,12 @@ class Search:
                 self.done, self.done + remaining_generations, "no feasible path yet" if is_infeasible else remark
             )
 
+    def report_path(self, path: Floats, certificate: Certificate) -> None:
+        """Report a path (w, 3) from outside the search's archive to `progress`, if it meets the goal."""
+        if self.progress is not None and self.meets_goal(certificate):
+            ratio = float(path_length(path)) / self._straight_length()
+            self.progress(self.done, self.done, f"length ratio {ratio:.4f}, kill exposure 0")
+
     def best_certified(self) -> tuple[Floats, Certificate]:
         """Return the first path in the archive that is certified with the full kill margin, and its certificate.
 

@@ -202,3 +202,12 @@ def test_more_waypoints_are_tried_unless_their_number_is_stated(
     plan = plan_path(scenario, make_limits(scenario), seed=1)
     assert not plan.safe
     assert len(plan.waypoints) == 12
+
+
+def test_the_last_progress_is_of_the_path_that_turns_back(make_limits: Callable[[Scenario], Limits]) -> None:
+    """No path of the straight frame leaves this trap; the last text must not contradict the safe plan."""
+    texts: list[str] = []
+    scenario = load_scenario("trap-u")
+    plan = plan_path(scenario, make_limits(scenario), seed=1, progress=lambda done, total, text: texts.append(text))
+    assert plan.safe
+    assert texts[-1] == f"length ratio {plan.objectives.length_ratio:.4f}, kill exposure 0"
