@@ -204,10 +204,30 @@ def test_more_waypoints_are_tried_unless_their_number_is_stated(
     assert len(plan.waypoints) == 12
 
 
-def test_the_last_progress_is_of_the_path_that_turns_back(make_limits: Callable[[Scenario], Limits]) -> None:
-    """No path of the straight frame leaves this trap; the last text must not contradict the safe plan."""
+def test_the_last_progress_is_of_the_path_that_turns_back(
+    small: Callable[..., Scenario], make_limits: Callable[[Scenario], Limits]
+) -> None:
+    """Three walls about the destination, open behind it: the paths that advance all meet a wall."""
+    boxes = [(2400, 2600, -2600, 2600), (-2500, 2600, 2400, 2600), (-2500, 2600, -2600, -2400)]
+    zones = [
+        {
+            "name": f"wall {k}",
+            "kind": "exclusion",
+            "polygon_m": [[west, south], [east, south], [east, north], [west, north]],
+        }
+        for k, (west, east, south, north) in enumerate(boxes)
+    ]
+    scenario = small(
+        terrain=FLAT,
+        threats=[],
+        zones=zones,
+        area={"east_m": [-10000, 10000], "north_m": [-10000, 10000], "ceiling_amsl_m": 450},
+        start={"east_m": 8000, "north_m": 0, "height_m": 150},
+        destination={"east_m": 0, "north_m": 0, "height_m": 150},
+        planner={"waypoints": 12, "population": 60, "generations": 25},
+    )
     texts: list[str] = []
-    scenario = load_scenario("trap-u")
     plan = plan_path(scenario, make_limits(scenario), seed=1, progress=lambda done, total, text: texts.append(text))
     assert plan.safe
+    assert "no feasible path yet" in texts
     assert texts[-1] == f"length ratio {plan.objectives.length_ratio:.4f}, kill exposure 0"
