@@ -71,7 +71,7 @@ MAX_POPULATION_VALUES = 30_000_000
 
 # Number of waypoints of a plan if the scenario states none.
 DEFAULT_WAYPOINTS = PlannerTable.model_fields["waypoints"].default
-# Number of waypoints with which the search is repeated, if the scenario states none and no path is safe.
+# Number of waypoints with which a search among zones is repeated, if the scenario states none and no path is safe.
 MORE_WAYPOINTS = 24
 
 # A search, its path (w, 3) and the certificate of the path.
@@ -165,18 +165,19 @@ def _other_waypoint_counts(scenario: Scenario, algorithm: Algorithm, previous_pa
 def _needs_other_count(best: _Result, count: int) -> bool:
     """Return True if a search with another number of waypoints may find a better path than the best so far.
 
-    Another number is tried if no path is safe, unless it is proven that there is none. If the shortest path is sought
-    among zones, where paths are not shortened, fewer waypoints are also tried if the best path is longer than the
-    straight line.
+    This is only the case among zones, where paths are not shortened. Another number is tried there if no path is safe,
+    unless it is proven that there is none. If the shortest path is sought, fewer waypoints are also tried if the best
+    path is longer than the straight line.
     """
     search, waypoints, certificate = best
+    if search.is_closed or not is_limited(search.problem.search.airspace):
+        return False
     if not search.meets_goal(certificate):
-        return not search.is_closed
+        return True
     if search.first_safe or (search.problem.scenario.planner.objective or "length") != "length":
         return False
     max_length = (1.0 + MIN_DETOUR_FRACTION) * math.dist(waypoints[0], waypoints[-1])
-    is_among_zones = is_limited(search.problem.search.airspace)
-    return is_among_zones and count < search.encoding.waypoints and bool(path_length(waypoints) > max_length)
+    return count < search.encoding.waypoints and bool(path_length(waypoints) > max_length)
 
 
 def _is_better(result: _Result, other: _Result) -> bool:
