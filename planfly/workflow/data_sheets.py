@@ -584,7 +584,7 @@ def _file_texts(
     stall_speed = max(
         sheet.stall, math.ceil(10.0 * performance.slowest.airspeed * math.sqrt(SHEET_DENSITY / SEA_LEVEL)) / 10.0
     )
-    min_airspeed = min(max(stall_speed, MIN_GUIDANCE_SPEED_RATIO * stall_speed), sheet.cruise)
+    min_airspeed = min(MIN_GUIDANCE_SPEED_RATIO * stall_speed, sheet.cruise)
     max_airspeed = max(sheet.cruise, MAX_GUIDANCE_SPEED_RATIO * performance.fastest.airspeed)
     metadata = _metadata_text(sized, stall_speed, round(min_airspeed, 1), math.floor(10.0 * max_airspeed) / 10.0)
     (folder / f"{name}.toml").write_text(metadata, encoding="utf-8")

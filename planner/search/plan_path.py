@@ -4,7 +4,7 @@ A seeded search tries the straight line first, then fits waypoints to grid route
 of the obstacles, and runs generations of samples if no path is safe. If the certificate fails, up to two more attempts
 use finer grids, larger populations, a larger clearance buffer and a smaller margin to missiles. If no safe path exists
 in the straight frame, or only a long one, a lattice search looks for routes that turn back. If it is proven that no
-path exists, the search ends.
+path exists, the search ends. Among zones, the whole search may be repeated with another number of waypoints.
 """
 
 import math

@@ -223,7 +223,7 @@ def _steep_ground_message(requirements: RouteRequirements, leg: int, ground: _St
     """Make a message that compares ground that a leg cannot follow with the limit of the slope."""
     limit_text = f"{ground.name} permits a climb of {math.degrees(ground.limit):.1f}°"
     if not ground.name:
-        limit_text = _limit_text(requirements, leg, ground.limit, ground.source, is_climb=True)
+        limit_text = _limit_text(requirements, leg, ground.limit, ground.source)
     brief = (
         f"leg {requirements.leg(leg).number} follows the ground up {math.degrees(ground.slope):.1f}°"
         f" for {_distance_text(ground.length)}"
@@ -350,7 +350,7 @@ def _steep_leg_message(requirements: RouteRequirements, leg: int, limit: float, 
     if source == "aircraft" and (no_progress_text := _no_progress_text(requirements, leg)):
         return message(no_progress_text, f"; leg {number} {verb} {slope_text} at {airspeed:.0f} m/s")
     limit_texts = [
-        _limit_text(requirements, leg, limit, source, is_climb=planned_slope >= 0.0),
+        _limit_text(requirements, leg, limit, source),
         _certain_limit_text(requirements, leg, limit, source),
     ]
     return message(f"leg {number} {verb} {slope_text}", f"; {'; '.join(filter(None, limit_texts))}", placed=True)
@@ -375,7 +375,7 @@ def _no_progress_text(requirements: RouteRequirements, leg: int) -> str:
     return ""
 
 
-def _limit_text(requirements: RouteRequirements, leg: int, limit: float, source: str, *, is_climb: bool) -> str:
+def _limit_text(requirements: RouteRequirements, leg: int, limit: float, source: str) -> str:
     """Describe the limit on a leg's slope, and the airspeed, altitude and wind for which it applies.
 
     limit: largest slope of a climb or a descent, rad.

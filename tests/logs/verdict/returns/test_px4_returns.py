@@ -184,7 +184,7 @@ def test_the_default_returns_to_the_landing_of_the_mission(tmp_path: Path) -> No
 
 
 def test_a_return_to_a_landing_stays_below_rtl_return_alt_by_nav_fw_alt_rad(tmp_path: Path) -> None:
-    """Where the climb ends it flies level to the loiter of a landing, and climbs on to RTL_RETURN_ALT to home."""
+    """After its climb it flies level to the loiter of a landing, but climbs on to RTL_RETURN_ALT on the way home."""
     for return_type, lower_m in ((1, 30.0), (0, 0.0)):
         near, far = (
             judged(
