@@ -2,7 +2,8 @@
 
 import json
 import math
-from collections.abc import Callable, Sequence
+import re
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar, get_args
 
@@ -135,12 +136,7 @@ def first_fault(error: ValidationError, data: Any = None, model: type[BaseModel]
     ]
     first_error = (misspelt_keys or errors)[0]
     keys = [str(part) for part in (first_error["loc"] if data is None else _data_keys(first_error["loc"], data))]
-    # A check of planfly raises its own error; use its message.
-    message = str(first_error["ctx"]["error"]) if first_error["type"] == "value_error" else first_error["msg"]
-    if first_error["type"] == "model_type":
-        message = "expected a table"
-    elif first_error["type"] == "too_short":
-        message = f"expected at least {first_error['ctx']['min_length']}"
+    message = expected_values(first_error)
     value = first_error.get("input")
     if isinstance(value, dict | list):
         value = None
@@ -156,6 +152,49 @@ def first_fault(error: ValidationError, data: Any = None, model: type[BaseModel]
     # A check of the whole file names its key itself.
     prefix = "" if not field and first_error["type"] == "value_error" else f"{field or 'file'}{value_text}: "
     return Fault(field, value, message, f"{prefix}{message}{remainder}")
+
+
+# Expected values by the type of pydantic's error; placeholders are keys of the error's context.
+_EXPECTED_VALUES = {
+    "missing": "missing",
+    "model_type": "expected a table",
+    "model_attributes_type": "expected a table",
+    "dict_type": "expected a table",
+    "list_type": "expected a list",
+    "tuple_type": "expected a list",
+    "string_type": "expected text",
+    "string_too_short": "expected at least {min_length} characters",
+    "string_too_long": "expected at most {max_length} characters",
+    "float_type": "expected a number",
+    "float_parsing": "expected a number",
+    "finite_number": "expected a finite number",
+    "int_type": "expected a whole number",
+    "int_parsing": "expected a whole number",
+    "int_from_float": "expected a whole number",
+    "bool_type": "expected true or false",
+    "bool_parsing": "expected true or false",
+    "literal_error": "expected {expected}",
+    "enum": "expected {expected}",
+    "greater_than": "expected more than {gt}",
+    "greater_than_equal": "expected at least {ge}",
+    "less_than": "expected less than {lt}",
+    "less_than_equal": "expected at most {le}",
+    "too_short": "expected at least {min_length} values",
+    "too_long": "expected at most {max_length} values",
+    # A check of planfly raises its own error with its own message.
+    "value_error": "{error}",
+}
+
+
+def expected_values(error_entry: Mapping[str, Any]) -> str:
+    """Return the expected values of a field, from one entry of a pydantic error's list; pydantic's words if unknown."""
+    template = _EXPECTED_VALUES.get(error_entry["type"])
+    if template is None:
+        return str(error_entry["msg"])
+    context = error_entry.get("ctx", {})
+    if "expected" in context:
+        context = {"expected": context["expected"].replace("'", '"')}
+    return re.sub(r"\b1 (value|character)s$", r"1 \1", template.format(**context))
 
 
 # Tables of the ends of a flight, which a scenario for a mission needs, too.

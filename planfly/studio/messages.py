@@ -8,6 +8,8 @@ from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
+from world.scenario_file import expected_values
+
 # Maximum length of a message, characters.
 MAX_MESSAGE_CHARACTERS = 256 * 1024
 # Maximum length of a message with a dropped file, which is sent as text, characters.
@@ -227,10 +229,10 @@ def describe_error(error: ValidationError) -> str:
     ...     read_message('{"kind": "raise", "rev": 1, "by": 1e9}')
     ... except ValidationError as error:
     ...     describe_error(error)
-    'raise: by: Input should be less than or equal to 9000'
+    'raise: by: expected at most 9000.0'
     """
-    first = error.errors(include_url=False, include_context=False, include_input=False)[0]
-    return f"{': '.join(map(str, first['loc']))}: {first['msg']}" if len(first["loc"]) > 1 else ""
+    first = error.errors(include_url=False, include_input=False)[0]
+    return f"{': '.join(map(str, first['loc']))}: {expected_values(first)}" if len(first["loc"]) > 1 else ""
 
 
 def message_schema() -> dict[str, Any]:

@@ -195,7 +195,7 @@ def _without(key: str) -> Callable[[dict[str, Any]], None]:
     ("change", "message"),
     [
         (lambda data: data.update(schema="planfly.plan/2"), r"^p\.json: schema: .*planfly\.plan/1"),
-        (_without("certificate"), r"^p\.json: certificate: Field required"),
+        (_without("certificate"), r"^p\.json: certificate: missing"),
         (lambda data: data.update(colour=1), r"^p\.json: colour: "),
         (lambda data: data.update(seed=-1), r"^p\.json: seed: -1: "),
         (lambda data: data.update(ended="tired"), r"^p\.json: ended: "),
@@ -205,7 +205,7 @@ def _without(key: str) -> Callable[[dict[str, Any]], None]:
         (lambda data: data["waypoints_east_north_amsl_m"].insert(1, [5e5 + 1, 0, 0]), r"amsl_m\.1\.0: 500001"),
         (lambda data: data["violations"].pop("turn"), r"^p\.json: violations: \['bounds', 'slope', 'terrain'\]"),
         (lambda data: data["objectives"].update(beauty=1.0), r"^p\.json: objectives: \['beauty', "),
-        (lambda data: data["scenario"].pop("terrain"), r"^p\.json: terrain: Field required"),
+        (lambda data: data["scenario"].pop("terrain"), r"^p\.json: terrain: missing"),
     ],
 )
 def test_one_fault_one_line(change: Callable[[dict[str, Any]], object], message: str) -> None:

@@ -31,7 +31,7 @@ CASES: dict[str, tuple[str, str, str]] = {
     ),
     "a table mistaken": ("", "[wnd]\nspeed_mps = 3", "wnd: unknown key: did you mean 'wind'?"),
     "unknown table": ("", "[weather]\nrain = 1", "weather: unknown key"),
-    "missing name": ('name = "small"', "", "name: Field required"),
+    "missing name": ('name = "small"', "", "name: missing"),
     "a number of 9000 digits": ("amsl_m = 400", f"amsl_m = 1{'0' * 9000}", "not valid TOML"),
     "ends on one another": (
         "east_m = 4000",
@@ -41,7 +41,7 @@ CASES: dict[str, tuple[str, str, str]] = {
     "a fault in the second threat": (
         "",
         THREAT + THREAT + "name = 3",
-        "threats.1.name: 3: Input should be a valid str",
+        "threats.1.name: 3: expected text",
     ),
     "no terrain": ('kind = "flat"\namsl_m = 200', 'kind = "none"', 'terrain.kind: "none": allowed are'),
     "no terrain but a hash": (
@@ -67,18 +67,18 @@ def test_one_fault_one_line(case: str, tmp_path: Path) -> None:
     [
         (
             b"",
-            "name: Field required (also missing: terrain, start, destination); tables [start] and [destination] need ",
+            "name: missing (also missing: terrain, start, destination); tables [start] and [destination] need ",
         ),
         (
             b'[landing]\neast_m = 0\nnorth_m = 0\n[terrain]\nkind = "dem"\npath = "jacksboro"\n',
-            "name: Field required (also missing: start, destination); tables [start] and [destination] need east_m and"
+            "name: missing (also missing: start, destination); tables [start] and [destination] need east_m and"
             " north_m, or lat_deg and lon_deg, and amsl_m or height_m",
         ),
         (b"\x00\x01\x02\xff\xfe" * 50, "not a text file in UTF-8"),
         (b"\x89HDF\r\n\x1a\n" + bytes(200), "not a text file in UTF-8"),
         (bytes(300), "not valid TOML"),
         (b"limits = 5\n" + SMALL.encode(), "limits: 5: expected a table"),
-        (b"threats = 5\n" + SMALL.encode(), "threats: 5: Input should be a valid list"),
+        (b"threats = 5\n" + SMALL.encode(), "threats: 5: expected a list"),
         (b"x = " + b"[" * 100_000, "not valid TOML"),
     ],
 )

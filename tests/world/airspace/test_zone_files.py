@@ -357,7 +357,7 @@ BAD_FILES = {
         json.dumps(LAKE).replace('"name"', '"kind": "prohibited", "name"').encode(),
         'feature (lake): kind: "prohibited"',
     ),
-    "name.geojson": (json.dumps(LAKE).replace('"lake"', "7").encode(), "feature: name: 7: Input should be a valid str"),
+    "name.geojson": (json.dumps(LAKE).replace('"lake"', "7").encode(), "feature: name: 7: expected text"),
     "band.geojson": (
         json.dumps(LAKE).replace('"name"', '"floor_agl_m": 90, "name"').encode(),
         "feature (lake): ceiling_agl_m: 90: must be above floor_agl_m 90",
