@@ -109,7 +109,7 @@ BAD_PLAN = {
     "long-integer": (json.dumps(plan_data()).replace("36.5", "9" * 400), "mission.items.0.params.4"),
     "other-file": (with_key("fileType", "Mission"), 'fileType: "Mission": expected "Plan"'),
     "version": (with_key("version", 3), "version: 3"),
-    "no-mission": ({"fileType": "Plan", "version": 1}, "mission: Field required"),
+    "no-mission": ({"fileType": "Plan", "version": 1}, "mission: missing"),
     "mission-version": (with_key("mission.version", 1), "mission.version: 1"),
     "no-items": (with_key("mission.items", []), "mission.items: no items"),
     "items-null": (with_key("mission.items", None), "mission.items: null"),
