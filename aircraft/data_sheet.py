@@ -715,7 +715,7 @@ def _solve_motor(
 
 
 def _motor_with_typical_losses(propeller: Propeller, volts: float, emf: float, cruise: float) -> ElectricMotor:
-    """Return a motor with the losses of the Aerosonde's motor, relative to the power in cruise.
+    """Return a motor with the relative losses of the Aerosonde's motor at full throttle in cruise.
 
     volts: battery voltage, V.
     emf: back-emf constant, V s/rad.

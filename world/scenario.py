@@ -829,11 +829,12 @@ def in_forecast_member(scenario: Scenario, forecast: Forecast, member: int) -> S
 
 
 def with_link(scenario: Scenario, **entries: Any) -> Scenario:
-    """Return a scenario with changed entries of [link]; a value of None keeps the present value.
+    """Return a scenario with a changed radio link; a value of None keeps the present value.
 
-    entries: values by the keys of [link].
+    entries: values by the keys of the scenario's [link] table.
 
-    A position in degrees replaces a position in metres.  The terrain of an elevation file is read up to the station.
+    A position in degrees replaces a position in metres. If the ground station is outside the terrain that was read from
+    an elevation file, the terrain is read again so that it includes the station.
     Raises ScenarioError for an entry that is not allowed in a scenario file, and for a link without frequency, power or
     sensitivity. Raises TerrainError for an elevation file that cannot be read.
 

@@ -84,12 +84,12 @@ class PointMass(NamedTuple):
 def make_point_mass(
     aircraft: Aircraft, envelope: Envelope, airspeed: float, wind: Wind, geo_map: PolyMap | None = None
 ) -> PointMass:
-    """Return the point mass of an aircraft from its trims, in a wind.
+    """Return a point-mass model of an aircraft, from its table of trimmed states, in a wind.
 
     airspeed: commanded equivalent airspeed, m/s.
     geo_map: map from east and north to longitude and latitude, deg; without it, only the mean wind is used.
 
-    Beyond the grid of trims, the values at the grid's edge apply.
+    Outside the table's airspeeds and altitudes, the values at its edge apply.
     """
     speeds, excess, alpha, lift, glides = _load_trim_tables(aircraft)
     has_power = bool(envelope.power_level.size)

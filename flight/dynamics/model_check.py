@@ -121,7 +121,11 @@ class _Reader:
         self._declares = name == "property" and depth == (2 if self._main else 1)
 
     def _end_element(self, name: str) -> None:
-        """Record the end of a removed channel, or the property that the text of an element creates or reads."""
+        """Handle an end tag of the parsed JSBSim model.
+
+        Inside a channel that is to be removed, the end of the channel completes its span of bytes. Elsewhere, if the
+        element's text is the name of a property, the name is recorded as created or as read.
+        """
         self._path.pop()
         match = _PROPERTY_NAME.fullmatch("".join(self._text).strip())
         self._text = []

@@ -820,8 +820,9 @@ def _tightest_circle_radius(limits: Limits | None, airspeed: float, up: float) -
 def _spiral_slope_function(limits: Limits | None) -> SpiralSlopes:
     """Return a function that computes the steepest climb and descent of a spiral, as tangents.
 
-    Both are a fraction of the aircraft's slope limit on the course of the spiral where this limit is lowest. A climb
-    or descent without a limit, or that the aircraft cannot fly, has the slope `DEFAULT_SPIRAL_SLOPE`.
+    In wind, the aircraft's slope limit depends on the course. A spiral passes through all courses, so the lowest limit
+    of eight courses counts, reduced by `SPIRAL_SLOPE_FRACTION`. The slope is `DEFAULT_SPIRAL_SLOPE` if there is no
+    limit, or if the aircraft cannot climb or descend at all.
     """
 
     def slopes(airspeed: float, up: float) -> tuple[float, float]:

@@ -110,7 +110,10 @@ def draw_scene(view: SceneView) -> Figure:
 
 
 def _widen_bounds(bounds: Floats) -> Floats:
-    """Widen the bounds (m, (2, 2)) of a narrow scene to the smallest allowed ratio of the sides."""
+    """Widen the shorter side of a map's bounds until its ratio to the longer side is at least `_MIN_SIDE_RATIO`.
+
+    bounds: minimum and maximum east, minimum and maximum north, (2, 2), m.
+    """
     sides = np.ptp(bounds, axis=1)
     widening = 0.5 * np.maximum(_MIN_SIDE_RATIO * sides.max() - sides, 0.0)
     return np.asarray(bounds + np.stack([-widening, widening], axis=1))

@@ -288,7 +288,7 @@ def zone_shapes(zones: tuple[Zone, ...]) -> tuple[Layer, ...]:
 def zone_labels(zones: tuple[Zone, ...]) -> tuple[Label, ...]:
     """Return labels of zones: exclusion zones at the center, inclusion zones at the northernmost corner.
 
-    More than `_MAX_ZONE_NAMES` zones have no labels.
+    Returns no labels if there are more than `_MAX_ZONE_NAMES` zones.
     """
     if len(zones) > _MAX_ZONE_NAMES:
         return ()

@@ -243,17 +243,18 @@ def _find_nearby_units(threat_cells: ThreatCells, size: int, block: Record) -> N
 
 @inlined
 def _add_exposures(spheres: Records, units: Int32s, size: int, block: Record) -> None:
-    """Add the kill and detection exposure of the points to nearby threats.
+    """Add to each path's sums how much its current point is exposed to kill and detection by nearby threats.
 
     These are eqs. 9 and 10 of Yang, Tang and Lozano 2014.
 
-    spheres: centres, radii and scales of the threats.
-    units: numbers of the threats near each cell, one cell after another.
+    spheres: centres, radii and scales of all threats.
+    units: one array of threat indices for all map cells: the threats near the first cell, then those near the second.
     size: number of paths in the block.
-    block: one point of each path of the block, with its part of `units`; its sums are updated.
+    block: one point of each path. `first` and `count` say which entries of `units` belong to the point's cell. `sums`
+        is updated.
 
-    Round k treats the k-th threat of every list that has one. Within a round no branch depends on the contents of a
-    list, because the processor could not predict it.
+    The loop goes through the threats in rounds: round 0 adds the first threat near each point, round 1 the second. This
+    avoids branches that the processor cannot predict.
     """
     east, north, up = block.point.east, block.point.north, block.point.up
     kill, detection = block.sums.kill, block.sums.detection

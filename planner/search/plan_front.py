@@ -483,7 +483,10 @@ def noise_directions(inner_count: int, scales: Floats) -> Floats:
 
 
 def noticeable_gains(default: FrontPlan, fourth: str) -> Floats:
-    """Return the smallest noticeable gain over a default plan in each objective, (4,)."""
+    """Return the smallest gain over the default plan that counts as a different plan, for each objective, (4,).
+
+    The objectives are length (m), radar exposure (s), clearance (m), and the one that `fourth` names.
+    """
     length, exposure, _, fourth_value = _objective_row(default, fourth)
     exposure_gain = NOTICEABLE_EXPOSURE_FRACTION * max(MIN_EXPOSURE_S, exposure)
     return np.array(

@@ -130,9 +130,11 @@ def _closed_heights(zones: ZonesWithMargins, line: MapSegment, lateral: float, g
 
 @inner
 def _step_slopes(data: ProblemArrays, frame: RotatedFrame, step: float, amsl: float, fraction: float) -> Floats:
-    """Return tangents of the steepest climb and dive, (sideways, 2), by the cells across per stage.
+    """Return the tangents of the steepest climb and dive for each direction in which a path may continue.
 
-    step: length of a step along the line, m.
+    Returns (2 * MAX_SIDE + 1, 2): row `MAX_SIDE + k` is the step that goes one cell forward and k cells to the side.
+
+    step: length of a cell, m.
     amsl: altitude of the slope limits, m.
     fraction: fraction of the limits that may be used.
     """

@@ -173,10 +173,10 @@ class Px4(Autopilot):
 
     @classmethod
     def load(cls, table: FlightTable, aircraft: Aircraft, scenario: str) -> Self:
-        """Return the autopilot with parameters from the user's file, the aircraft's file, and the defaults.
+        """Return a PX4 with the user's parameters, else those of the aircraft's file, else the defaults.
 
-        The simulated release is the first known of: the release that the table states, the release that wrote the file,
-        the newest release.
+        The PX4 release to simulate is taken from the [flight] table if it states one, else from the comment in the
+        parameter file, else the newest release is simulated. `scenario` is part of the interface and is not used.
         """
         writer_release = None
         if table.params is not None:

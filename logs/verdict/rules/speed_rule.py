@@ -191,7 +191,10 @@ def _find_held_speed(
 
 
 def _uncertainty_text(requirements: RouteRequirements, leg: int, commanded: float, max_speed: float) -> str:
-    """State the uncertain maximum airspeed if the commanded speed exceeds its certain part; otherwise ""."""
+    """Compare a commanded airspeed with the maximum airspeed and its standard deviation, as text.
+
+    Returns "" if the commanded airspeed is below the maximum even after a margin for this uncertainty.
+    """
     envelope = requirements.setup.envelope
     if not envelope.fastest_sd:
         return ""

@@ -114,7 +114,9 @@ def _make_flown_cells(track: Track | None, heights_above_ground: Floats | None, 
 
 
 def _describe_judged_part(setup: FlightSetup) -> str:
-    """Describe the part of a flight on whose legs the required height above ground applies in full.
+    """State in which phases the required height above ground applies: after take-off, before landing.
+
+    Returns "" for a flight without take-off and landing.
 
     >>> from logs.recording.example_log import example_log
     >>> _describe_judged_part(example_log().setup)

@@ -154,7 +154,7 @@ def _count_needed_decimals(finding: Finding) -> int | None:
 
 
 def missed_text(finding: Finding) -> str:
-    """Return the distance of a failed finding from the values that pass; "" if no limit decides it."""
+    """State by how much a failed finding misses its limit, with the unit; "" if the finding has no limit."""
     if finding.ok is not False or finding.margin is None or finding.effective_limit is None:
         return ""
     distance = -finding.margin - (finding.tolerance or 0.0)
