@@ -92,7 +92,7 @@ class _Reader:
         """Refuse a document type with internal declarations, unless JSBSim ships the model."""
         # A declaration that only names a document type is never read; JSBSim's own files hold a few harmless entities.
         if internal and not self._remove_channels:
-            self._refuse_model("a document type declaration may expand without end")
+            self._refuse_model("a document type declaration may expand without limit")
 
     def _start_element(self, name: str, attributes: dict[str, str]) -> None:
         """Record the files and properties that an element names; refuse a forbidden element."""

@@ -260,7 +260,7 @@ SUPPORT: dict[Command, Support] = {
     C.NAV_LOITER_UNLIM: Support(
         _FLOWN,
         _FLOWN,
-        "a loiter without end; one minute and at least one lap of it are flown. A height of 0 m keeps the altitude of "
+        "an unlimited loiter; one minute and at least one lap of it are flown. A height of 0 m keeps the altitude of "
         "the item before, in all four loiters, as in ArduPlane (`Location::sanitize`); with PX4 it is not judged",
     ),
     C.NAV_LOITER_TURNS: Support(_FLOWN, _REFUSED, "a loiter for a number of turns"),

@@ -162,7 +162,7 @@ def fence_problem(
     >>> circle = MissionItem(0, Command.NAV_FENCE_CIRCLE_INCLUSION, Frame.GLOBAL, radius, 36.5, -84.2, 0.0)
     >>> origin = GeoOrigin(36.5, -84.2)
     >>> fence_problem((circle,), origin, east=0.0, north=600.0)
-    ('outside an inclusion circle of 500 m', 0)
+    ('outside an inclusion circle of radius 500 m', 0)
     >>> fence_problem((circle,), origin, east=0.0, north=400.0) is None
     True
     """
@@ -177,7 +177,7 @@ def fence_problem(
             name = "polygon"
         else:
             is_inside = math.hypot(east - float(corners_east[0]), north - float(corners_north[0])) <= item.params[0]
-            name = f"circle of {item.params[0]:.0f} m"
+            name = f"circle of radius {item.params[0]:.0f} m"
         if is_inside == (item.command in INCLUSIONS):
             is_in_inclusion |= is_inside
             continue

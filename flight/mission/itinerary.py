@@ -51,7 +51,7 @@ _MAX_JUMPS_IN_A_ROW_ARDUPLANE = 65
 # passed (`AP_Mission::advance_current_nav_cmd`, `max_loops`).
 _MAX_COMMANDS_IN_A_ROW_ARDUPLANE = 257
 
-# Minimum simulated duration of a loiter without end, s; at least one lap is flown, and the mission ends there.
+# Minimum simulated duration of an unlimited loiter, s; at least one lap is flown, and the mission ends there.
 ENDLESS_LOITER_TIME_S = 60.0
 
 # Note on items after a mission's end.
@@ -69,7 +69,7 @@ class Loiter:
         to the next position.
     timed: True if the item states a time, even 0.
     to_altitude: True if the loiter lasts until the item's altitude is reached.
-    endless: True if the item states a loiter without end, of which ``seconds`` and at least one lap are simulated.
+    endless: True if the item states an unlimited loiter, of which ``seconds`` and at least one lap are simulated.
     exits_on_course: True if the item states an exit on the course to the next stop. Only PX4 reads it; ArduPlane always
         exits on that course.
     exits_on_tangent: True if the item states that the line to the next stop starts on the circle (PX4) or at the exit
@@ -321,7 +321,7 @@ def make_itinerary(mission: Mission, *, resets_jump_counters: bool = False) -> I
     if steps.endless is not None:
         name = command_name(mission.items[steps.index[steps.endless]].command)
         builder.notes.add(
-            f"{name} repeats without end: its items are flown once more, and the simulated flight ends there",
+            f"{name} repeats indefinitely: its items are flown once more, and the simulated flight ends there",
             steps.endless,
         )
     _add_command_limits(mission, steps, builder)

@@ -72,7 +72,7 @@ class LoiterRules:
     holds_height: True if the autopilot holds its altitude on the leg to a loiter to an altitude.
     max_climb_rate, max_sink_rate: in a loiter, m/s.
     altitude_tolerance: altitude tolerance, m.
-    ends_in_circle: True if the autopilot loiters without end about a mission's last waypoint.
+    ends_in_circle: True if the autopilot loiters indefinitely about a mission's last waypoint.
     unflown_note: note on parts of loiters that are not simulated; "" for none.
     rtl_exit_note: note on the exit from a loiter before an RTL, if the route has another exit.
 

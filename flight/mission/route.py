@@ -114,7 +114,7 @@ class Route:
         item, each with the circle's radius.
     started: description of the flight's start.
     notes: parts that cannot be flown as written, with item numbers.
-    endless_jump: seq of a jump that repeats the last loop without end, or None.
+    endless_jump: seq of a jump that repeats the last loop indefinitely, or None.
     takeoff_ground, landing_ground: altitude of the ground at take-off and at the landing point, m, above which the
         flight starts and ends; None without such a point or if unknown.
     rtl_start: index of the waypoint at which an RTL starts, or None; the waypoints from there to `rtl_end` represent

@@ -398,7 +398,7 @@ def _check_vehicle(kind: int | None, source: str) -> None:
             allowed = f"{name}: planfly flies fixed-wing aircraft (1)"
             raise MissionError.at(source, "mission.vehicleType", kind, allowed)
     if kind is not None and kind not in _FIXED_WING_TYPES:
-        allowed = "another vehicle (MAV_TYPE): planfly flies fixed-wing aircraft (1)"
+        allowed = "not a fixed-wing aircraft: expected 1 (MAV_TYPE_FIXED_WING)"
         raise MissionError.at(source, "mission.vehicleType", kind, allowed)
 
 

@@ -268,10 +268,10 @@ class RunningFlight:
     def _timeout_text(self) -> str:
         """Return the end reason of a flight that exceeded its time limit; it names the item of a current loiter."""
         route, next_waypoint = self.setup.route, min(int(self.guidance_memory.leg) + 1, self.setup.route.legs)
-        time_text = f"not finished after {self.max_ticks * self.dt:.0f} s"
+        text = f"time limit of {self.max_ticks * self.dt:.0f} s reached"
         if route.arc_radii[next_waypoint] > 0.0 and route.rtl_start is None:
-            return f"circled: at the loiter of item {route.items[next_waypoint]}, {time_text}"
-        return f"time limit: {time_text}"
+            return f"{text} in the loiter of item {route.items[next_waypoint]}"
+        return text
 
 
 def _extra_loiter_length(setup: FlightSetup, waypoints: Records) -> float:

@@ -39,7 +39,7 @@ def finding_words(finding: Finding) -> RuleWords:
 
 
 def finding_heading(finding: Finding) -> str:
-    """Return the rule of a finding and its place, such as "slope at leg 7, to item 9"."""
+    """Return the rule of a finding and its place, such as "slope at leg 7 (to item 9)"."""
     word = finding_words(finding).word
     # The place of a fence item already begins with the rule's name.
     return finding.where if finding.where.startswith(f"{word} ") else noun_with_place(word, finding.place)

@@ -93,7 +93,7 @@ def undecided_text(findings: Sequence[Finding]) -> str:
     >>> from logs.verdict.places import Place
     >>> legs = (Place("leg", k, to_item=k + 1) for k in range(2))
     >>> undecided_text([make_finding("slope", leg, ok=None, reason="", check=UNKNOWN_AIRCRAFT) for leg in legs])
-    "slopes on leg 0, to item 1, and leg 1, to item 2, are too close to the limit to judge, because the aircraft's ..."
+    "slopes on leg 0 (to item 1) and leg 1 (to item 2) are too close to the limit to judge, because the aircraft's ..."
     """
     open_findings = undecided_findings(findings)
     paths = [

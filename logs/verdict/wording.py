@@ -41,7 +41,7 @@ def place_text(place: Place) -> str:
     >>> [place_text(place) for place in (Place("waypoint", 3, item=4), Place("missile", 0, name="Alfa"), Place("plan"))]
     ['waypoint 3 (item 4)', 'Alfa (missile)', 'plan']
     >>> place_text(Place("exclusion", 0, name="town")), place_text(Place("leg", 7, to_item=9))
-    ('town (exclusion)', 'leg 7, to item 9')
+    ('town (exclusion)', 'leg 7 (to item 9)')
     >>> place_text(Place("waypoint", 11, item=4, number=3))
     'waypoint 3 (item 4)'
     """
@@ -54,7 +54,7 @@ def place_text(place: Place) -> str:
         case Place("exclusion" | "inclusion"):
             return f"{place.name} ({place.kind})"
         case Place("leg", index=int(), to_item=int(item)):
-            return f"leg {number}, to item {item}"
+            return f"leg {number} (to item {item})"
         case Place(kind, index=int(), item=int(item)):
             return f"{kind} {number} (item {item})"
         case Place(kind, index=int()):
@@ -62,22 +62,11 @@ def place_text(place: Place) -> str:
     return place.kind
 
 
-def place_text_within(place: Place) -> str:
-    """Return the name of a place for use within a sentence, with the item of a leg between commas.
-
-    >>> place_text_within(Place("leg", 7, to_item=9))
-    'leg 7, to item 9,'
-    """
-    return place_text(place) + ("," if place.to_item is not None else "")
-
-
-def noun_with_place(noun: str, place: Place, *, within: bool = False) -> str:
+def noun_with_place(noun: str, place: Place) -> str:
     """Name the rule of a finding and its place, unless that is the whole flight, plan or mission.
 
-    within: True for use within a sentence, with the item of a leg between commas.
-
     >>> noun_with_place("slope", Place("leg", 7, to_item=9)), noun_with_place("energy", Place("flight"))
-    ('slope at leg 7, to item 9', 'energy')
+    ('slope at leg 7 (to item 9)', 'energy')
     >>> noun_with_place("mission", Place("mission", item=3)), noun_with_place("mission", Place("mission"))
     ('mission item 3', 'mission')
     >>> noun_with_place("waypoint", Place("waypoint", 12, item=14))
@@ -85,7 +74,7 @@ def noun_with_place(noun: str, place: Place, *, within: bool = False) -> str:
     """
     if place.kind in ("flight", "plan") or (place.kind == "mission" and place.item is None):
         return noun
-    name = place_text_within(place) if within else place_text(place)
+    name = place_text(place)
     if place.kind == "mission":
         return f"{noun} {name}"
     return name if noun == place.kind else f"{noun} at {name}"
@@ -112,7 +101,7 @@ def change_text(change: Change) -> str:
     >>> change_text(Change("descent", Place("leg", 3), None, 12.0, "m"))
     'lower both ends of leg 3 by 12 m'
     >>> change_text(Change("descent", Place("leg", 3, to_item=5), None, 12.0, "m"))
-    'lower both ends of leg 3, to item 5, by 12 m'
+    'lower both ends of leg 3 (to item 5) by 12 m'
     >>> change_text(Change("descent", Place("waypoint", 4, item=5), None, 12.0, "m"))
     'lower waypoint 4 (item 5) by 12 m'
     >>> change_text(Change("radius", Place("waypoint", 4, item=5), 80.0, 94.0, "m"))
@@ -120,7 +109,7 @@ def change_text(change: Change) -> str:
     >>> change_text(Change("full throttle", Place("leg", 3), None, 20.0, "s"))
     'fly a climb of 20 s at full throttle and give its log to planfly aircraft --identify'
     """
-    place_name, requested_value = place_text_within(change.place), change.wanted
+    place_name, requested_value = place_text(change.place), change.wanted
     match change.what:
         case "length":
             return f"lengthen {_length_text(change)}"
@@ -228,7 +217,7 @@ def _changed_texts(change: Change, digits: int = 0) -> tuple[str, str]:
 def _airspeed_text(change: Change, airspeed_text: str) -> str:
     """Phrase a change of airspeed as an instruction, such as "fly leg 1 at 20.5 m/s"."""
     if change.place.kind == "leg":
-        return f"fly {place_text_within(change.place)} at {airspeed_text}"
+        return f"fly {place_text(change.place)} at {airspeed_text}"
     where = f" through {place_text(change.place)}" if change.place.kind == "waypoint" else ""
     return f"fly{where} at {airspeed_text}"
 
@@ -245,7 +234,7 @@ def _rise_text(change: Change) -> str:
 def _length_text(change: Change) -> str:
     """State a leg with its present and its new length, such as "leg 1 from 150 m to 260 m"."""
     current = change.current or 0.0
-    place_name = place_text_within(change.place)
+    place_name = place_text(change.place)
     if current < MIN_LEG_LENGTH_M:
         return f"{place_name} to {change.wanted:.0f} m (it is vertical)"
     wanted_text, current_text = _changed_texts(change)
@@ -274,7 +263,7 @@ def suggestion_text(suggestion: Suggestion) -> str:
     'lengthen leg 1 from 150 m to 260 m and leg 2 from 150 m to 260 m'
     >>> moves = (ItemMove(3, 0.0, 412.0, 0.0),)
     >>> suggestion_text((Change("north", Place("exclusion", 0, name="town"), None, 40.0, "m", moves=moves),))
-    'pass town 40 m further north, with a move of 412 m (move item 3 by 412 m north)'
+    'pass town 40 m further north, with a move of 412 m (move item 3 north by 412 m)'
     """
     if all(change.what == "terrain height" for change in suggestion):
         text = _terrain_height_text(suggestion)
@@ -342,20 +331,20 @@ def moves_text(moves: Sequence[ItemMove]) -> str:
     """List moves of items; items with the same move are named together.
 
     >>> moves_text([ItemMove(8, -1.96, 48.9, 0.0), ItemMove(9, 0.0, 0.0, -6.5), ItemMove(10, 0.0, 0.0, -6.5)])
-    'item 8 by 48.9 m north and 2 m west, items 9 and 10 by 6.5 m down'
+    'item 8 north by 48.9 m and west by 2 m, items 9 and 10 down by 6.5 m'
     >>> moves_text([ItemMove(item, 40.0, 0.0, 12.0) for item in (3, 4, 5, 9)])
-    'items 3 to 5 and 9 by 40 m east and 12 m up'
+    'items 3 to 5 and 9 east by 40 m and up by 12 m'
     """
     items_by_offset: dict[str, list[int]] = {}
     for move in sorted(moves, key=lambda move: move.item):
         sides = (move.north, "north", "south"), (move.east, "east", "west"), (move.up, "up", "down")
         steps = [
-            f"{round(abs(step), 1):g} m {positive if step > 0.0 else negative}"
+            f"{positive if step > 0.0 else negative} by {round(abs(step), 1):g} m"
             for step, positive, negative in sides
             if round(abs(step), 1) > 0.0
         ]
         items_by_offset.setdefault(_join_with_and(steps), []).append(move.item)
-    return ", ".join(f"{_items_text(items)} by {offset}" for offset, items in items_by_offset.items())
+    return ", ".join(f"{_items_text(items)} {offset}" for offset, items in items_by_offset.items())
 
 
 def _items_text(items: Sequence[int]) -> str:
@@ -401,7 +390,7 @@ def disagreement_text(disagreement: Disagreement) -> str:
     """
     verbs = {True: "passes", False: "fails"}
     rule_noun = RULE_NOUNS.get(disagreement.rule, disagreement.rule)
-    rule_and_place = noun_with_place(rule_noun, disagreement.place, within=True)
+    rule_and_place = noun_with_place(rule_noun, disagreement.place)
     counterpart = FLOWN_COUNTERPARTS.get(disagreement.rule) if disagreement.level == "geometry" else None
     conjunction = f", and {counterpart}, its counterpart," if counterpart else " and"
     return (

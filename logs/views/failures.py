@@ -42,7 +42,7 @@ class Failures:
         """Return the name of a leg or a waypoint in the verdict.
 
         >>> Failures({7: ("slope",)}, {}, places={("leg", 7): Place("leg", 7, to_item=9)}).place_name("leg", 7)
-        'leg 7, to item 9'
+        'leg 7 (to item 9)'
         >>> Failures({7: ("slope",)}, {}).place_name("leg", 7)
         'leg 7'
         """

@@ -61,7 +61,7 @@ def leg_names(setup: FlightSetup) -> list[str]:
 
     >>> from logs.recording.example_log import example_log
     >>> leg_names(example_log().setup)[0]
-    'leg 0, to item 2'
+    'leg 0 (to item 2)'
     """
     items = setup.route.items.tolist()
     numbers = setup.route.leg_numbers.tolist()

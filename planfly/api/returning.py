@@ -153,7 +153,8 @@ class ReturnsResult:
     def notes(self) -> tuple[str, ...]:
         """Notes on how the returns were flown."""
         notes = [
-            f"returns are simulated in the mean wind, by {self.returns.autopilot}'s control laws flying a point mass"
+            "returns are simulated in the mean wind, with a point-mass model under"
+            f" {self.returns.autopilot}'s control laws"
         ]
         if self.returns.jsbsim_differences:
             max_difference = max(abs(difference) for difference in self.returns.jsbsim_differences)

@@ -78,7 +78,7 @@ def add_check_parser(command_line: LineParser) -> None:
     group.add_argument(
         "--geometry",
         action="store_true",
-        help="judge a mission only by its geometry and the aircraft's envelope, without a flight (quick)",
+        help="judge a mission only by its geometry and the aircraft's envelope, without simulating the flight (fast)",
     )
     add_result_options(parser, junit=True)
 

@@ -100,7 +100,7 @@ def return_law_lines(setup: FlightSetup) -> list[str]:
         return []
     world = make_return_world(setup)
     behaviour, unjudged = world.autopilot.returns, world.unjudged_parts
-    lines = [f"returns to launch are simulated by {world.autopilot.title}'s control laws flying a point mass"]
+    lines = [f"returns to launch are simulated with a point-mass model under {world.autopilot.title}'s control laws"]
     lines += [behaviour.path_text] if behaviour.path_text else []
     if unjudged:
         extent = "in full" if world.is_simulated else "at all"

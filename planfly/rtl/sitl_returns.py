@@ -156,7 +156,7 @@ def check_is_arduplane(program: Path) -> None:
     """Raise ArgumentError for a program other than ArduPlane, whose returns planfly does not simulate."""
     autopilot_class = find_program_class(program)
     if not issubclass(autopilot_class, ArduPlaneSitl):
-        allowed = f"expected ArduPlane's program; returns of {autopilot_class.title} are not supported"
+        allowed = f"expected an ArduPlane executable; returns by a real {autopilot_class.title} are not supported"
         raise ArgumentError.of_argument("autopilot", str(program), allowed)
 
 

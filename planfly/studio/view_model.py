@@ -220,7 +220,7 @@ def _command_text(item: MissionItem) -> str:
     >>> _command_text(MissionItem(3, 178, 3, (0.0, 21.0, -1.0, 0.0), 0.0, 0.0, 0.0))
     'change speed: airspeed 21 m/s'
     >>> _command_text(MissionItem(8, 177, 3, (4.0, -1.0, 0.0, 0.0), 0.0, 0.0, 0.0))
-    'jump to item 4, without end'
+    'jump to item 4, indefinitely'
     >>> _command_text(MissionItem(9, 206, 3, (25.0, 0.0, 1.0, 0.0), 0.0, 0.0, 0.0))
     'set cam trigg dist (25, 0, 1, 0)'
     """
@@ -231,7 +231,7 @@ def _command_text(item: MissionItem) -> str:
         texts += [f"throttle {third:g} %"] if third >= 0.0 else []
         return f"change speed: {', '.join(texts) or 'no change'}"
     if item.command == Command.DO_JUMP:
-        count_text = "without end" if second < 0.0 else f"{second:g} time{'s' * (second != 1.0)}"
+        count_text = "indefinitely" if second < 0.0 else f"{second:g} time{'s' * (second != 1.0)}"
         return f"jump to item {first:g}, {count_text}"
     name = command_name(item.command).removeprefix("NAV_").removeprefix("DO_").replace("_", " ").lower()
     # Parameters of 0 and NaN are the defaults of a command.

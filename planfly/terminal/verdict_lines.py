@@ -33,7 +33,8 @@ def print_verdict(
     lines = verdict_lines(verdict, notes, lambda: setup is not None and has_geometric_suggestion(setup))
     if returns is not None and returns.line:
         is_warning = verdict.flyable and returns.has_failures
-        text = f"returns   {returns.line}{'; no return is required' if is_warning else ''}; more: planfly returns"
+        requirement = "; the scenario requires no safe return" if is_warning else ""
+        text = f"returns   {returns.line}{requirement}; details: planfly returns"
         lines.insert(1 if is_warning else len(lines), colour_text(text, "warning") if is_warning else text)
     print("\n".join(lines))
 

@@ -372,7 +372,7 @@ def _follow_ground(edited: _EditedMission, change: Change, _finding: Finding) ->
 
 
 def _end_with_loiter(edited: _EditedMission, change: Change, _finding: Finding) -> None:
-    """Turn the last waypoint into a loiter without end, so that the autopilot does not return by itself."""
+    """Turn the last waypoint into an unlimited loiter, so that the autopilot does not return by itself."""
     index = None if change.place.index is None else edited.item_index(change.place.index)
     if index is not None:
         items = list(edited.mission.items)

@@ -62,7 +62,7 @@ def take_off(rng: np.random.Generator, home: Floats, course: float, *, item: boo
         return None
     high = over(line(home, last))
     first = [f"0 22 15 0 0 0 0 0 {high:.1f}"] if item else []
-    # A loiter without end: nothing returns.
+    # An unlimited loiter: nothing returns.
     return [*first, row(16, next_place, high), row(17, last, high)]
 
 

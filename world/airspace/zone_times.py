@@ -104,7 +104,7 @@ def parse_time(text: str) -> datetime:
     try:
         moment = datetime.fromisoformat(text_at_midnight)
     except ValueError:
-        raise ValueError("expected a time in ISO 8601 format, as 2026-05-01T10:00+02:00") from None
+        raise ValueError("expected a time in ISO 8601 format, such as 2026-05-01T10:00+02:00") from None
     if moment.tzinfo is None:
         raise ValueError("no offset from UTC: write Z, or +02:00")
     try:

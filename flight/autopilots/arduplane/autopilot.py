@@ -679,7 +679,7 @@ _MAX_BYTE_RADIUS_M = 255.0
 def read_loiter_radius(loiter: Loiter) -> float:
     """Return the radius that ArduPlane reads from a loiter item, m; 0 if it uses WP_LOITER_RAD instead.
 
-    ArduPlane reads the radius of three kinds of loiter: by turns, to an altitude, and without end. In a loiter by time
+    ArduPlane reads the radius of three kinds of loiter: by turns, to an altitude, and unlimited. In a loiter by time
     it flies WP_LOITER_RAD, even if the time is zero. It then reads only the direction from the item, because
     `Plane::verify_loiter_time` does not pass the item's radius to `Plane::update_loiter`.
 

@@ -450,7 +450,7 @@ def control_as_ardupilot(
         guidance.is_in_rtl = is_last and (
             not target.loiters_to_altitude or abs(estimated.up - target.up) <= MISSED_ROUTE_DISTANCE_M
         )
-        # A loiter without end is flown for a minute and at least one lap.
+        # An unlimited loiter is flown for a minute and at least one lap.
         has_flown_enough = memory.loiter_time > ENDLESS_LOITER_TIME_S and memory.loiter_angle_sum >= 2.0 * math.pi
         loiters_forever = target.loiter_time == math.inf and has_flown_enough
         guidance.is_finished = is_last and (memory.loiter_complete or loiters_forever)

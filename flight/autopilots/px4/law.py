@@ -222,8 +222,8 @@ def _end_mission(
 ) -> None:
     """End the flight once the aircraft is past the last waypoint and near its altitude, or after a timeout.
 
-    If PX4 loiters without end at the mission's end (`MissionBase::setEndOfMissionItems`), the flight ends after one lap
-    of that loiter. A loiter before the last waypoint, in which PX4 corrects the altitude, does not end the flight.
+    If PX4 loiters indefinitely at the mission's end (`MissionBase::setEndOfMissionItems`), the flight ends after one
+    lap of that loiter. A loiter before the last waypoint, in which PX4 corrects the altitude, does not end the flight.
 
     estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
     last_waypoint: `WAYPOINT` record; at a loiter the flight is not ended here.

@@ -169,7 +169,7 @@ def _navigate_waypoint(
     """Follow the leg to a waypoint, and begin the next leg once the waypoint is reached.
 
     If the aircraft is too high or too low at the waypoint, it loiters there first. At the last waypoint of a mission it
-    loiters without end: about the waypoint, or up to 1.16 about the position at which it reached the waypoint.
+    loiters indefinitely: about the waypoint, or up to 1.16 about the position at which it reached the waypoint.
 
     estimated: position and velocity over the ground, a `MOTION` record.
     waypoints, target_index: `WAYPOINT` records of the route, (w,), and the index of the waypoint.

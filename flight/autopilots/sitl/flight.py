@@ -68,7 +68,7 @@ def autopilot_tick(block: Floats, heights: Heights) -> int:
     block.
 
     The flight may be complete once the program reports that it flies to its last item. Usually it completes where the
-    aircraft passes the end of the path. An RTL completes in its loiter. A loiter without end completes after
+    aircraft passes the end of the path. An RTL completes in its loiter. An unlimited loiter completes after
     `ENDLESS_LOITER_TIME_S` and one lap, and a loiter about the last waypoint after one lap.
     """
     work = block[:WORKSPACE_NUMBERS].view(WORKSPACE)[0]
@@ -130,7 +130,7 @@ def place_on_path(true: Record, pieces: Records, nodes: Records, memory: Record)
 
 @inner
 def update_endless_loiter(true: Record, corner: Record, memory: Record, dt: float) -> None:
-    """Update the time and angle flown on a loiter without end, and finish the flight when it is complete.
+    """Update the time and angle flown on an unlimited loiter, and finish the flight when it is complete.
 
     The loiter is complete after `ENDLESS_LOITER_TIME_S` and one lap. Time and angle are counted from the moment when
     the aircraft is near the circle and moves mainly around the center, in the loiter's direction. From then on they are

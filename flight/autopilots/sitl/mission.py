@@ -3,9 +3,9 @@
 Items that a flight from air to air cannot contain, a take-off or a landing, become waypoints where the route has them.
 An extra waypoint, 1 km straight on after the last, keeps the autopilot on its course to the route's end: it accepts a
 waypoint a radius early, and returns to launch after the last one.  A mission that ends with an RTL has the RTL at its
-end, or before the landing sequence that follows it, and its rally points are uploaded too.  A loiter without end at the
+end, or before the landing sequence that follows it, and its rally points are uploaded too.  An unlimited loiter at the
 mission's end is uploaded unchanged; planfly ends the flight after a minute and one lap of it.  An autopilot that
-loiters without end about the last waypoint gets no extra waypoint either.
+loiters indefinitely about the last waypoint gets no extra waypoint either.
 """
 
 import math

@@ -34,7 +34,7 @@ _SINGULAR_TEXTS: dict[Kind, str] = {
     "power": "may use more energy than allowed, because the aircraft's power is uncertain",
     "used": "cannot be judged by energy, because the energy used before it is unknown",
     "unsure": "cannot be judged because the point mass and JSBSim disagree",
-    "low": "comes lower than {limit:.0f} m above ground",
+    "low": "descends below {limit:.0f} m above ground",
 }
 _PLURAL_TEXTS: dict[Kind, str] = {
     "ground": "hit the ground",
@@ -46,7 +46,7 @@ _PLURAL_TEXTS: dict[Kind, str] = {
     "power": "may use more energy than allowed, because the aircraft's power is uncertain",
     "used": "cannot be judged by energy, because the energy used before it is unknown",
     "unsure": "cannot be judged because the point mass and JSBSim disagree",
-    "low": "come lower than {limit:.0f} m above ground",
+    "low": "descend below {limit:.0f} m above ground",
 }
 # Legend text of a path segment from which returns have this outcome.
 _SEGMENT_NAMES: dict[Kind, str] = {
@@ -59,7 +59,7 @@ _SEGMENT_NAMES: dict[Kind, str] = {
     "power": "a return is not judged: power uncertain",
     "used": "a return is not judged: energy used before unknown",
     "unsure": "a return is not judged: the point mass and JSBSim disagree",
-    "low": "a return comes lower than required",
+    "low": "a return descends below the required height",
     "safe": "a return is safe",
 }
 # Texts for the reactions of an autopilot to a failure.

@@ -34,7 +34,7 @@ from logs.verdict.tolerances import (
     GROUND_LEG_CLEARANCE_M,
     HOME_ERROR_M,
 )
-from logs.verdict.wording import place_text_within
+from logs.verdict.wording import place_text
 from world.arrays import Floats
 from world.frames import to_geo, to_map
 from world.terrain import Terrain
@@ -442,7 +442,7 @@ def _height_text(clearance: float) -> str:
 
 def _placed_message(requirements: RouteRequirements, leg: int, text: str) -> Message:
     """Return a message that begins with the name of a leg."""
-    return message(f"{place_text_within(requirements.leg(leg))} {text}", placed=True)
+    return message(f"{place_text(requirements.leg(leg))} {text}", placed=True)
 
 
 def _time_and_place_text(aligned: AlignedTrack, segment: int, fraction: float) -> str:

@@ -13,7 +13,7 @@ from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
 from logs.verdict.rule import Rule
 from logs.verdict.tolerances import MAX_ROW_GAP_S, MAX_ROW_GAP_TICKS, MAX_VELOCITY_DISAGREEMENT_MPS
-from logs.verdict.wording import place_text_within
+from logs.verdict.wording import place_text
 from world.wording import count_text
 
 
@@ -66,7 +66,7 @@ def _ending_place_text(requirements: RouteRequirements, aligned: AlignedTrack | 
     if aligned is None or aligned.passed[-1]:
         return ""
     row = len(aligned.track) - 1
-    return f" on {place_text_within(requirements.leg(aligned.leg_at(row)))} {aligned.position_text(row)}"
+    return f" on {place_text(requirements.leg(aligned.leg_at(row)))} {aligned.position_text(row)}"
 
 
 def _record_faults(aligned: AlignedTrack) -> list[Message]:

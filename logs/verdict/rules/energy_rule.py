@@ -158,7 +158,7 @@ def _endless_jump_faults(requirements: RouteRequirements, usable_energy: float, 
         start -= 1
     energies = leg_energies(requirements)[0]
     round_energy = sum(energies[start:]) if route.items[start] == route.items[last_waypoint] else math.nan
-    fault = f"the jump of item {route.endless_jump} repeats without end"
+    fault = f"the jump at item {route.endless_jump} repeats indefinitely"
     if not round_energy > 0.0:
         return [message(fault)]
     # Energy of the mission flown once through: path to the first round, that round, and the items after the jump.
@@ -169,7 +169,8 @@ def _endless_jump_faults(requirements: RouteRequirements, usable_energy: float, 
     if repeats < 0:
         return [message(f"{fault}, but the energy does not last for one round")]
     rounds_text = count_text(repeats + 1, "round")
-    return [message(f"{fault}, but the energy lasts for only {rounds_text}. Set the count of the jump to {repeats}")]
+    remedy = f"Set its repeat count to {repeats}; only one round was simulated"
+    return [message(f"{fault}, but the energy lasts for only {rounds_text}. {remedy}")]
 
 
 def _energy_without_jump(requirements: RouteRequirements) -> float:

@@ -22,7 +22,7 @@ from logs.verdict.returns.judge_returns import FlyAgain, Returns, judge_returns,
 from logs.verdict.returns.return_starts import ReturnStarts, flown_starts, planned_starts
 from logs.verdict.returns.returns_text import ACTION_TEXTS, headline
 from logs.verdict.rule import LogNeeds, Rule
-from logs.verdict.wording import place_text_within
+from logs.verdict.wording import place_text
 from world.arrays import Floats
 from world.errors import MissionError
 from world.radio import RadioLink
@@ -222,7 +222,7 @@ def _link_text(link_along_path: LinkAlongPath, leg: Place | None) -> str:
         else f"the link margin is up to {abs(points.margin[k]):.1f} dB below the required fade margin"
     )
     place = (
-        f". It is lowest on {place_text_within(leg)} at {link_along_path.time[k]:.0f} s"
+        f". It is lowest on {place_text(leg)} at {link_along_path.time[k]:.0f} s"
         f" (east {east:.0f} m, north {north:.0f} m,"
         f" {points.distance[k] / 1000.0:.1f} km from the station, {sight_text})"
     )

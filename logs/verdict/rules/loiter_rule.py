@@ -141,7 +141,7 @@ def merge_loiter_findings(
 def end_loiter_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge the loiter without end after the last waypoint; return [] if the mission ends otherwise.
+    """Judge the unlimited loiter after the last waypoint; return [] if the mission ends otherwise.
 
     The finding fails if the wind is too strong for a circle, because the aircraft then drifts downwind.  Otherwise,
     hazards around the loiter leave the finding of a plan undecided, and a flight has no finding.
@@ -153,7 +153,7 @@ def end_loiter_findings(
     title, place = requirements.setup.autopilot.title, requirements.waypoint(requirements.legs)
     if not math.isfinite(reach):
         fault = message(
-            f"{title} then circles here without end, and the wind is too strong to fly a circle",
+            f"{title} then circles here indefinitely, and the wind is too strong to fly a circle",
             f": at {float(requirements.route.leg_airspeeds[-1]):.1f} m/s the aircraft drifts downwind",
         )
         return [
@@ -268,7 +268,7 @@ def _corner_faults(
 def _min_radius(requirements: RouteRequirements, circle: LoiterCircle, *, possible: bool = False) -> float:
     """Return the smallest radius that the bank limit permits for a loiter in this wind, m.
 
-    Only the courses of the loiter's arcs count.  A loiter without end has all courses, even if the route contains only
+    Only the courses of the loiter's arcs count.  An unlimited loiter has all courses, even if the route contains only
     a part of a lap.
     possible: True for the largest bank limit that the aircraft may have.
     """

@@ -274,9 +274,9 @@ def _unsimulated_findings(setup: FlightSetup) -> Iterator[Finding]:
             ]
     slopes = landing_slopes(setup.mission, setup.route, setup.scenario)
     if setup.imported_log is None and slopes is not None and max(map(abs, slopes)) > STEEPEST_STRIP_SLOPE:
-        steepest_text = f"{max(map(abs, slopes)):.1%}; a touchdown is judged only on up to {STEEPEST_STRIP_SLOPE:.0%}"
-        reason = f"NAV_LAND: the ground there slopes by {steepest_text}"
-        remarks.append((int(setup.route.items[-1]), reason))
+        steepest_text = f"the ground there has a slope of {max(map(abs, slopes)):.1%}"
+        reason = f"NAV_LAND: not judged, because {steepest_text}; a touchdown is judged only on up to"
+        remarks.append((int(setup.route.items[-1]), f"{reason} {STEEPEST_STRIP_SLOPE:.0%}"))
     # An imported flight was flown with its settings.
     texts = (
         setup.autopilot.checks.describe_unsimulated_settings(_mission_parts(setup))

@@ -335,7 +335,7 @@ def without_path_following_findings(
 def _suggest_end_loiter(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
-    """Suggest a loiter without end at the last waypoint, if the automatic return from there fails."""
+    """Suggest an unlimited loiter at the last waypoint, if the automatic return from there fails."""
     setup, end = requirements.setup, requirements.waypoint(requirements.legs)
     commands = {item.seq: item.command for item in setup.mission.items}
     is_waypoint = commands.get(-1 if end.item is None else end.item) == Command.NAV_WAYPOINT

@@ -391,9 +391,9 @@ def _limit_text(requirements: RouteRequirements, leg: int, limit: float, source:
     wind = requirements.wind_on(leg)
     tailwind, crosswind = wind.components_on_course(float(requirements.courses[leg]), altitude)
     if math.hypot(tailwind, crosswind) < CALM_WIND_MPS:
-        return f"{condition} the aircraft can fly at most {math.degrees(limit):.1f}° in calm air"
+        return f"{condition} the aircraft's limit is {math.degrees(limit):.1f}° in calm air"
     wind_text = _wind_text(tailwind, crosswind)
-    return f"{condition} the aircraft can fly at most {math.degrees(limit):.1f}° in this {wind_text}"
+    return f"{condition} the aircraft's limit is {math.degrees(limit):.1f}° in this {wind_text}"
 
 
 def _wind_text(tailwind: float, crosswind: float) -> str:

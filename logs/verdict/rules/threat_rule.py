@@ -14,7 +14,7 @@ from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT, Place
 from logs.verdict.rule import LogNeeds, Rule
 from logs.verdict.suggestions import suggest_wider_berth
-from logs.verdict.wording import place_text_within
+from logs.verdict.wording import place_text
 from world.arrays import Floats
 from world.threats import Threats, threat_label
 
@@ -123,7 +123,7 @@ def _nearest_place_text(
     time = aligned.track.time
     k = max(0, min(len(time) - 2, int(np.searchsorted(time, visit.closest_time, side="right")) - 1))
     fraction = float((visit.closest_time - time[k]) / (time[k + 1] - time[k]))
-    return f" on {place_text_within(requirements.leg(aligned.leg_at(k)))} {aligned.position_text(k, fraction)}"
+    return f" on {place_text(requirements.leg(aligned.leg_at(k)))} {aligned.position_text(k, fraction)}"
 
 
 def _no_entry_finding(

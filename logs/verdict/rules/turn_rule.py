@@ -27,7 +27,7 @@ from logs.verdict.tolerances import (
     SETTLED_CROSS_TRACK_M,
     STRAIGHT_RADIUS_RATIO,
 )
-from logs.verdict.wording import count_text, place_text_within
+from logs.verdict.wording import count_text, place_text
 from world.geometry import fly_by_offset
 
 
@@ -154,7 +154,7 @@ def _unflown_turn_text(
     active_time, leg_length = min(active_times), float(requirements.runs[leg])
     radius = acceptance_condition(requirements, leg + 1).radius
     return (
-        f"{requirements.setup.autopilot.title} flew {place_text_within(requirements.leg(leg))} for only"
+        f"{requirements.setup.autopilot.title} flew {place_text(requirements.leg(leg))} for only"
         f" {active_time:.1f} s: the leg is {leg_length:.0f} m long, and a waypoint counts as reached within"
         f" {radius:.0f} m"
     )

@@ -19,7 +19,7 @@ from logs.verdict.measures.waypoint_circles import circles_text, waypoint_circle
 from logs.verdict.rule import Rule
 from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.tolerances import EQUAL_DISTANCE_TOLERANCE_M, ROUNDING_M
-from logs.verdict.wording import place_text, place_text_within
+from logs.verdict.wording import place_text
 from world.arrays import Floats
 
 
@@ -116,9 +116,7 @@ def _flown_finding(
             reason += f"; the line across the leg at the waypoint was crossed {crossing_offset:.0f} m to the side"
         if waypoint > 0 and not aligned.passed[waypoint]:
             last_leg = requirements.leg(aligned.leg_at(len(aligned.track) - 1))
-            text = (
-                f": the flight ended on {place_text_within(last_leg)} {math.hypot(distance, height_error):.0f} m away"
-            )
+            text = f": the flight ended on {place_text(last_leg)} {math.hypot(distance, height_error):.0f} m away"
             faults = [message("not reached", text)]
             ok, reason = False, finding_reason(faults)
             if not aligned.passed[waypoint - 1]:

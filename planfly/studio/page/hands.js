@@ -293,7 +293,7 @@ export class Hands {
 // The name of a leg, and what is closest to its limit there.
 function legWords(model, leg) {
   const [state, text] = model.states.legs[leg], to = model.items.find((one) => one.k === model.of[leg + 1]);
-  return [to ? `leg ${leg}, to item ${to.seq}` : `leg ${leg}`, text || (state === "ok" ? "passes" : "")];
+  return [to ? `leg ${leg} (to item ${to.seq})` : `leg ${leg}`, text || (state === "ok" ? "passes" : "")];
 }
 
 export const words = plain;

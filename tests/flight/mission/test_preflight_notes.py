@@ -93,7 +93,9 @@ def test_ground_that_no_plan_would_land_on_is_told(east: float, north: float, to
     setup = replace(setup, scenario=replace(setup.scenario, terrain=sloped(east, north)))
     left = [one.reason for one in mission_findings(setup) if one.check == NOT_FLOWN]
     assert left == (
-        ["NAV_LAND: the ground there slopes by 10.1%; a touchdown is judged only on up to 10%"] if told else []
+        ["NAV_LAND: not judged, because the ground there has a slope of 10.1%; a touchdown is judged only on up to 10%"]
+        if told
+        else []
     )
 
 

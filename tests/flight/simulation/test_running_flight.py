@@ -97,11 +97,11 @@ def test_a_loiter_may_take_as_long_as_its_item_says() -> None:
 
 def test_a_flight_that_still_circles_when_its_time_is_over_says_so() -> None:
     setup = setup_of(wp(0, -1500), wp(0, 0, 100, 18, p="3 0 150 0"), wp(1500, 1500))
-    for leg, said in ((0, "circled: at the loiter of item 2, "), (setup.route.legs - 1, "time limit: ")):
+    for leg, place in ((0, " in the loiter of item 2"), (setup.route.legs - 1, "")):
         flight = Gliding(setup, AEROSONDE, load_gains(AEROSONDE))
         flight._start_disturbances(setup)
         flight.max_ticks, flight.guidance_memory.leg = 0, leg
-        assert flight.fly_block(10)[1] == f"{said}not finished after 0 s"
+        assert flight.fly_block(10)[1] == f"time limit of 0 s reached{place}"
 
 
 def test_a_block_ends_with_the_time() -> None:
@@ -110,4 +110,4 @@ def test_a_block_ends_with_the_time() -> None:
     flight.max_ticks = 0
     rows, ended = flight.fly_block(10)
     assert len(rows) == 0
-    assert ended == "time limit: not finished after 0 s"
+    assert ended == "time limit of 0 s reached"

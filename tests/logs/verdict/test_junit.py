@@ -36,8 +36,8 @@ def test_each_finding_is_a_case_and_the_answer_one_more() -> None:
     made = cases(junit_text({"a & b.waypoints": verdict(*found, flyable=False, line="not flyable: slope")}))
     assert len(made) == 4
     failed, passed, unknown, answer = (
-        made["planfly.a & b_waypoints.slope", "leg 1, to item 3"],
-        made["planfly.a & b_waypoints.slope", "leg 1, to item 3 (2)"],
+        made["planfly.a & b_waypoints.slope", "leg 1 (to item 3)"],
+        made["planfly.a & b_waypoints.slope", "leg 1 (to item 3) (2)"],
         made["planfly.a & b_waypoints.clearance", "flight"],
         made["planfly.a & b_waypoints", "verdict"],
     )

@@ -96,7 +96,7 @@ def test_a_verdict_has_the_levels_that_were_asked(autopilot: FlightSetup) -> Non
 def test_where_only_the_autopilot_fails_the_second_line_says_so(autopilot: FlightSetup) -> None:
     verdict = aside(autopilot, 70.0, ReferenceFlights(PASSED, DECIDING))
     assert verdict.lines[:2] == (
-        "not flyable: corridor on leg 1, to item 2 (70 m > 60 m)",
+        "not flyable: corridor on leg 1 (to item 2) (70 m > 60 m)",
         "The aircraft can fly this mission, but ArduPlane with these parameters cannot: with NAVL1_PERIOD 17 s the"
         " aircraft is 70 m off leg 1; with 14 s the flight would pass",
     )
@@ -104,7 +104,7 @@ def test_where_only_the_autopilot_fails_the_second_line_says_so(autopilot: Fligh
     for level in verdict.levels[:2]:
         assert level.disagreements == (Disagreement("corridor", leg(1), level.name, there=True, here=False),)
     assert verdict.lines[-1].endswith(
-        "flyable; corridor at leg 1, to item 2, passes with planfly's guidance and fails in flight"
+        "flyable; corridor at leg 1 (to item 2) passes with planfly's guidance and fails in flight"
     )
     assert verdict.deciding == DECIDING
     written = json.loads(verdict_json(verdict))
@@ -128,7 +128,7 @@ def test_a_pitch_at_its_limit_is_named_where_the_flight_fails(
     attitude = np.array(track.attitude)
     attitude[np.abs(track.time - 180.0) < 0.5 * seconds, 1] = math.radians(pitch_deg)
     verdict = judge_flight(autopilot, edited(track, attitude=attitude), "completed", reference=ReferenceFlights(PASSED))
-    line = "Pitch: at its limit TECS_PITCH_MAX 15° for 5 s on leg 1, to item 2"
+    line = "Pitch: at its limit TECS_PITCH_MAX 15° for 5 s on leg 1 (to item 2)"
     assert (line in verdict.lines) is is_named
 
 
@@ -175,7 +175,7 @@ def test_levels_that_find_the_worst_at_other_corners_of_a_circle_are_compared() 
     assert planned.place.index != flown.place.index
     found = [(item.rule, item.place.number, item.there, item.here) for item in verdict.levels[0].disagreements]
     assert ("clearance", 0, False, True) in found
-    assert "clearance at leg 0, to item 2, fails by geometry and passes in flight" in verdict.summary
+    assert "clearance at leg 0 (to item 2) fails by geometry and passes in flight" in verdict.summary
 
 
 def test_where_the_aircraft_fails_too_no_parameter_is_blamed(autopilot: FlightSetup) -> None:

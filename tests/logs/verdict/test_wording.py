@@ -127,7 +127,7 @@ LONGER = Change("length", leg(1), 150.0, 300.0, "m")
         (MISSION, "mission"),
         (PLAN, "plan"),
         (leg(0), "leg 0"),
-        (Place("leg", 0, to_item=0), "leg 0, to item 0"),
+        (Place("leg", 0, to_item=0), "leg 0 (to item 0)"),
         (waypoint(0), "waypoint 0"),
         (Place("waypoint", 0, item=0), "waypoint 0 (item 0)"),
         (Place("mission", item=0), "item 0"),
@@ -194,19 +194,25 @@ def powered(volts: float) -> FlightSetup:
 
 # A failing route, its rule and place; where the number stands in the text of what is suggested, and its decimals.
 SUGGESTED = {
-    "rise": (lambda: make_setup(STEEP), "slope", leg(1), r"climb ([\d.]+) m instead of 300 m on leg 1, to item 2", 0),
+    "rise": (
+        lambda: make_setup(STEEP),
+        "slope",
+        leg(1),
+        r"climb ([\d.]+) m instead of 300 m on leg 1 \(to item 2\)",
+        0,
+    ),
     "fall": (
         lambda: make_setup(STEEP[::-1]),
         "slope",
         leg(1),
-        r"descend ([\d.]+) m instead of 300 m on leg 1, to item 2",
+        r"descend ([\d.]+) m instead of 300 m on leg 1 \(to item 2\)",
         0,
     ),
     "length": (
         lambda: make_setup(STEEP),
         "slope",
         leg(1),
-        r"lengthen leg 1, to item 2, from 1000 m to ([\d.]+) m",
+        r"lengthen leg 1 \(to item 2\) from 1000 m to ([\d.]+) m",
         0,
     ),
     "airspeed": (
@@ -220,7 +226,7 @@ SUGGESTED = {
         lambda: make_setup(STRAIGHT, airspeed=33.0),
         "speed",
         leg(0),
-        r"command an airspeed of ([\d.]+) to [\d.]+ m/s on leg 0, to item 1$",
+        r"command an airspeed of ([\d.]+) to [\d.]+ m/s on leg 0 \(to item 1\)$",
         1,
     ),
     "turn": (lambda: make_setup(SHORT), "turn", waypoint(1), r"turn at most ([\d.]+)° at waypoint 1", 1),
@@ -228,7 +234,7 @@ SUGGESTED = {
         lambda: make_setup([[0, 0, 20], [0, 6000, 20]]),
         "clearance",
         leg(0),
-        r"raise both ends of leg 0, to item 1, by ([\d.]+) m",
+        r"raise both ends of leg 0 \(to item 1\) by ([\d.]+) m",
         0,
     ),
     "inset": (

@@ -196,7 +196,7 @@ def test_an_entered_missile_is_ringed_and_named_on_the_map() -> None:
     figure = drawn_map(SCENARIO, **ALL, track=track, verdict=ENTERED)
     (ring,) = [line.get_xydata() for line in figure.axes[0].lines if line.get_label() == "threat that is entered"]
     np.testing.assert_allclose(np.hypot(*(ring - [300.0, 0.0]).T), 250.0)
-    assert {"post 25 (missile): threat", "leg 1, to item 9: slope"} <= texts(figure)
+    assert {"post 25 (missile): threat", "leg 1 (to item 9): slope"} <= texts(figure)
     assert "post 25" not in texts(figure)
     assert 4 < inside.sum() < len(track) // 2
     np.testing.assert_array_equal(np.isfinite(broad_line(figure).get_xdata()), inside)
@@ -207,7 +207,7 @@ def test_an_entered_missile_is_ringed_and_named_on_the_map() -> None:
 def test_an_entered_missile_stands_over_the_flown_heights() -> None:
     track, inside = inside_rows()
     figure = drawn_profile(SCENARIO, **ALL, track=track, verdict=ENTERED)
-    assert {"post 25 (missile): threat", "leg 1, to item 9: slope"} <= texts(figure)
+    assert {"post 25 (missile): threat", "leg 1 (to item 9): slope"} <= texts(figure)
     np.testing.assert_array_equal(np.isfinite(broad_line(figure).get_ydata()), inside)
     # Its foot and its top over the path, 200 m beside the centre: 300 m less and more of sqrt(250^2 - 200^2) = 150 m.
     (cut,) = [band for band in figure.axes[0].collections if band.get_label() == "threat that is entered"]
@@ -232,4 +232,4 @@ def test_a_sphere_is_the_one_that_the_place_names() -> None:
 
 def test_threats_without_a_place_in_the_picture_get_no_label() -> None:
     labels = make_fail_labels(failures(ENTERED, 4), ROUTE[:, :2], {})
-    assert [label.text for label in labels] == ["leg 1, to item 9: slope"]
+    assert [label.text for label in labels] == ["leg 1 (to item 9): slope"]

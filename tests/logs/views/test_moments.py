@@ -44,7 +44,7 @@ def test_without_terrain_no_height_above_ground_is_said() -> None:
 
 
 def test_legs_and_waypoints_have_the_names_of_the_verdict() -> None:
-    assert leg_names(SETUP) == ["leg 0, to item 1", "leg 1, to item 2", "leg 2, to item 3"]
+    assert leg_names(SETUP) == ["leg 0 (to item 1)", "leg 1 (to item 2)", "leg 2 (to item 3)"]
     assert waypoint_names(SETUP)[1] == "waypoint 1 (item 1)\n340 m AMSL"
     bare = replace(SETUP, route=SETUP.route.with_fields(item=-1))
     assert leg_names(bare)[0] == "leg 0"

@@ -217,7 +217,7 @@ def test_a_higher_return_of_px4_needs_a_larger_battery(tmp_path: Path) -> None:
     # 11 kg are lifted by 200 m.
     assert rows[650].return_energy - rows[450].return_energy > 11.0 * 9.81 * 200.0 / 3600.0
     lines = battery_lines(battery_result(base, [energy_row(80.0)] * 20, own=888.0))
-    assert "returns to launch are simulated by PX4's control laws flying a point mass" in lines
+    assert "returns to launch are simulated with a point-mass model under PX4's control laws" in lines
     assert any("RTL_RETURN_ALT (650 m above the destination)" in line for line in lines)
     assert not any("ArduPlane" in line for line in lines)
 
@@ -250,7 +250,7 @@ def test_the_legs_around_a_loiter_are_one_in_the_energies_and_in_the_lines(tmp_p
     rows = [replace(row, return_energy=2.0 * row.mission_energy, return_leg=0, return_time=30.0 + k) for k in range(2)]
     lines_on_it = [line for line in battery_lines(battery_result(base, rows, own=888.0)) if "the return that" in line]
     assert lines_on_it == [
-        "in 2 of 2 flights the return that starts at 30 s (leg 0, to item 2) decides the capacity",
+        "in 2 of 2 flights the return that starts at 30 s (leg 0 (to item 2)) decides the capacity",
     ]
 
 

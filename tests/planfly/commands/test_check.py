@@ -28,7 +28,7 @@ def test_a_climb_on_the_spot_is_judged_and_not_flyable(
     assert main(["check", str(mission), "--geometry", "--json", str(tmp_path / "verdict.json")]) == 4
     verdict = json.loads((tmp_path / "verdict.json").read_text(encoding="utf-8"))
     failed = [item for item in verdict["findings"] if item["ok"] is False]
-    assert [(item["rule"], item["where"]) for item in failed] == [("slope", "leg 1, to item 3")]
+    assert [(item["rule"], item["where"]) for item in failed] == [("slope", "leg 1 (to item 3)")]
     rise, angle = abs(up - 200), "89.9" if up == 210.5 else "90.0"
     assert abs(failed[0]["planned"]) == pytest.approx(float(angle), abs=0.1)
     assert f"leg 1 {verb} {rise:g} m vertically, {angle}°; at 2" in failed[0]["reason"]
@@ -198,11 +198,11 @@ def test_legs_have_their_items_and_limits_their_owner_through_a_jump(tmp_path: P
         for item in findings
         if item["rule"] == "clearance"
     }
-    assert legs == {k: (f"leg {k}, to item {item}", item) for k, item in enumerate((2, 3, 2, 3, 5))}
+    assert legs == {k: (f"leg {k} (to item {item})", item) for k, item in enumerate((2, 3, 2, 3, 5))}
     assert {item["limit_source"] for item in findings if item["rule"] == "clearance"} == {"default"}
     (violated,) = [item for item in findings if item["rule"] == "fence" and item["ok"] is False]
     assert violated["limit_source"] == "fence"
-    assert "(leg 0, to item 2)" in violated["reason"]
+    assert "(leg 0 (to item 2))" in violated["reason"]
     assert "scenario" not in {item["limit_source"] for item in findings}
 
 

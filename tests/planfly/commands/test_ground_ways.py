@@ -12,7 +12,7 @@ HOME = "36.2726545 -84.2614207"
 # from home, 1.15 km away.
 NEAR, FAR = "36.2861601 -84.2836927", "36.2969616 -84.3015158"
 MISSIONS = {
-    # It ends in a loiter without end: the return over the ridge would hit the ground.
+    # It ends in an unlimited loiter: the return over the ridge would hit the ground.
     "air": (f"3 16 0 0 0 0 {NEAR} 517", f"3 17 0 0 250 0 {FAR} 517"),
     "take-off": ("3 22 15 0 0 0 0 0 517", f"3 16 0 0 0 0 {NEAR} 517", f"3 16 0 0 0 0 {FAR} 517"),
     "landing": (f"3 16 0 0 0 0 {FAR} 517", f"3 16 0 0 0 0 {NEAR} 300", f"3 21 0 0 0 0 {HOME} 0"),

@@ -143,9 +143,9 @@ def test_the_command_prints_answers_and_draws(log: Path, capsys: pytest.CaptureF
     place = ["--station", f"{origin.lat_deg},{origin.lon_deg}"]
     assert main(["link", str(log), *radio, *place, "--out", "drawn", "--json", "answer.json"]) == 4
     out = capsys.readouterr().out
-    assert "It is lowest on leg 0, to item 2, at 0 s" in out
+    assert "It is lowest on leg 0 (to item 2) at 0 s" in out
     answer = json.loads(Path("answer.json").read_text(encoding="utf-8"))
-    assert (answer["ok"], answer["exit_code"], answer["where"]) == (False, 4, "leg 0, to item 2")
+    assert (answer["ok"], answer["exit_code"], answer["where"]) == (False, 4, "leg 0 (to item 2)")
     names = ("link.png", "link-map.png", "link-coverage.tif")
     assert answer["files"] == [str(Path("drawn") / name) for name in names]
     assert all(Path(name).exists() for name in answer["files"])

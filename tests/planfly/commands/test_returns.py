@@ -41,7 +41,7 @@ def test_a_mission_and_its_log_say_the_same(hill: Path, log: bytes, capsys: pyte
     asked = ["returns", "hill.waypoints", "--scenario", "hill.toml", "--every", "20", "--json", "mission.json"]
     assert main(asked) == 4
     out = capsys.readouterr().out
-    assert "1 of 13 returns hits the ground, 1 comes lower than 30 m above ground; 11 are safe" in out
+    assert "1 of 13 returns hits the ground, 1 descends below 30 m above ground; 11 are safe" in out
     assert out.splitlines()[1].startswith("  Aircraft: aerosonde, 11 kg, ")
     assert "causes of a return: the pilot's RTL, the mission's end" in out
     assert "no return after RC lost (FS_LONG_ACTN 0), station lost (FS_GCS_ENABL 0), battery low" in out
@@ -153,7 +153,7 @@ def test_px4_returns_by_its_own_parameters(behind: Path, capsys: pytest.CaptureF
         assert not any(name in out for name in ARDUPLANES)
         assert "causes of a return: the pilot's RTL, RC lost (NAV_RCL_ACT 2)" in out
         assert f"An aircraft below RTL_RETURN_ALT ({height} m above the destination) first climbs to this height" in out
-        assert "returns are simulated in the mean wind, by PX4's control laws flying a point mass" in out
+        assert "returns are simulated in the mean wind, with a point-mass model under PX4's control laws" in out
         assert "PX4's own return without the engine is not simulated" in out
         assert ("would help: RTL_RETURN_ALT 4" in out) is (height == 100)
         answers[height] = json.loads((behind / f"{height}.json").read_text(encoding="utf-8"))

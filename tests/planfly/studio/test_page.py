@@ -468,7 +468,7 @@ LAPS = """Promise.all([import('/map.js'), import('/hands.js')]).then(([{ MapView
 def test_the_worst_lap_is_drawn_last_and_named_first(page: Browser) -> None:
     drawn, said, corner = page.value(LAPS)
     assert drawn == ["leg ok", "leg near", "leg fail"]
-    assert said == ["leg 0, to item 4", "clearance: 29.3 m", "leg 2, to item 4: clearance 31 m", "fail"]
+    assert said == ["leg 0 (to item 4)", "clearance: 29.3 m", "leg 2 (to item 4): clearance 31 m", "fail"]
     assert corner == ["fail", "missed"]
 
 

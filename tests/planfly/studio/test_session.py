@@ -685,7 +685,7 @@ def test_a_suggested_speed_is_named_by_its_undo() -> None:
     changes = {(0, 0): (replace(session.mission, source="slower"), slower)}
     session.tried["geometric"] = TriedChanges(session.rev, [], changes)
     session.edit(messages.Apply(kind="apply", rev=session.rev, finding=0, which=0))
-    assert session.undo_text.endswith(": fly leg 2, to item 4, at 20.5 m/s instead of 25 m/s")
+    assert session.undo_text.endswith(": fly leg 2 (to item 4) at 20.5 m/s instead of 25 m/s")
 
 
 def test_a_sphere_is_passed_with_what_navigation_may_be_off_to_spare() -> None:

@@ -113,6 +113,6 @@ def test_a_leg_that_leaves_the_terrain_data_is_not_judged() -> None:
     legs = place_states(judged.requirements, findings).legs
     assert legs[len(judged.setup.route.positions) - 2].state == "open"
     assert legs[len(judged.setup.route.positions) - 2].text.startswith(
-        "clearance: leg 1, to item 3, leaves the data of"
+        "clearance: leg 1 (to item 3) leaves the data of"
     )
     assert legs[0].state != "open"

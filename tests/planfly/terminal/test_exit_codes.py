@@ -14,7 +14,7 @@ MEANT = {
     "flyable, or flown as planned": exit_codes.FLYABLE,
     "internal or system error": exit_codes.FAULT,
     "incorrect usage or invalid input": exit_codes.BAD_INPUT,
-    "finished, but data of a damaged log is lost": exit_codes.INCOMPLETE,
+    "finished, but part of a log is unreadable": exit_codes.INCOMPLETE,
     "not flyable, not flown as planned, or no feasible plan": exit_codes.NOT_FLYABLE,
     "stopped by SIGINT (Ctrl-C), 143 by SIGTERM": exit_codes.INTERRUPTED,
 }

@@ -190,8 +190,8 @@ def test_unsafe_returns_of_a_flyable_mission_follow_its_first_line(
     lines = capsys.readouterr().out.splitlines()
     (place,) = [number for number, line in enumerate(lines) if line.startswith("returns")]
     assert place == row % len(lines)
-    required = "; no return is required" if row == 1 else ""
-    assert lines[place] == f"returns   all 3 returns violate town{required}; more: planfly returns"
+    required = "; the scenario requires no safe return" if row == 1 else ""
+    assert lines[place] == f"returns   all 3 returns violate town{required}; details: planfly returns"
 
 
 def test_a_mission_without_a_home_has_no_line_on_returns(capsys: pytest.CaptureFixture[str]) -> None:

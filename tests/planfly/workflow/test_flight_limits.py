@@ -42,7 +42,7 @@ def test_simulated_time_has_a_limit(long: Path, capsys: pytest.CaptureFixture[st
     ]
     assert main(argv) == 4
     # 0.02 h are 72 s.
-    assert "time limit: not finished after 72 s" in capsys.readouterr().out
+    assert "time limit of 72 s reached" in capsys.readouterr().out
     log = read_log(Path("f.mcap"))
     assert log.complete
     assert log.track.time[-1] == pytest.approx(72.0, abs=1.0 / 30.0)

@@ -182,7 +182,7 @@ def test_the_time_of_a_log_is_its_own(mission: Path, capsys: pytest.CaptureFixtu
     assert "f.mcap: --at 2026-05-03T10:00Z: not allowed: a log is exported with the zones" in capsys.readouterr().err
     for command in (["export", str(mission), "map.kml"], ["serve", str(mission), "--bind", "127.0.0.1:0"]):
         assert main([*command, "--at", "tomorrow"]) == 2
-        expected = "expected a time in ISO 8601 format, as 2026-05-01T10:00+02:00"
+        expected = "expected a time in ISO 8601 format, such as 2026-05-01T10:00+02:00"
         assert capsys.readouterr().err == f"planfly: --at tomorrow: {expected}\n"
     assert main(["export", str(mission), "map.kml", "--at", "2026-05-01T10:00Z/soon"]) == 2
     assert capsys.readouterr().err == f"planfly: --at 2026-05-01T10:00Z/soon: 'soon': {expected}\n"

@@ -309,7 +309,7 @@ def test_the_aircraft_can_and_arduplane_cannot(flown: tuple[FlownMission, Path])
         "The aircraft can fly this mission, but ArduPlane with these parameters cannot: with TECS_HDEM_TCONST 3 s the "
         "aircraft is "
     )
-    assert second.endswith(f"m too low on leg 1, to item 2; with {deciding.passing:g} s the flight would pass")
+    assert second.endswith(f"m too low on leg 1 (to item 2); with {deciding.passing:g} s the flight would pass")
 
 
 def test_a_served_flight_tells_stations_which_parameter_decides(

@@ -190,7 +190,7 @@ def test_legs_that_are_low_with_home_on_the_ground_are_raised_in_addition() -> N
     judged = judge_mission_geometry(setup_of(wp(0, 500, 15.0), wp(0, 2500, 15.0), home="36.5 -84.2 0"))
     (finding,) = [finding for finding in judged.failed if finding.rule == "clearance"]
     home = "set home to 100.0 m AMSL, the ground there, instead of 0.0 m"
-    assert finding.suggestion.startswith(f"{home} and raise both ends of leg 0, to item 2, by 16 m")
+    assert finding.suggestion.startswith(f"{home} and raise both ends of leg 0 (to item 2) by 16 m")
 
 
 def test_legs_that_are_high_because_home_is_above_the_ground_are_offered_homes_altitude() -> None:

@@ -131,6 +131,6 @@ def test_a_large_miss_of_a_leg_that_passes_is_in_the_first_line(step: float, sid
     setup = over_step(step)
     verdict = judge(setup, flown(setup, step))
     assert slope_of(setup, flown(setup, step)).ok
-    missed = f"; leg 1, to item 2, flown up to {abs(step) / 1.5:.0f} m {side} its height above ground"
+    missed = f"; leg 1 (to item 2) flown up to {abs(step) / 1.5:.0f} m {side} its height above ground"
     assert missed in verdict.headline
     assert "its height above ground" not in judge(setup, flown(setup, step, share=0.8)).headline

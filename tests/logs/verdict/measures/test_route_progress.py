@@ -86,8 +86,8 @@ def test_what_was_not_reached_is_named_once() -> None:
     assert of(verdict, "waypoint", waypoint(1)).ok is True
     ahead, after = (of(verdict, "waypoint", waypoint(k)) for k in (2, 3))
     # Half of the leg of 3,002 m was left.
-    assert ahead.reason == "not reached: the flight ended on leg 1, to item 2, 1501 m away"
-    assert (after.ok, after.flown, after.reason) == (None, None, "not reached: the flight ended on leg 1, to item 2")
+    assert ahead.reason == "not reached: the flight ended on leg 1 (to item 2) 1501 m away"
+    assert (after.ok, after.flown, after.reason) == (None, None, "not reached: the flight ended on leg 1 (to item 2)")
 
 
 def test_a_flight_that_ends_within_reach_of_a_waypoint_is_on_the_next_leg() -> None:

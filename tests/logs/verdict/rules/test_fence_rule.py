@@ -62,7 +62,7 @@ def test_a_planned_path_through_a_zone() -> None:
     assert (known["entry time"], known["exit time"]) == pytest.approx((20.0, 40.0), abs=1e-3)
     assert (known["entries"], known["entry leg"], known["exit leg"], known["entry up"]) == (1, 0, 0, 300.0)
     assert item.brief == "10.0 m inside"
-    assert "enters it at 20.0 s, east 0 m, north 500 m, 300 m AMSL (leg 0, to item 1)" in item.reason
+    assert "enters it at 20.0 s, east 0 m, north 500 m, 300 m AMSL (leg 0 (to item 1))" in item.reason
 
 
 def test_a_flight_off_its_path_is_judged_by_its_track() -> None:

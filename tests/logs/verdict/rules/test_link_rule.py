@@ -79,8 +79,8 @@ def test_the_place_is_the_leg_and_the_position_of_the_least_margin() -> None:
     for item in (of(judge_geometry(setup), "link"), of(judge(setup, fly_path(setup)), "link")):
         assert item.place == FLIGHT
         assert "the link margin is up to 3.5 dB below the required fade margin" in item.reason
-        assert "It is lowest on leg 0, to item 1, at 0 s (east 0 m, north 0 m, 6.0 km from the station" in item.reason
-    assert "on leg 1, to item 2, at 240 s" in of(judge_geometry(linked(make_setup(WAY))), "link").reason
+        assert "It is lowest on leg 0 (to item 1) at 0 s (east 0 m, north 0 m, 6.0 km from the station" in item.reason
+    assert "on leg 1 (to item 2) at 240 s" in of(judge_geometry(linked(make_setup(WAY))), "link").reason
 
 
 def test_within_range_the_link_is_ok() -> None:

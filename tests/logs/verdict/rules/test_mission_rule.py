@@ -239,7 +239,7 @@ def test_geofence() -> None:
     for fences, words in (
         ((*square, *ring), None),
         (small, "outside an inclusion polygon"),
-        ((*square, *hole), "inside an exclusion circle of 300 m"),
+        ((*square, *hole), "inside an exclusion circle of radius 300 m"),
         (fence(5003, 1000, (0, 0)), "outside an inclusion circle"),
         (fence(5002, 3, (-100, 1400), (100, 1400), (0, 1700)), "inside an exclusion polygon"),
     ):
@@ -572,7 +572,7 @@ MARK = "0 189 0 0 0 0 0 0 0"
 def test_items_behind_the_missions_end_are_never_reached(
     lines: tuple[str, ...], item: int | None, ok: bool | None
 ) -> None:
-    """`verify_command` of an RTL and of a loiter without end never returns true; marks are reached by other ways."""
+    """`verify_command` of an RTL and of an unlimited loiter never returns true; marks are reached by other ways."""
     found = [one for one in mission_findings(setup_of(*lines)) if "is never reached" in one.reason]
     assert [(one.place.item, one.ok) for one in found] == ([] if item is None else [(item, ok)])
 

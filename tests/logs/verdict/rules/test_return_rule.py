@@ -245,7 +245,7 @@ def test_the_return_after_the_last_item_counts_as_an_items(
         assert [item.ok for item in found] == ([] if ok is None else [ok])
         assert verdict.flyable is not (ok is False), verdict.lines
         assert ok is not False or "the return after the last item hits the ground" in verdict.headline
-        # A loiter by time has a time, which a loiter without end could not keep.
+        # A loiter by time has a time, which an unlimited loiter could not keep.
         is_mended = ok is False and lines == BEHIND_THE_HILL
         offered = [change.what for item in found for one in item.suggestions for change in one]
         assert offered == (["end loiter"] if is_mended else [])

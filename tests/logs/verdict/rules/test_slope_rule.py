@@ -43,10 +43,10 @@ def test_the_envelope_limits_a_slope(slope: float, ok: bool) -> None:
 def test_a_steep_leg_is_explained() -> None:
     setup = make_setup(hill(18.3, 1400.0))
     verdict = judge(setup, fly_path(setup))
-    assert verdict.summary.startswith("not flyable: slope on leg 1, to item 2 (18.3° > 13.7°)")
+    assert verdict.summary.startswith("not flyable: slope on leg 1 (to item 2) (18.3° > 13.7°)")
     reason = of(verdict, "slope", leg(1)).reason
     assert reason.startswith(
-        "leg 1 climbs 18.3° for 1.4 km; at 25 m/s and 763 m AMSL the aircraft can fly at most 13.7° in calm air"
+        "leg 1 climbs 18.3° for 1.4 km; at 25 m/s and 763 m AMSL the aircraft's limit is 13.7° in calm air"
     )
 
 
@@ -56,7 +56,7 @@ def test_wind_flattens_the_limit_and_is_named() -> None:
     item = of(judge_geometry(setup), "slope", leg(1))
     wanted = math.degrees(math.atan2(25 * math.sin(math.radians(13.7)), 25 * math.cos(math.radians(13.7)) + 10))
     assert item.limit == pytest.approx(wanted, abs=0.01)
-    assert "the aircraft can fly at most 9.8° in this 10 m/s tailwind" in item.reason
+    assert "the aircraft's limit is 9.8° in this 10 m/s tailwind" in item.reason
     assert not judge_geometry(make_setup(hill(14.0), wind={"speed_mps": 8.0, "from_deg": 0.0})).summary.count("slope")
 
 
@@ -154,8 +154,8 @@ def test_a_headline_names_a_steep_leg_before_the_arc_that_it_makes_steep() -> No
     """Leg 0 descends 6 degrees, which the aircraft can; the arc to leg 1, which descends 20 degrees, is too steep."""
     verdict = judge_geometry(make_setup(corner(60.0, (-6.0, -20.0))))
     assert of(verdict, "slope", leg(0)).brief == "the arc at waypoint 1"
-    assert verdict.headline.startswith("not flyable: slope on leg 1, to item 2 (-20° < ")
-    assert "slope on leg 0, to item 1 (the arc at waypoint 1)" in verdict.headline
+    assert verdict.headline.startswith("not flyable: slope on leg 1 (to item 2) (-20° < ")
+    assert "slope on leg 0 (to item 1) (the arc at waypoint 1)" in verdict.headline
 
 
 def test_the_arc_and_both_legs_are_named() -> None:
@@ -278,7 +278,7 @@ def test_a_slope_within_what_is_not_known_is_undecided() -> None:
         assert told == [("full throttle", 20.0, "s")]
         assert (verdict.flyable, verdict.undecided, verdict.complete) == (False, True, True)
         assert verdict.headline == (
-            "not judged in full: slope on leg 1, to item 2, is too close to the limit to judge, because the"
+            "not judged in full: slope on leg 1 (to item 2) is too close to the limit to judge, because the"
             " aircraft's limits are uncertain; the aircraft's model is from a data sheet"
         )
         assert verdict.levels[0].undecided

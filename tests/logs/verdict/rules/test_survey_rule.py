@@ -495,7 +495,7 @@ def test_a_turn_around_too_tight_to_be_drawn_is_left_open_where_something_is_nea
         assert found.place.index == 2
         assert "turn-around 1 is too tight to be flown as drawn" in found.reason
         assert "missile m is in range; only a simulated flight shows" in found.reason
-        said = "not judged in full: only a simulated flight shows how the turn-around on leg 2, to item 3 is flown"
+        said = "not judged in full: only a simulated flight shows how the turn-around on leg 2 (to item 3) is flown"
         assert verdict.headline.startswith(said)
 
 

@@ -183,8 +183,8 @@ def test_a_leg_that_the_autopilot_left_at_once_is_the_reason_that_is_given() -> 
         return _unflown_turn_text(requirements, 2, TurnMeasure(), align_track(requirements, replace(track, leg=leg)))
 
     counts = "the leg is 40 m long, and a waypoint counts as reached within"
-    assert f"{short.autopilot.title} flew leg 2, to item 3, for only 1.0 s: {counts}" in why(1.0, 3)
-    assert f"flew leg 2, to item 3, for only 0.0 s: {counts}" in why(0.0, 3)
+    assert f"{short.autopilot.title} flew leg 2 (to item 3) for only 1.0 s: {counts}" in why(1.0, 3)
+    assert f"flew leg 2 (to item 3) for only 0.0 s: {counts}" in why(0.0, 3)
     assert why(0.0, 1) == "the flight did not get past it"
 
 
