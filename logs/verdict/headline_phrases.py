@@ -19,8 +19,9 @@ def _with_place(noun: str, finding: Finding, text: str) -> str:
     if place.kind in ("flight", "plan", "mission"):
         return f"{noun_with_place(noun, place)} ({text})"
     # The item is separated by a comma, so that only `text` is in brackets.
-    item_text = "" if place.item is None else f", item {place.item}"
-    place_name = place_text(replace(place, item=None)) + item_text
+    item_text = f", to item {place.to_item}" if place.to_item is not None else ""
+    item_text = f", item {place.item}" if place.item is not None else item_text
+    place_name = place_text(replace(place, item=None, to_item=None)) + item_text
     return f"{noun} {'at' if place.kind == 'waypoint' else 'on'} {place_name} ({text})"
 
 

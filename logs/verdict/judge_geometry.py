@@ -36,7 +36,7 @@ def judge_geometry(setup: FlightSetup, requirements: RouteRequirements | None = 
     >>> setup = FlightSetup(scenario, mission, route, limits, "aerosonde", battery=888.0, seed=1)
     >>> verdict = judge_geometry(setup)
     >>> verdict.headline
-    'not flyable: slope on leg 0 (to item 1) (14.5° > 14.2°)'
+    'not flyable: slope on leg 0, to item 1 (14.5° > 14.2°)'
     >>> suggestions = [suggestion for finding in verdict.findings for suggestion in finding.suggestions]
     >>> [[change.what for change in suggestion] for suggestion in suggestions]
     [['airspeed'], ['rise'], ['length']]

@@ -162,9 +162,7 @@ def _unknown_aircraft_text(open_findings: Sequence[Finding]) -> str:
             f"slopes on {len(slope_findings)} legs are too close to the limit to judge, because the aircraft's"
             " limits are uncertain"
         )
-    place_names = [
-        place_text(finding.place) + ("," if finding.place.to_item is not None else "") for finding in slope_findings
-    ]
+    place_names = [place_text(finding.place) for finding in slope_findings]
     noun, verb = ("slopes", "are") if len(slope_findings) > 1 else ("slope", "is")
     return (
         f"{noun} on {' and '.join(place_names)} {verb} too close to the limit to judge,"
@@ -261,9 +259,8 @@ def _worst_error_notes(errors: Sequence[tuple[float, Place]], verb: str, referen
         return []
     error, place = max(notable, key=lambda pair: abs(pair[0]))
     more_text = f", and {len(notable) - 1} more by over {NOTABLE_HEIGHT_ERROR_M:.0f} m" if len(notable) > 1 else ""
-    comma = "," if place.to_item is not None else ""
     side = "above" if error > 0.0 else "below"
-    return [f"{place_text(place)}{comma} {verb} {abs(error):.0f} m {side} {reference}{more_text}"]
+    return [f"{place_text(place)} {verb} {abs(error):.0f} m {side} {reference}{more_text}"]
 
 
 def _headline_findings(failed: list[Finding]) -> list[Finding]:

@@ -169,8 +169,8 @@ def _endless_jump_faults(requirements: RouteRequirements, usable_energy: float, 
     if repeats < 0:
         return [message(f"{fault}, but the energy does not last for one round")]
     rounds_text = count_text(repeats + 1, "round")
-    remedy = f"Set its repeat count to {repeats}; only one round was simulated"
-    return [message(f"{fault}, but the energy lasts for only {rounds_text}. {remedy}")]
+    fault = f"{fault}. Each round uses {round_energy:.1f} Wh, so the energy lasts for only {rounds_text}"
+    return [message(f"{fault}. Set its repeat count to {repeats}")]
 
 
 def _energy_without_jump(requirements: RouteRequirements) -> float:

@@ -157,7 +157,7 @@ def test_a_file_holds_the_data_and_the_words(setup: FlightSetup) -> None:
     assert (geometry.name, own.name, own.flyable, own.headline) == ("geometry", "airframe", False, verdict.headline)
     differences = [Disagreement("corridor", leg(k), "geometry", there=True, here=False) for k in range(3)]
     assert [one for one in geometry.disagreements if one.rule == "corridor"] == differences
-    texts = [f"corridor at leg {k}, to item {k + 1}, passes by geometry and fails in flight" for k in range(3)]
+    texts = [f"corridor at leg {k} (to item {k + 1}) passes by geometry and fails in flight" for k in range(3)]
     levels = written["levels"]
     assert [level["name"] for level in levels] == ["geometry", "airframe"]
     assert [text for text in levels[0]["disagreements"] if text in texts] == texts

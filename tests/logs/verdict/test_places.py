@@ -96,7 +96,7 @@ def test_a_verdict_has_the_levels_that_were_asked(autopilot: FlightSetup) -> Non
 def test_where_only_the_autopilot_fails_the_second_line_says_so(autopilot: FlightSetup) -> None:
     verdict = aside(autopilot, 70.0, ReferenceFlights(PASSED, DECIDING))
     assert verdict.lines[:2] == (
-        "not flyable: corridor on leg 1 (to item 2) (70 m > 60 m)",
+        "not flyable: corridor on leg 1, to item 2 (70 m > 60 m)",
         "The aircraft can fly this mission, but ArduPlane with these parameters cannot: with NAVL1_PERIOD 17 s the"
         " aircraft is 70 m off leg 1; with 14 s the flight would pass",
     )

@@ -489,7 +489,7 @@ def test_a_low_return_is_offered_the_parameter_of_its_altitude_or_a_higher_start
     assert 10.0 <= start.wanted <= 22.0
     assert f"set RTL_ALTITUDE to {end.wanted:g} m instead of 100 m" in finding.suggestion
     assert (
-        f"raise waypoint 1 (item 2) by {start.wanted:.0f} m (move item 2 by {start.wanted:.0f} m up)"
+        f"raise waypoint 1 (item 2) by {start.wanted:.0f} m (move item 2 up by {start.wanted:.0f} m)"
         in finding.suggestion
     )
     # It passes with the parameter, and with its margin.

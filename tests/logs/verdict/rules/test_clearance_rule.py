@@ -93,7 +93,7 @@ def test_a_leg_across_a_hole_of_the_terrain_is_not_judged_and_named() -> None:
         # The pixel before the hole is 2990 m north; heights between it and the hole depend on the hole.
         assert int(re.findall(r"data .*?north (\d+) m", open_leg.reason)[0]) == pytest.approx(2995, abs=30)
         assert re.search(r"\(latitude \d+\.\d{5}, longitude \d+\.\d{5}\)", open_leg.reason)
-        assert open_leg.brief.startswith("leg 1, to item ")
+        assert open_leg.brief.startswith("leg 1 (to item ")
         assert verdict.answer == "not judged in full"
         assert not verdict.failed
 

@@ -401,4 +401,4 @@ def test_the_take_off_and_the_landing_are_part_of_the_link() -> None:
         distances = np.linalg.norm(flown.track.position - place - [0.0, 0.0, 3.0], axis=1)
         assert facts["greatest distance from the station"] == pytest.approx(float(distances.max()), abs=30.0)
         assert item.flown == pytest.approx(float(flown.track.time[-1]), abs=20.0)
-        assert f". It is lowest on leg {worst_leg}, to item " in item.reason
+        assert f". It is lowest on leg {worst_leg} (to item " in item.reason

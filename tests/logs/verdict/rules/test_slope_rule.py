@@ -43,7 +43,7 @@ def test_the_envelope_limits_a_slope(slope: float, ok: bool) -> None:
 def test_a_steep_leg_is_explained() -> None:
     setup = make_setup(hill(18.3, 1400.0))
     verdict = judge(setup, fly_path(setup))
-    assert verdict.summary.startswith("not flyable: slope on leg 1 (to item 2) (18.3° > 13.7°)")
+    assert verdict.summary.startswith("not flyable: slope on leg 1, to item 2 (18.3° > 13.7°)")
     reason = of(verdict, "slope", leg(1)).reason
     assert reason.startswith(
         "leg 1 climbs 18.3° for 1.4 km; at 25 m/s and 763 m AMSL the aircraft's limit is 13.7° in calm air"
@@ -154,8 +154,8 @@ def test_a_headline_names_a_steep_leg_before_the_arc_that_it_makes_steep() -> No
     """Leg 0 descends 6 degrees, which the aircraft can; the arc to leg 1, which descends 20 degrees, is too steep."""
     verdict = judge_geometry(make_setup(corner(60.0, (-6.0, -20.0))))
     assert of(verdict, "slope", leg(0)).brief == "the arc at waypoint 1"
-    assert verdict.headline.startswith("not flyable: slope on leg 1 (to item 2) (-20° < ")
-    assert "slope on leg 0 (to item 1) (the arc at waypoint 1)" in verdict.headline
+    assert verdict.headline.startswith("not flyable: slope on leg 1, to item 2 (-20° < ")
+    assert "slope on leg 0, to item 1 (the arc at waypoint 1)" in verdict.headline
 
 
 def test_the_arc_and_both_legs_are_named() -> None:
@@ -290,7 +290,7 @@ def test_a_suggested_slope_follows_from_what_the_reason_says_of_the_data_sheet()
     item = of(judge_geometry(setup), "slope", leg(1))
     assert item.ok is False
     assert (
-        "at most 13.7° in calm air; with the uncertainty of a data sheet (± 3.0°) only 8.8° is certain" in item.reason
+        "limit is 13.7° in calm air; with the uncertainty of a data sheet (± 3.0°) only 8.8° is certain" in item.reason
     )
     certain = make_setup([[e, n, u + 400] for e, n, u in hill(16.0)])
     assert "certain" not in of(judge_geometry(certain), "slope", leg(1)).reason

@@ -86,7 +86,7 @@ def test_a_leg_that_is_planned_too_steeply_has_one_value_and_one_limit(
     assert (item.ok, item.planned, item.flown) == (False, pytest.approx(-5.6), pytest.approx(flown))
     assert item.reason.startswith("leg 1 descends 5.6° for 2.0 km; the scenario allows 5.0°")
     assert (item.value, item.effective_limit) == (pytest.approx(-5.6), pytest.approx(-5.01))
-    assert excess_phrase("slope", item) == "slope on leg 1 (to item 2) (-5.6° < -5.01°)"
+    assert excess_phrase("slope", item) == "slope on leg 1, to item 2 (-5.6° < -5.01°)"
     (row,) = finding_rows([item])
     assert (row.planned, row.limit, row.margin) == ("−5.60", "≥\u00a0−5.01", "−0.59")
 
@@ -238,7 +238,7 @@ def test_a_climb_into_a_wind_as_strong_as_the_airspeed_makes_no_progress(monkeyp
     item = of(verdict, "slope", leg(1))
     assert (item.ok, item.limit) == (False, 0.0)
     assert item.reason.startswith(f"{words}; leg 1 climbs 3.0° for 2.0 km at 25 m/s")
-    assert verdict.headline.startswith(f"not flyable: slope on leg 1 (to item 2) ({words})")
+    assert verdict.headline.startswith(f"not flyable: slope on leg 1, to item 2 ({words})")
     measure = SlopeMeasure(slope=LegFit(math.radians(2.0), 0.0, 900.0, is_fitted=True))
     assert f"flown at +2.0°, {words}" in judged(measure, monkeypatch, 0.0, envelope=True, wind=headwind).reason
     # 25 cos 13.7 = 24.29 m/s are as much as a headwind of 24.2 m/s leaves.

@@ -105,5 +105,5 @@ def test_heights_over_a_home_above_the_ground_are_open_where_they_are_too_low_fr
         # From the ground, 75 m are lower by 50.1 m: 5.1 m are missing, and 1 m more is suggested.
         texts = [finding.suggestion for finding in verdict.findings if finding.suggestions]
         home = f"set home to 0.0 m AMSL, the ground there, instead of {alt:.1f} m"
-        assert all(text.startswith(f"{home} and raise both ends of leg 0, ") and " by 6 m" in text for text in texts)
+        assert all(text.startswith(f"{home} and raise both ends of leg 0 (") and " by 6 m" in text for text in texts)
         assert len(texts) == (open_ and frame == 3)
