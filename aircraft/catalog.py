@@ -189,7 +189,13 @@ def read_aircraft(folder: Path) -> Aircraft:
     try:
         table = read_toml(file, "aircraft")
     except OSError as error:
-        advice = _missing_metadata_advice(folder) if isinstance(error, FileNotFoundError) else ""
+        models = sorted(file.stem for file in folder.glob("*.xml")) if isinstance(error, FileNotFoundError) else []
+        advice = (
+            f": the folder has a JSBSim model ({', '.join(models[:3])}), but also needs {folder.name}.toml;"
+            " planfly aircraft --new FOLDER makes a folder with all files"
+            if models
+            else ""
+        )
         raise FlightError(f"{file}: {error.strerror}{advice}", file=file) from None
     except ValueError as error:  # a TOML or a UTF-8 error
         raise FlightError(f"{file}: {' '.join(str(error).split())}", file=file) from None
@@ -210,17 +216,6 @@ def read_aircraft(folder: Path) -> Aircraft:
             value=values["airspeed"],
         )
     return Aircraft(name=folder.name, title=title, folder=folder, model=model, **values)
-
-
-def _missing_metadata_advice(folder: Path) -> str:
-    """Return advice on the missing metadata file if a folder has a JSBSim model, otherwise ""."""
-    models = sorted(file.stem for file in folder.glob("*.xml"))
-    if not models:
-        return ""
-    return (
-        f": the folder has a JSBSim model ({', '.join(models[:3])}), but also needs {folder.name}.toml;"
-        " planfly aircraft --new FOLDER makes a folder with all files"
-    )
 
 
 def _numeric_fields(table: dict[str, Any]) -> dict[str, float]:
@@ -317,7 +312,22 @@ def copy_aircraft_folder(
     1124.9
     """
     target = check_new_folder(folder, overwrite=overwrite)
-    files = _collect_copied_files(source, target.name, model or {})
+    # The metadata, and files that are named after the aircraft, get the name of the copy.
+    model = model or {}
+    folders = [source.folder, *(folder for folder in source.model_folders if source.folder in folder.parents)]
+    source_files = [file for folder in folders if folder.is_dir() for file in folder.iterdir()]
+    files = {}
+    for file in source_files:
+        if file.suffix not in _SUFFIXES or not file.is_file():
+            continue
+        path = file.relative_to(source.folder)
+        new_path = path if path.stem != source.name else path.with_name(f"{target.name}{path.suffix}")
+        files[str(new_path)] = file.read_bytes()
+    metadata = files[f"{target.name}.toml"].decode("utf-8").replace(f"{source.name}.xml", f"{target.name}.xml")
+    shipped_model_file = f"{source.model.shipped}.xml"
+    files |= {f"{target.name}.xml" if file == shipped_model_file else file: data for file, data in model.items()}
+    shipped_model_entry = "" if model else rf'\g<1>"{source.model.shipped}"\n'
+    files[f"{target.name}.toml"] = _SHIPPED_ENTRY.sub(shipped_model_entry, metadata).encode()
     write_aircraft_folder(target, files)
     return tuple(sorted(files))
 
@@ -354,26 +364,3 @@ def check_new_folder(folder: Path, *, overwrite: bool = False) -> Path:
     if not target.parent.is_dir():
         raise FlightError(f"{folder}: its parent folder '{target.parent}' does not exist", file=folder)
     return target
-
-
-def _collect_copied_files(source: Aircraft, name: str, model: Mapping[str, bytes]) -> dict[str, bytes]:
-    """Return the contents of the files of an aircraft's copy, by their paths in the new folder.
-
-    name: name of the copy. The metadata, and files that are named after the aircraft, get this name.
-    model: contents of the JSBSim model's files by path; empty if the copy refers to a model that JSBSim ships.
-    """
-    folders = [source.folder, *(folder for folder in source.model_folders if source.folder in folder.parents)]
-    source_files = [file for folder in folders if folder.is_dir() for file in folder.iterdir()]
-    files = {}
-    for file in source_files:
-        if file.suffix not in _SUFFIXES or not file.is_file():
-            continue
-        path = file.relative_to(source.folder)
-        new_path = path if path.stem != source.name else path.with_name(f"{name}{path.suffix}")
-        files[str(new_path)] = file.read_bytes()
-    metadata = files[f"{name}.toml"].decode("utf-8").replace(f"{source.name}.xml", f"{name}.xml")
-    shipped_model_file = f"{source.model.shipped}.xml"
-    files |= {f"{name}.xml" if file == shipped_model_file else file: data for file, data in model.items()}
-    shipped_model_entry = "" if model else rf'\g<1>"{source.model.shipped}"\n'
-    files[f"{name}.toml"] = _SHIPPED_ENTRY.sub(shipped_model_entry, metadata).encode()
-    return files

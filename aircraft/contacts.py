@@ -142,17 +142,7 @@ def _model_contacts(model: bytes) -> tuple[Contact, ...]:
 
     The aircraft stands on its wheels, or without wheels on its lowest points.
     """
-    contacts = _read_contacts(model)
-    if not any(contact.wheel for contact in contacts):
-        max_depth = max((contact.down for contact in contacts), default=0.0)
-        contacts = [
-            replace(contact, is_support=contact.down >= _MIN_SKID_DEPTH_RATIO * max_depth > 0.0) for contact in contacts
-        ]
-    return tuple(sorted(contacts, key=lambda contact: not contact.is_support))
-
-
-def _read_contacts(model: bytes) -> list[Contact]:
-    """Return the contacts in a model's XML; only wheels have `is_support` set."""
+    # Contacts in the XML; only wheels have `is_support` set.
     section = ElementTree.fromstring(model).find("ground_reactions")
     contacts, centre = [], _center_of_gravity(model)
     for element in [] if section is None else section.findall("contact"):
@@ -162,7 +152,12 @@ def _read_contacts(model: bytes) -> list[Contact]:
         is_wheel = element.get("type", "BOGEY") == "BOGEY"
         forward, right, down = np.array([-1.0, 1.0, -1.0]) * (position - centre)
         contacts.append(Contact(element.get("name", ""), float(forward), float(right), float(down), is_wheel, is_wheel))
-    return contacts
+    if not any(contact.wheel for contact in contacts):
+        max_depth = max((contact.down for contact in contacts), default=0.0)
+        contacts = [
+            replace(contact, is_support=contact.down >= _MIN_SKID_DEPTH_RATIO * max_depth > 0.0) for contact in contacts
+        ]
+    return tuple(sorted(contacts, key=lambda contact: not contact.is_support))
 
 
 def _center_of_gravity(model: bytes) -> Floats:

@@ -303,7 +303,8 @@ def check_sheet(sheet: DataSheet) -> DataSheet:
     aspect = sheet.span**2 / area
     if not _is_within(aspect, *ASPECT_RANGE):
         min_span, max_span = (math.sqrt(aspect_limit * area) for aspect_limit in ASPECT_RANGE)
-        allowed = f"allowed {min_span:.2f}..{max_span:.2f} m with a wing of {area:.3g} m2 ({_area_source(sheet)})"
+        source = "as stated" if sheet.area else "the area for this mass and stall speed; state the area if you know it"
+        allowed = f"allowed {min_span:.2f}..{max_span:.2f} m with a wing of {area:.3g} m2 ({source})"
         raise _range_error("span", sheet.span, allowed, "m")
     electric_options = [name for name, is_given in (("--battery", sheet.volts), ("--motor", sheet.motor)) if is_given]
     if sheet.burns_fuel and electric_options:
@@ -346,11 +347,6 @@ def _wing_area(sheet: DataSheet) -> float:
     return _weight(sheet) / (0.5 * SEA_LEVEL * sheet.stall**2 * CLASSES[sheet.layout].lift_max)
 
 
-def _area_source(sheet: DataSheet) -> str:
-    """Return a phrase on the source of the wing area, for a message."""
-    return "as stated" if sheet.area else "the area for this mass and stall speed; state the area if you know it"
-
-
 @dataclass(frozen=True, slots=True)
 class SizedAircraft:
     """A model that matches a data sheet, and the names of its guessed values.
@@ -390,7 +386,11 @@ def size_aircraft(
     drag = _drag_function(full_sheet, aero)
     if sheet.sink:
         aero, drag = _match_sink(full_sheet, aero, sheet.sink)
-    propulsion, full_sheet = _size_propulsion(sheet, full_sheet, drag)
+    # The performance of motor or engine and propeller is the climb and the top speed in the sheet.
+    try:
+        propulsion, full_sheet = _size_any_motor(sheet, full_sheet, drag)
+    except _NoPropellerError:
+        raise _no_propeller_error(sheet, full_sheet, drag) from None
     if isinstance(propulsion, ElectricMotor):
         propulsion = _with_calibrated_power(propulsion, full_sheet, drag, prior)
     chord = full_sheet.area / full_sheet.span
@@ -557,29 +557,18 @@ def _match_sink(sheet: DataSheet, aero: AeroCoefficients, sink: float) -> tuple[
 
 
 class _NoPropellerError(Exception):
-    """No propeller gives the climb and the top speed of a sheet; `_size_propulsion` adds the reason."""
-
-
-def _size_propulsion(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> tuple[Motor, DataSheet]:
-    """Size the motor or engine with its propeller; return it and the sheet with its performance.
-
-    stated_sheet: sheet with only the stated values.
-    sheet: the sheet with missing values filled in.
-    drag: function that returns the drag in level flight (N) at an airspeed (m/s).
-
-    The performance is the climb and the top speed in the returned sheet. Raises FlightError, with the feasible range of
-    a stated value, if no propeller meets the sheet.
-    """
-    try:
-        return _size_any_motor(stated_sheet, sheet, drag)
-    except _NoPropellerError:
-        raise _no_propeller_error(stated_sheet, sheet, drag) from None
+    """No propeller gives the climb and the top speed of a sheet; `size_aircraft` adds the reason."""
 
 
 def _size_any_motor(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> tuple[Motor, DataSheet]:
     """Size the engine or the electric motor of an aircraft, and its propeller.
 
-    Arguments and result are as for `_size_propulsion`. Raises _NoPropellerError if no propeller meets the sheet.
+    stated_sheet: sheet with only the stated values.
+    sheet: the sheet with missing values filled in.
+    drag: function that returns the drag in level flight (N) at an airspeed (m/s).
+
+    Returns the motor or engine, and the sheet with its performance. Raises _NoPropellerError if no propeller meets the
+    sheet.
 
     A climb at reduced throttle may imply a climb at full throttle beyond `MAX_CLIMB`; the climb at full throttle is
     then this limit.

@@ -119,7 +119,16 @@ def read_uncertainty(folder: Path) -> Uncertainty | None:
     source = table.get("source", "flight logs" if file.name == UNCERTAINTY_FILES[0] else SHEET_SOURCE)
     if not isinstance(source, str) or not source.strip():
         raise FlightError.at(str(file), "source", source, "expected a text", shown=repr(source))
-    _check_keys(table, file)
+    # If a required key were missing, the model would seem certain.
+    known_keys = _REQUIRED_KEYS | _OPTIONAL_KEYS | (_LOG_KEYS if file.name == UNCERTAINTY_FILES[0] else frozenset())
+    missing, unknown = sorted(_REQUIRED_KEYS - table.keys()), sorted(table.keys() - known_keys)
+    suggestion = did_you_mean(unknown[0], sorted(known_keys - table.keys())) if unknown else ""
+    # A misspelled key is missing, too: in this case report the spelling.
+    if missing and not suggestion:
+        raise FlightError(f"{file}: missing {', '.join(missing)}", file=file, field=missing[0])
+    if unknown:
+        message = f"{file}: unknown key {', '.join(unknown)}{suggestion}"
+        raise FlightError(message, file=file, field=unknown[0], value=table[unknown[0]])
     climb_sd, descent_sd = (
         math.radians(_read_number(table, key, file, 0.0, 45.0)) for key in ("climb_sd_deg", "descent_sd_deg")
     )
@@ -137,22 +146,6 @@ def read_uncertainty(folder: Path) -> Uncertainty | None:
     # Older folders have no fastest_sd_mps.
     max_speed_sd = _read_number(table, "fastest_sd_mps", file, 0.0, 100.0) if "fastest_sd_mps" in table else 0.0
     return Uncertainty(source, climb_sd, descent_sd, quantities, power_sd, max_speed_sd=max_speed_sd, **guesses)
-
-
-def _check_keys(table: dict[str, Any], file: Path) -> None:
-    """Raise FlightError if a required key is missing or a key is unknown.
-
-    If a required key were missing, the model would seem certain.
-    """
-    known_keys = _REQUIRED_KEYS | _OPTIONAL_KEYS | (_LOG_KEYS if file.name == UNCERTAINTY_FILES[0] else frozenset())
-    missing, unknown = sorted(_REQUIRED_KEYS - table.keys()), sorted(table.keys() - known_keys)
-    suggestion = did_you_mean(unknown[0], sorted(known_keys - table.keys())) if unknown else ""
-    # A misspelled key is missing, too: in this case report the spelling.
-    if missing and not suggestion:
-        raise FlightError(f"{file}: missing {', '.join(missing)}", file=file, field=missing[0])
-    if unknown:
-        message = f"{file}: unknown key {', '.join(unknown)}{suggestion}"
-        raise FlightError(message, file=file, field=unknown[0], value=table[unknown[0]])
 
 
 def _read_number(table: dict[str, Any], key: str, file: Path, min_value: float, max_value: float) -> float:

@@ -327,12 +327,6 @@ def _finite_or_none(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
-def _airspace_entries(certificate: Certificate) -> dict[str, float]:
-    """Return the certificate's entries for zones and maximum height; empty without both in the scenario."""
-    values = {"zone_distance_m": certificate.zone_distance, "headroom_m": certificate.headroom}
-    return {key: float(value) for key, value in values.items() if np.isfinite(value)}
-
-
 def plan_json(plan: Plan) -> str:
     """Return the plan as the text of a ``plan.json``; equal plans give equal bytes.
 
@@ -347,6 +341,8 @@ def plan_json(plan: Plan) -> str:
     True
     """
     certificate = plan.certificate
+    # Zones and maximum height have entries if the scenario has them.
+    margins = {"zone_distance_m": certificate.zone_distance, "headroom_m": certificate.headroom}
     data = {
         "schema": PLAN_SCHEMA,
         "algorithm": plan.algorithm,
@@ -367,7 +363,7 @@ def plan_json(plan: Plan) -> str:
             "clearance_margin_m": _finite_or_none(certificate.clearance),
             "bounds_margin_m": certificate.bounds,
             "kill_distance_m": _finite_or_none(certificate.kill_distance),
-            **_airspace_entries(certificate),
+            **{key: float(value) for key, value in margins.items() if np.isfinite(value)},
             "problems": list(certificate.problems),
         },
         "history": [[_finite_or_none(value) for value in row] for row in plan.history.tolist()],

@@ -231,8 +231,20 @@ class BlindPrediction:
         battery = volts[rows] if isinstance(volts, np.ndarray) else np.full(rows.shape, volts)
         flat = [array.ravel() for array in (airspeed, signals.throttle[rows], signals.density[rows], battery)]
         _, current = motor.thrust_and_current(*flat)
-        heading = _headings(states, signals.attitude[rows[:, 0], 2], 1.0 / signals.hertz)
-        air = _air_velocity_ned(states, heading)
+        u, v, w, _, pitch_rate, yaw_rate, roll, pitch = np.moveaxis(states, 2, 0)
+        # Heading by integrating the turn rate.
+        rate = (pitch_rate * np.sin(roll) + yaw_rate * np.cos(roll)) / np.cos(pitch)
+        turned = np.cumsum(0.5 * (1.0 / signals.hertz) * (rate[:, 1:] + rate[:, :-1]), axis=1)
+        start_heading = signals.attitude[rows[:, 0], 2][:, np.newaxis]
+        heading = start_heading + np.concatenate([np.zeros((len(states), 1)), turned], axis=1)
+        # Velocity through the air with wings level, then with wings and nose level, then north, east and down.
+        wings_level_down = v * np.sin(roll) + w * np.cos(roll)
+        right = v * np.cos(roll) - w * np.sin(roll)
+        forward = u * np.cos(pitch) + wings_level_down * np.sin(pitch)
+        down = wings_level_down * np.cos(pitch) - u * np.sin(pitch)
+        north = forward * np.cos(heading) - right * np.sin(heading)
+        east = forward * np.sin(heading) + right * np.cos(heading)
+        air = np.stack([north, east, down], axis=2)
         # The wind stays as at the start of the window.
         velocity = air + (measured_velocity - air[:, 0])[:, np.newaxis]
         return _stack_quantities(
@@ -301,32 +313,3 @@ def _stack_quantities(angles: Floats, airspeed: Floats, velocity: Floats, power:
     rows = _compared_rows(angles.shape[1] - 1)
     columns = (angles[:, :, 0], angles[:, :, 1], airspeed, -down, height - height[:, :1], track - track[:, :1], power)
     return np.stack([column[:, rows] for column in columns], axis=2)
-
-
-def _headings(states: Floats, start: Floats, step: float) -> Floats:
-    """Return the headings in windows, rad, (w, n), by integrating the turn rate.
-
-    start: heading at the start of each window, rad, (w,).
-    step: time between samples, s.
-    """
-    roll, pitch = states[:, :, 6], states[:, :, 7]
-    rate = (states[:, :, 4] * np.sin(roll) + states[:, :, 5] * np.cos(roll)) / np.cos(pitch)
-    turned = np.cumsum(0.5 * step * (rate[:, 1:] + rate[:, :-1]), axis=1)
-    return start[:, np.newaxis] + np.concatenate([np.zeros((len(states), 1)), turned], axis=1)
-
-
-def _air_velocity_ned(states: Floats, heading: Floats) -> Floats:
-    """Return the velocity through the air as north, east and down components, m/s, (w, n, 3).
-
-    states: states of `Predictor.simulate`, (w, n, 8).
-    heading: rad, (w, n).
-    """
-    u, v, w, _, _, _, roll, pitch = np.moveaxis(states, 2, 0)
-    # Components with wings level, then with wings and nose level.
-    wings_level_down = v * np.sin(roll) + w * np.cos(roll)
-    right = v * np.cos(roll) - w * np.sin(roll)
-    forward = u * np.cos(pitch) + wings_level_down * np.sin(pitch)
-    down = wings_level_down * np.cos(pitch) - u * np.sin(pitch)
-    north = forward * np.cos(heading) - right * np.sin(heading)
-    east = forward * np.sin(heading) + right * np.cos(heading)
-    return np.stack([north, east, down], axis=2)

@@ -82,11 +82,6 @@ def _product_of_inertia_change(relative_sd: float, min_sd_ratio: float) -> Calla
     return change
 
 
-def _scale_airspeed(signals: Signals, base: BaseModel) -> Changed:
-    """Increase the airspeed by one standard deviation."""
-    return replace(signals, airspeed=signals.airspeed * (1.0 + signals.airspeed_sd)), base
-
-
 def _acceleration_bias(axis: int, bias: float) -> Callable[[Signals, BaseModel], Changed]:
     """Return a function that adds a bias (m/s^2) to an accelerometer.
 
@@ -123,19 +118,6 @@ def _noise_doubling(axes: tuple[int, ...]) -> Callable[[Signals, BaseModel], Cha
     return change
 
 
-def _force_delay(seconds: float) -> Callable[[Signals, BaseModel], Changed]:
-    """Return a function that delays the accelerometers."""
-    return lambda signals, base: (
-        replace(signals, acceleration=signals.delay(signals.acceleration, seconds)),
-        base,
-    )
-
-
-def _surface_delay(seconds: float) -> Callable[[Signals, BaseModel], Changed]:
-    """Return a function that delays the control surfaces by a number of seconds."""
-    return lambda signals, base: (replace(signals, surfaces=signals.delay(signals.surfaces, seconds)), base)
-
-
 def _servo_lag_trade(seconds: float) -> Callable[[Signals, BaseModel], Changed]:
     """Return a function that increases the lag of the servos, and shortens their delay by the same time."""
 
@@ -148,16 +130,6 @@ def _servo_lag_trade(seconds: float) -> Callable[[Signals, BaseModel], Changed]:
         return replace(signals, surfaces=surfaces), base
 
     return change
-
-
-def _current_scaling(factor: float) -> Callable[[Signals, BaseModel], Changed]:
-    """Return a function that multiplies the battery's current by a factor."""
-    return lambda signals, base: (replace(signals, current=signals.current * factor), base)
-
-
-def _unchanged(signals: Signals, base: BaseModel) -> Changed:
-    """Return signals and model unchanged."""
-    return signals, base
 
 
 # Name of the quantity for the accelerometers' noise.
@@ -175,16 +147,29 @@ FIXED_PARAMETERS = (
     FixedParameter("side force of the ailerons (100 %)", _coefficient_change("side_aileron", 1.0, 0.075)),
     FixedParameter("roll of the rudder (100 %)", _coefficient_change("roll_rudder", 1.0, 0.0024)),
     FixedParameter("product of inertia (50 %)", _product_of_inertia_change(0.5, 0.05)),
-    FixedParameter("clock of the accelerometers (15 ms)", _force_delay(0.015)),
-    FixedParameter("clock of the servos (15 ms)", _surface_delay(0.015)),
+    FixedParameter(
+        "clock of the accelerometers (15 ms)",
+        lambda signals, base: (replace(signals, acceleration=signals.delay(signals.acceleration, 0.015)), base),
+    ),
+    FixedParameter(
+        "clock of the servos (15 ms)",
+        lambda signals, base: (replace(signals, surfaces=signals.delay(signals.surfaces, 0.015)), base),
+    ),
     FixedParameter("lag of the servos (15 ms, at the same total delay)", _servo_lag_trade(0.015)),
-    FixedParameter("airspeed (as the wind triangle has it)", _scale_airspeed),
+    FixedParameter(
+        "airspeed (as the wind triangle has it)",
+        lambda signals, base: (replace(signals, airspeed=signals.airspeed * (1.0 + signals.airspeed_sd)), base),
+    ),
     # An error of the level also shows as a bias of the forward accelerometer, which is removed.
     FixedParameter(
         "level of the autopilot (0.2 deg)", _acceleration_bias(0, _LEVEL_SD_RAD * 9.80665), level=_LEVEL_SD_RAD
     ),
-    FixedParameter("mean vertical air (0.04 m/s)", _unchanged, vertical_air=0.04),
+    FixedParameter("mean vertical air (0.04 m/s)", lambda signals, base: (signals, base), vertical_air=0.04),
     FixedParameter("downward accelerometer (0.03 m/s2)", _acceleration_bias(2, 0.03)),
     FixedParameter(ACCELEROMETER_NOISE, _noise_doubling((1, 2))),
-    FixedParameter("scale of the current (2 %)", _current_scaling(1.02), needs_current=True),
+    FixedParameter(
+        "scale of the current (2 %)",
+        lambda signals, base: (replace(signals, current=signals.current * 1.02), base),
+        needs_current=True,
+    ),
 )

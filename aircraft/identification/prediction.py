@@ -121,7 +121,10 @@ class Predictor:
         # A prediction must not start from later samples.
         self._flow = flow_from_forces(signals, base, values, smooth=with_flow)
         self._motor = make_motor(base, values)
-        required = self._required_accelerations()
+        # Moments about roll, pitch and yaw that the measured motion requires, divided by the moments of inertia.
+        ixx, iyy, izz, _ = self._base.inertia
+        moments = required_moments(self._signals, self._base, self._motor)
+        required = np.column_stack([moments["roll"] / ixx, moments["pitch"] / iyy, moments["yaw"] / izz])
         modelled = self._modelled_accelerations(
             self._flow, signals.rates, signals.airspeed, np.arange(len(signals.airspeed))
         )
@@ -188,15 +191,6 @@ class Predictor:
         speed, alpha, beta = self._signals.airspeed[rows], self._flow.alpha[rows], self._flow.beta[rows]
         symmetric_speed = speed * np.cos(beta)
         return np.column_stack([symmetric_speed * np.cos(alpha), speed * np.sin(beta), symmetric_speed * np.sin(alpha)])
-
-    def _required_accelerations(self) -> Floats:
-        """Return the required aerodynamic moments divided by the moments of inertia, rad/s^2, (n, 3).
-
-        These are the moments about roll, pitch and yaw that the measured motion requires.
-        """
-        ixx, iyy, izz, _ = self._base.inertia
-        required = required_moments(self._signals, self._base, self._motor)
-        return np.column_stack([required["roll"] / ixx, required["pitch"] / iyy, required["yaw"] / izz])
 
     def _modelled_accelerations(self, flow: Flow, rates: Floats, airspeed: Floats, rows: Ints) -> Floats:
         """Return the aerodynamic moments of the model divided by the moments of inertia, rad/s^2, (n, 3).

@@ -96,34 +96,20 @@ def load_autopilot(scenario: "Scenario", aircraft: "Aircraft") -> "Autopilot":
     if return_table is not None:
         settings = RtlSettings(return_table.rtl_altitude, return_table.rtl_autoland)
         rtl_parameters = autopilot.returns.make_parameters(settings)
-        _check_no_conflict(scenario, autopilot, rtl_parameters)
+        for parameter, value in rtl_parameters.items():
+            file_value = autopilot.stated_value(parameter)
+            if file_value is not None and not math.isclose(value, file_value, rel_tol=1e-6, abs_tol=1e-6):
+                source = "" if autopilot.parameters is None else autopilot.parameters.source
+                allowed = f"{source} sets {parameter} to {file_value:g}; the two values must be equal"
+                raise ScenarioError.at(scenario.name, f"returns ({parameter})", value, allowed, shown=f"{value:g}")
         autopilot = autopilot.with_parameters(**rtl_parameters) if rtl_parameters else autopilot
+    landing, home, depth = scenario.landing, scenario.home, 0.0
+    if landing is not None and home is not None and scenario.terrain is not None:
+        depth = float(home[2] - scenario.terrain.height(landing.east, landing.north))
     assumed_parameters = autopilot.returns.make_parameters(
-        RtlSettings(lands=scenario.landing is not None, field_depth=_field_depth_below_home(scenario))
+        RtlSettings(lands=landing is not None, field_depth=0.0 if math.isnan(depth) else depth)
     )
     return autopilot.with_parameters("assumed", **assumed_parameters) if assumed_parameters else autopilot
-
-
-def _field_depth_below_home(scenario: "Scenario") -> float:
-    """Return the height of home above the landing point's ground, m; 0 if either altitude is unknown."""
-    landing, home = scenario.landing, scenario.home
-    if landing is None or home is None or scenario.terrain is None:
-        return 0.0
-    depth = float(home[2] - scenario.terrain.height(landing.east, landing.north))
-    return 0.0 if math.isnan(depth) else depth
-
-
-def _check_no_conflict(scenario: "Scenario", autopilot: "Autopilot", rtl_parameters: Mapping[str, float]) -> None:
-    """Raise ScenarioError if a scenario and the user's parameter file give one parameter different values.
-
-    rtl_parameters: parameters that the scenario's RTL settings set.
-    """
-    for name, value in rtl_parameters.items():
-        stated_value = autopilot.stated_value(name)
-        if stated_value is not None and not math.isclose(value, stated_value, rel_tol=1e-6, abs_tol=1e-6):
-            source = "" if autopilot.parameters is None else autopilot.parameters.source
-            allowed = f"{source} sets {name} to {stated_value:g}; the two values must be equal"
-            raise ScenarioError.at(scenario.name, f"returns ({name})", value, allowed, shown=f"{value:g}")
 
 
 def find_program_class(program: Path) -> "type[ProgramAutopilot]":

@@ -34,28 +34,22 @@ def with_parameter(text: str, source: str, values: Mapping[str, float]) -> str:
     stated_names = [name for name in values if name in entries]
     for name in stated_names:
         index = entries[name].where.number - 1
-        lines[index] = _with_value(lines[index], values[name])
+        line, value = lines[index], values[name]
+        columns = line.split("\t")
+        if len(columns) == _QGC_COLUMN_COUNT:
+            lines[index] = "\t".join([*columns[:3], f"{value:.10g}", columns[4]])
+        else:
+            lines[index] = _NAME_AND_VALUE.sub(rf"\g<1>{value:.10g}", line)
     if not stated_names:
+        # The new line has the format of the file's first one.
         model_line = lines[next(iter(entries.values())).where.number - 1]
-        lines.append(_format_parameter_line(model_line, *next(iter(values.items()))))
+        columns, (name, value) = model_line.split("\t"), next(iter(values.items()))
+        if len(columns) == _QGC_COLUMN_COUNT:
+            lines.append("\t".join([columns[0], str(AUTOPILOT), name, f"{value:.10g}", str(_REAL_TYPE)]))
+        else:
+            separator = _NAME_AND_VALUE.match(model_line)
+            lines.append(f"{name}{separator[2] if separator else ' '}{value:.10g}")
     return "\n".join(lines) + "\n"
-
-
-def _with_value(line: str, value: float) -> str:
-    """Return a line of a parameter file with its value replaced."""
-    columns = line.split("\t")
-    if len(columns) == _QGC_COLUMN_COUNT:
-        return "\t".join([*columns[:3], f"{value:.10g}", columns[4]])
-    return _NAME_AND_VALUE.sub(rf"\g<1>{value:.10g}", line)
-
-
-def _format_parameter_line(model_line: str, name: str, value: float) -> str:
-    """Return a line for a parameter in the format of another line of the file, ``model_line``."""
-    columns = model_line.split("\t")
-    if len(columns) == _QGC_COLUMN_COUNT:
-        return "\t".join([columns[0], str(AUTOPILOT), name, f"{value:.10g}", str(_REAL_TYPE)])
-    separator = _NAME_AND_VALUE.match(model_line)
-    return f"{name}{separator[2] if separator else ' '}{value:.10g}"
 
 
 def px4_parameter_text(name: str, value: float, release: str) -> str:

@@ -169,7 +169,11 @@ def parameter_origin(text: str, entries: Mapping[str, Entry]) -> ParameterOrigin
     evidence = ", ".join(names[winner][:_SHOWN_NAMES])
     if winner == header:
         evidence = f'"# Stack: {stack[1][:40]}"' if stack is not None else program[1] if program is not None else ""
-    vehicle = _px4_vehicle(text, entries) if winner == PX4 else _ardupilot_vehicle(text, entries)
+    vehicle = (
+        _px4_vehicle(text, entries)
+        if winner == PX4
+        else _vehicle_by_majority(text, entries, _ARDUPLANE_NAMES, _ARDUPILOT_VEHICLES)
+    )
     return ParameterOrigin(winner, vehicle, evidence)
 
 
@@ -226,11 +230,6 @@ def _px4_vehicle(text: str, entries: Mapping[str, Entry]) -> str:
     if _select_names(entries, _PX4_VTOL.fullmatch):
         return _VTOL
     return _vehicle_by_majority(text, entries, _PX4_PLANE, _PX4_VEHICLES)
-
-
-def _ardupilot_vehicle(text: str, entries: Mapping[str, Entry]) -> str:
-    """Return the vehicle of an ArduPilot file; "" for an aeroplane."""
-    return _vehicle_by_majority(text, entries, _ARDUPLANE_NAMES, _ARDUPILOT_VEHICLES)
 
 
 # ----------------------------------------------------------------------

@@ -42,16 +42,6 @@ Tick = Callable[[Floats, Heights], int]
 Loop = Callable[[Floats, Heights, Records, Floats, Code, Records, Records, int], int]
 
 
-def _initialise_nothing(guidance: Record, record: Record) -> None:
-    """Do nothing, because the control law has no record to initialise."""
-    return
-
-
-def _transfer_nothing(previous_record: Record, record: Record, start: Floats) -> None:
-    """Do nothing, because the control law has no state to transfer to another route."""
-    return
-
-
 @dataclass(frozen=True)
 class ControlLaw:
     """Compiled control law of an autopilot.
@@ -72,18 +62,13 @@ class ControlLaw:
     tick: Tick
     loop: Loop | None = None
     memory: np.dtype[np.record] | None = None
-    initialise: Callable[[Record, Record], None] = _initialise_nothing
-    transfer_state: Callable[[Record, Record, Floats], None] = _transfer_nothing
+    initialise: Callable[[Record, Record], None] = lambda guidance, record: None
+    transfer_state: Callable[[Record, Record, Floats], None] = lambda previous_record, record, start: None
     released_throttle: float = 0.0
 
 
 # ----------------------------------------------------------------------
 # Turns and speeds.
-
-
-def _turn_at_waypoint(turn: float, amsl: float) -> float:
-    """Return 0, the turn distance of an autopilot that turns at the waypoint itself, m."""
-    return 0.0
 
 
 @dataclass(frozen=True)
@@ -105,7 +90,7 @@ class TurnRules:
     """
 
     acceptance_radius: float | None = None
-    distance: Callable[[float, float], float] = _turn_at_waypoint
+    distance: Callable[[float, float], float] = lambda turn, amsl: 0.0
     radii_at: Callable[[Floats], Floats] | None = None
     reads_acceptance: bool = True
     acceptance_limit: float = math.inf
@@ -230,11 +215,6 @@ class RtlSettings(NamedTuple):
     field_depth: float = 0.0
 
 
-def _no_parameters(settings: RtlSettings) -> Mapping[str, float]:
-    """Return no parameters, because RTL settings do not affect the autopilot."""
-    return {}
-
-
 # Reaction of an autopilot to a failure.  "return": RTL; "land": the mission's landing sequence; "land here": a landing
 # where the aircraft is; "autoland": mode AUTOLAND, or RTL without that mode; "on": continue the mission; "landed":
 # none, because the aircraft is on the ground; "never": none, because nothing can trigger the cause; the other reactions
@@ -269,11 +249,6 @@ class LinkLossReaction(NamedTuple):
     delay: float
     parameter: str
     value: float
-
-
-def _continue_mission(use: LinkUse) -> tuple[LinkLossReaction, ...]:
-    """Return no reaction, because the mission continues after the loss of a link."""
-    return ()
 
 
 class Cause(NamedTuple):
@@ -350,21 +325,6 @@ class ReturnTrials(NamedTuple):
 NO_TRIALS = ReturnTrials()
 
 
-def _no_causes(mission: ReturnMission) -> tuple[Cause, ...]:
-    """Return no causes, because no event makes the autopilot leave the mission."""
-    return ()
-
-
-def _no_unsimulated_reason(mission: ReturnMission) -> str:
-    """Return "", because every RTL of the autopilot is simulated."""
-    return ""
-
-
-def _no_unjudged_parts(mission: ReturnMission) -> tuple[str, ...]:
-    """Return no texts, because all parts of an RTL are simulated."""
-    return ()
-
-
 @dataclass(frozen=True)
 class ReturnBehaviour:
     """Behaviour of an autopilot in an RTL; the defaults are ArduPlane's behaviour with its default parameters.
@@ -383,13 +343,13 @@ class ReturnBehaviour:
     """
 
     rules: ReturnRules = DEFAULT_RETURN_RULES
-    make_parameters: Callable[[RtlSettings], Mapping[str, float]] = _no_parameters
-    after_link_loss: Callable[[LinkUse], tuple[LinkLossReaction, ...]] = _continue_mission
+    make_parameters: Callable[[RtlSettings], Mapping[str, float]] = lambda settings: {}
+    after_link_loss: Callable[[LinkUse], tuple[LinkLossReaction, ...]] = lambda use: ()
     fly: FlyReturns | None = None
     flies_without_engine: bool = False
-    causes: Callable[[ReturnMission], tuple[Cause, ...]] = _no_causes
-    unsimulated_text: Callable[[ReturnMission], str] = _no_unsimulated_reason
-    unjudged_texts: Callable[[ReturnMission], tuple[str, ...]] = _no_unjudged_parts
+    causes: Callable[[ReturnMission], tuple[Cause, ...]] = lambda mission: ()
+    unsimulated_text: Callable[[ReturnMission], str] = lambda mission: ""
+    unjudged_texts: Callable[[ReturnMission], tuple[str, ...]] = lambda mission: ()
     path_text: str = ""
     trials: ReturnTrials = NO_TRIALS
 
@@ -424,16 +384,6 @@ def straight_glide(height: float, run: float, tail_wind: float, amsl: float) -> 
     return LandingGlide(height / run)
 
 
-def _cruise_to_landing(cruise: float, tail_wind: float, amsl: float) -> float:
-    """Return the cruise airspeed (m/s), at which the autopilot flies the landing."""
-    return cruise
-
-
-def _unknown_height(stated_height: float, takeoff_height: float) -> None:
-    """Return None, because the height of a go-around is unknown."""
-    return None
-
-
 @dataclass(frozen=True)
 class GroundRules:
     """Rules of take-off, landing and go-around; by default the autopilot flies neither take-off nor landing.
@@ -455,8 +405,8 @@ class GroundRules:
     control_law: Callable[[GroundPhases, Aircraft, Sequence[Contact]], ControlLaw] | None = None
     needs_both_ends: bool = False
     glide: Callable[[float, float, float, float], LandingGlide] = straight_glide
-    airspeed: Callable[[float, float, float], float] = _cruise_to_landing
-    go_around_height: Callable[[float, float], float | None] = _unknown_height
+    airspeed: Callable[[float, float, float], float] = lambda cruise, tail_wind, amsl: cruise
+    go_around_height: Callable[[float, float], float | None] = lambda stated_height, takeoff_height: None
     launch_trigger: tuple[float, str] | None = None
 
 
@@ -574,11 +524,6 @@ PX4_DEFAULT_LIMITS = FeasibilityLimits()
 MissionDialect = Literal["planfly", "ardupilot", "px4"]
 
 
-def _no_unsimulated_settings(mission: MissionParts) -> list[str]:
-    """Return no sentence, because all settings are simulated."""
-    return []
-
-
 @dataclass(frozen=True)
 class MissionChecks:
     """Reading and checks of missions, and the settings on which they depend; by default nothing is refused.
@@ -606,7 +551,7 @@ class MissionChecks:
     any_inclusion_suffices: bool = False
     battery_failsafes: tuple[BatteryFailsafe, ...] = ()
     return_time_failsafe: ReturnTimeFailsafe | None = None
-    describe_unsimulated_settings: Callable[[MissionParts], list[str]] = _no_unsimulated_settings
+    describe_unsimulated_settings: Callable[[MissionParts], list[str]] = lambda mission: []
     parameter_notes: tuple[str, ...] = ()
 
 
@@ -660,11 +605,6 @@ def _no_tracking_error(
     return None
 
 
-def _no_altitude_miss(climb_reserve: float, sink_reserve: float, turbulence: Turbulence) -> float:
-    """Return the probability 0, because gusts never carry the aircraft out of an altitude tolerance."""
-    return 0.0
-
-
 def _no_displacement(reserve: float, turbulence: Turbulence) -> float:
     """Return a displacement of 0 m, because the autopilot holds its altitude in gusts."""
     return 0.0
@@ -690,7 +630,9 @@ class Deviations:
     tracking_error: TrackingErrorFunction = _no_tracking_error
     gust_sink: Callable[[float, Turbulence], float] = _no_displacement
     gust_rise: Callable[[float, Turbulence], float] = _no_displacement
-    altitude_miss_probability: Callable[[float, float, Turbulence], float] = _no_altitude_miss
+    altitude_miss_probability: Callable[[float, float, Turbulence], float] = (
+        lambda climb_reserve, sink_reserve, turbulence: 0.0
+    )
     altitude_parameter: str = ""
     altitude_candidates: tuple[Candidate, ...] = ()
     track_candidates: tuple[Candidate, ...] = ()

@@ -101,7 +101,10 @@ def make_point_mass(
     record.airspeed, record.first_airspeed, record.has_power = airspeed, speeds[0], has_power
     record.airspeed_step, record.altitude_step = speeds[1] - speeds[0], _ALTITUDES_M[1] - _ALTITUDES_M[0]
     record.alpha, record.alpha_lift = alpha, lift
-    record.induced = _induced_drag_factor(speeds, excess[0, :, 0])
+    # Fit the induced drag factor b (m^2/s^2) to glides: in straight flight at the airspeed V the drag per weight is a
+    # V^2 + b / V^2. In a bank, b grows as the square of the load factor.
+    terms = np.stack([speeds**2, speeds**-2.0], axis=1)
+    record.induced = max(0.0, float(least_squares(terms, -excess[0, :, 0] / speeds)[1]))
     record.wind_speed, record.wind_gradient, record.wind_reference = wind.speed, wind.gradient, wind.reference_amsl
     record.wind_east, record.wind_north = -math.sin(wind.from_course), -math.cos(wind.from_course)
     record.max_wind = wind.speed
@@ -219,19 +222,6 @@ def _resample_power(envelope: Envelope, table: Floats, speeds: Floats) -> Floats
         _fill_gaps(column)
     by_speed = np.stack([np.interp(speeds, envelope.airspeed, column) for column in filled.T], axis=1)
     return np.stack([np.interp(_ALTITUDES_M, envelope.amsl, row) for row in by_speed])
-
-
-def _induced_drag_factor(speeds: Floats, excess: Floats) -> float:
-    """Fit the induced drag factor b (m^2/s^2) to glides; it is at least 0.
-
-    In straight flight at the airspeed V the drag per weight is a V^2 + b / V^2. In a bank, b grows as the square of the
-    load factor.
-
-    speeds: airspeeds of the glides, m/s, (v,).
-    excess: specific excess power of the glides, m/s, (v,).
-    """
-    terms = np.stack([speeds**2, speeds**-2.0], axis=1)
-    return max(0.0, float(least_squares(terms, -excess / speeds)[1]))
 
 
 @inner

@@ -4,7 +4,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.catalog import Aircraft
 from flight.dynamics.fdm import Fdm
@@ -202,11 +201,7 @@ def _step_response(
         fdm.write(moved_commands if _STEP_TIME_S <= k / _RATE_HZ < _STEP_TIME_S + hold_time else commands)
         fdm.step()
         states[k + 1] = fdm.read()
-    change = np.column_stack([_unwrap_states(states, name) - states[name][0] for name in quantities])
+    change = np.column_stack(
+        [(np.unwrap(states[name]) if name == "yaw" else states[name]) - states[name][0] for name in quantities]
+    )
     return StepResponse(control, size, hold_time, states["time"].copy(), quantities, change)
-
-
-def _unwrap_states(states: NDArray[np.record], name: str) -> Floats:
-    """Return one quantity of the states, (t,), without the jumps of the yaw by 2 pi."""
-    values: Floats = states[name]
-    return np.unwrap(values) if name == "yaw" else values

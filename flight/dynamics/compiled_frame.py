@@ -15,7 +15,6 @@ from flight.dynamics.ground_contact import contact_forces, friction_acceleration
 from flight.dynamics.instructions import Code, run_instructions
 from flight.dynamics.jsbsim_properties import FOOT
 from flight.dynamics.vectors import (
-    Matrix,
     Vector,
     add,
     cross,
@@ -194,10 +193,24 @@ def step(frame: Record, numbers: Floats, code: Code, contacts: Records, friction
     run_instructions(numbers, code, code[FCS_START], code[AERO_START])
     _update_air_data(frame)
     run_instructions(numbers, code, code[AERO_START], code[EXTERNAL_START])
-    force, moment = _aerodynamic_forces(frame)
+    # Aerodynamic force (lbf) and moment about the center of gravity (lbf ft), in body axes.
+    cos, sin = math.cos(frame.alpha), math.sin(frame.alpha)
+    drag, side, lift = vector_of(frame.aero_force)
+    force = transform(((cos, 0.0, -sin), (0.0, 1.0, 0.0), (sin, 0.0, cos)), (-drag, side, -lift))
+    moment = add(vector_of(frame.aero_moment), cross(vector_of(frame.aero_arm), force))
     ground_force, ground_moment, count = contact_forces(frame, contacts, frictions)
     run_instructions(numbers, code, code[EXTERNAL_START], code[FORCES_START])
-    external_force, external_moment = _external_forces(numbers, code)
+    # Sums of the external forces (lbf) and moments (lbf ft), in body axes; the section of forces names the registers of
+    # each force and its axes.
+    external_force, external_moment = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    for k in range(code[FORCES_START], code[READS_START], FORCE_NUMBERS):
+        magnitude, first_axis = numbers[code[k]], int(code[k + 1])
+        single_force = scale(magnitude, _read_registers(numbers, first_axis + FORCE_DIRECTION))
+        pure_moment = scale(magnitude, _read_registers(numbers, first_axis + MOMENT_DIRECTION))
+        external_force = add(external_force, single_force)
+        external_moment = add(
+            external_moment, add(pure_moment, cross(_read_registers(numbers, first_axis + FORCE_ARM), single_force))
+        )
     force = add(add(force, ground_force), external_force)
     moment = add(add(moment, ground_moment), external_moment)
     _accelerate(frame, force, moment)
@@ -253,21 +266,14 @@ def _update_position(frame: Record) -> None:
         1.0 - ECCENTRICITY_2 * cos_geocentric * cos_geocentric
     )
     sin_lon, cos_lon = y / axis_distance, x / axis_distance
-    set_matrix(frame.earth_to_local, _local_axes(sin_lat, cos_lat, sin_lon, cos_lon))
-
-
-@inlined
-def _local_axes(sin_lat: float, cos_lat: float, sin_lon: float, cos_lon: float) -> Matrix:
-    """Return the matrix that transforms vectors from axes fixed to the earth to local axes.
-
-    Local axes point north, east and down.
-
-    sin_lat, cos_lat, sin_lon, cos_lon: sines and cosines of latitude and longitude.
-    """
-    return (
-        (-cos_lon * sin_lat, -sin_lon * sin_lat, cos_lat),
-        (-sin_lon, cos_lon, 0.0),
-        (-cos_lon * cos_lat, -sin_lon * cos_lat, -sin_lat),
+    # Local axes point north, east and down.
+    set_matrix(
+        frame.earth_to_local,
+        (
+            (-cos_lon * sin_lat, -sin_lon * sin_lat, cos_lat),
+            (-sin_lon, cos_lon, 0.0),
+            (-cos_lon * cos_lat, -sin_lon * cos_lat, -sin_lat),
+        ),
     )
 
 
@@ -358,32 +364,6 @@ def _update_air_data(frame: Record) -> None:
         frame.span_time = frame.wing_span / double_airspeed
         frame.chord_time = frame.wing_chord / double_airspeed
     frame.pressure_area = frame.wing_area * frame.dynamic_pressure
-
-
-@inlined
-def _aerodynamic_forces(frame: Record) -> tuple[Vector, Vector]:
-    """Return the aerodynamic force (lbf) and moment about the center of gravity (lbf ft), in body axes."""
-    cos, sin = math.cos(frame.alpha), math.sin(frame.alpha)
-    drag, side, lift = vector_of(frame.aero_force)
-    force = transform(((cos, 0.0, -sin), (0.0, 1.0, 0.0), (sin, 0.0, cos)), (-drag, side, -lift))
-    return force, add(vector_of(frame.aero_moment), cross(vector_of(frame.aero_arm), force))
-
-
-@inlined
-def _external_forces(numbers: Floats, code: Code) -> tuple[Vector, Vector]:
-    """Return the sums of the external forces (lbf) and of the external moments (lbf ft), in body axes.
-
-    numbers: registers of the model.
-    code: header and sections of instructions; the section of forces names the registers of each force and its axes.
-    """
-    force, moment = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-    for k in range(code[FORCES_START], code[READS_START], FORCE_NUMBERS):
-        magnitude, first_axis = numbers[code[k]], int(code[k + 1])
-        single_force = scale(magnitude, _read_registers(numbers, first_axis + FORCE_DIRECTION))
-        pure_moment = scale(magnitude, _read_registers(numbers, first_axis + MOMENT_DIRECTION))
-        force = add(force, single_force)
-        moment = add(moment, add(pure_moment, cross(_read_registers(numbers, first_axis + FORCE_ARM), single_force)))
-    return force, moment
 
 
 @inlined

@@ -17,7 +17,6 @@ from flight.dynamics.instructions import LOWER_LIMIT, Code
 from flight.dynamics.jsbsim_properties import FOOT, FORCES, GUST, MASS, MODEL_FIELDS, STATE_PROPERTIES, TERRAIN, WIND
 from flight.dynamics.model_program import (
     FRAME_PROPERTIES,
-    ModelProgram,
     UnsupportedModel,
     frame_register,
     translate,
@@ -94,7 +93,18 @@ class CompiledModel:
             raise UnsupportedModel("a flat earth")
         program = translate(fdm.model_text())
         self._fdm, self._program = fdm, program
-        self.properties = _frame_properties() | program.properties
+        # Register of each JSBSim property that the frame holds, by name, then those of the program.
+        vector_registers = {
+            name: frame_register(field, k)
+            for field, names in _VECTOR_PROPERTIES.items()
+            for k, name in enumerate(names)
+        }
+        number_registers = {name: frame_register(field) for field, name in _NUMBER_PROPERTIES.items()}
+        self.properties = (
+            vector_registers
+            | number_registers
+            | {name: frame_register(*field_and_element) for name, field_and_element in FRAME_PROPERTIES.items()}
+        ) | program.properties
         # Two more registers: a zero for quantities that the aircraft lacks, and one for outputs that are not used.
         self.numbers: Floats = np.array([*program.numbers, 0.0, 0.0])
         zero_register = len(program.numbers)
@@ -112,7 +122,18 @@ class CompiledModel:
             for field, name in _CONTACT_FIELDS.items()
         ]
         self.frames: Records = self.numbers[:FRAME_NUMBERS].view(FRAME)
-        self.code = _pack_code(program, [self._state_register(field, zero_register) for field in reads], writes, steps)
+        # The code is the header, then the sections in order.
+        forces = [number for force in program.forces for number in (force.magnitude, force.axes)]
+        sections = (
+            program.fcs,
+            program.aero,
+            program.external,
+            forces,
+            [self._state_register(field, zero_register) for field in reads],
+            writes,
+        )
+        bounds = accumulate(map(len, sections), initial=CODE_HEADER)
+        self.code = np.array([steps, *bounds, *(number for section in sections for number in section)], dtype=np.uint32)
         self._copy_state()
 
     def find_differences(self) -> list[str]:
@@ -186,16 +207,7 @@ class CompiledModel:
             numbers[block.first_register : block.first_register + LOWER_LIMIT] = _actuator_numbers(
                 numbers[block.source], *block[2:], frame.dt
             )
-        self._copy_contacts(centre)
-        initialise_attitude(self.frames, self._fdm.attitudes())
-
-    def _copy_contacts(self, centre: Sequence[float]) -> None:
-        """Copy the contacts from JSBSim.
-
-        Raises UnsupportedModel if a contact is on the ground, because JSBSim has no property for its friction forces.
-
-        centre: center of gravity in JSBSim's structural frame, inches.
-        """
+        # JSBSim has no property for the friction forces of a contact on the ground.
         read_property, frame = self._fdm.properties.read, self.frames[0]
         frame.centre, frame.terrain = centre, self._fdm.terrain_amsl / FOOT
         for contact, data in zip(self.contacts, self._program.contacts, strict=True):
@@ -207,6 +219,7 @@ class CompiledModel:
                 contact[field] = getattr(data, field)
         arms = np.linalg.norm(self.contacts["arm"], axis=1)
         frame.contact_reach = float(np.max(arms, initial=0.0)) + _REACH_MARGIN_FT
+        initialise_attitude(self.frames, self._fdm.attitudes())
 
     def _perturb_inputs(self, initial_registers: Floats, round_number: int) -> None:
         """Perturb commands and gusts equally in JSBSim and in the compiled model, with new signs in each round.
@@ -249,31 +262,6 @@ class CompiledModel:
 def _is_equal(a: float, b: float) -> bool:
     """Return True if two numbers are equal, or if both are NaN."""
     return a == b or (math.isnan(a) and math.isnan(b))
-
-
-def _frame_properties() -> dict[str, int]:
-    """Return the register of each JSBSim property that the frame holds, by name."""
-    vector_registers = {
-        name: frame_register(field, k) for field, names in _VECTOR_PROPERTIES.items() for k, name in enumerate(names)
-    }
-    number_registers = {name: frame_register(field) for field, name in _NUMBER_PROPERTIES.items()}
-    return (
-        vector_registers
-        | number_registers
-        | {name: frame_register(*field_and_element) for name, field_and_element in FRAME_PROPERTIES.items()}
-    )
-
-
-def _pack_code(program: ModelProgram, reads: Sequence[int], writes: Sequence[int], steps: int) -> Code:
-    """Return the code of a program: the header, then the sections in order.
-
-    reads, writes: registers that are read and written in each tick.
-    steps: time steps in a tick.
-    """
-    forces = [number for force in program.forces for number in (force.magnitude, force.axes)]
-    sections = (program.fcs, program.aero, program.external, forces, reads, writes)
-    bounds = accumulate(map(len, sections), initial=CODE_HEADER)
-    return np.array([steps, *bounds, *(number for section in sections for number in section)], dtype=np.uint32)
 
 
 def _arm_about_center(position: Sequence[float], centre: Sequence[float]) -> list[float]:

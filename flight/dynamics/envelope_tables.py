@@ -52,14 +52,25 @@ def load_envelope(aircraft: Aircraft, *, motor_braking: bool = False) -> Envelop
     13.6 degrees up, 7.7 down
     """
     file = cache_file(aircraft, motor_braking)
-    key = _cache_key(aircraft, motor_braking)
+    # The tables depend on these values; a cache file must contain the same values.
+    key = {
+        "schema": _SCHEMA_VERSION,
+        "aircraft": aircraft.name,
+        "model_hash": model_hash(aircraft),
+        "motor_braking": motor_braking,
+        "jsbsim": JSBSIM_VERSION,
+    }
     tables = _read_cache_file(file, key, _grid_airspeeds(aircraft))
     if tables is None:
         tables = compute_tables(aircraft, motor_braking)
         write_tables(file, key, tables)
     uncertainty = read_uncertainty(aircraft.folder)
     if uncertainty is not None and uncertainty.source == SHEET_SOURCE:
-        tables["level_speed_min"] = _limit_to_stall_speed(tables, aircraft.stall_speed)
+        # A model made from a data sheet can fly a few per cent slower than the stall speed of the sheet: scale the
+        # lowest airspeeds so that sea level has at least the stated one, up to the highest airspeed of level flight.
+        model_speeds = tables["level_speed_min"]
+        factor = max(1.0, aircraft.stall_speed / float(model_speeds[0])) if model_speeds[0] > 0.0 else 1.0
+        tables["level_speed_min"] = np.asarray(np.minimum(factor * model_speeds, tables["level_speed_max"]).round(9))
     return Envelope(
         source="" if uncertainty is None else uncertainty.source,
         climb_sd=0.0 if uncertainty is None else uncertainty.climb_sd,
@@ -76,20 +87,6 @@ def load_envelope(aircraft: Aircraft, *, motor_braking: bool = False) -> Envelop
         volts=aircraft.battery_voltage,
         **tables,
     )
-
-
-def _limit_to_stall_speed(tables: Mapping[str, Floats], stall_speed: float) -> Floats:
-    """Scale the lowest level-flight airspeeds so that sea level has at least the stated stall speed.
-
-    A model made from a data sheet can fly a few per cent slower than the stall speed of the sheet. The scaled airspeeds
-    are in m/s, one per altitude, and at most the highest airspeed of level flight.
-
-    tables: tables of the envelope by name, with the lowest and highest airspeed of level flight at each altitude, m/s.
-    stall_speed: m/s.
-    """
-    model_speeds = tables["level_speed_min"]
-    factor = max(1.0, stall_speed / float(model_speeds[0])) if model_speeds[0] > 0.0 else 1.0
-    return np.asarray(np.minimum(factor * model_speeds, tables["level_speed_max"]).round(9))
 
 
 def cache_file(aircraft: Aircraft, motor_braking: bool) -> Path:
@@ -193,17 +190,6 @@ def _grid_airspeeds(aircraft: Aircraft) -> Floats:
     They extend from the stall speed to 5 m/s above the maximum commanded airspeed; both speeds are rounded up.
     """
     return np.linspace(math.ceil(aircraft.stall_speed), math.ceil(aircraft.airspeed_max) + 5.0, _AIRSPEED_COUNT)
-
-
-def _cache_key(aircraft: Aircraft, motor_braking: bool) -> dict[str, Any]:
-    """Return the values on which the tables depend; a cache file must contain the same values."""
-    return {
-        "schema": _SCHEMA_VERSION,
-        "aircraft": aircraft.name,
-        "model_hash": model_hash(aircraft),
-        "motor_braking": motor_braking,
-        "jsbsim": JSBSIM_VERSION,
-    }
 
 
 def _read_cache_file(file: Path, key: dict[str, Any], airspeeds: Floats) -> dict[str, Floats] | None:

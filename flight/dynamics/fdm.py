@@ -244,7 +244,19 @@ class Fdm:
         self._gear = gear
         # Roll, pitch and yaw of all evaluations, one after the other.
         self._attitudes = array("d")
-        self._exec = _new_instance(aircraft, self.dt, flat_earth, is_tested or aircraft.is_embedded, gear)
+        is_tested = is_tested or aircraft.is_embedded
+        with silence() as read_output, temporary_folder("planfly-model-") as folder:
+            self._exec = jsbsim.FGFDMExec(str(folder))
+            load_model(
+                self._exec,
+                folder,
+                aircraft,
+                self.dt,
+                read_output,
+                flat_earth=flat_earth,
+                is_tested=is_tested,
+                gear=gear,
+            )
         access = PropertyAccess(self._exec.get_property_manager(), aircraft.model_file)
         self.properties = access
         if flat_earth:
@@ -533,19 +545,3 @@ def _apply_variation(properties: PropertyAccess, aircraft: Aircraft, variation: 
         properties.set("motor/battery-v", variation.volts * aircraft.battery_voltage)
     for name, value in variation.properties:
         properties.set(name, value)
-
-
-def _new_instance(
-    aircraft: Aircraft, dt: float, flat_earth: bool, is_tested: bool, gear: Gear | None
-) -> jsbsim.FGFDMExec:
-    """Return a JSBSim instance with an aircraft's model.
-
-    dt: time step, s.
-    flat_earth: True for a plane without rotation.
-    is_tested: True if a user's model is known not to abort JSBSim; otherwise the model is tested first.
-    gear: gear to add for ground contact, or None.
-    """
-    with silence() as read_output, temporary_folder("planfly-model-") as folder:
-        instance = jsbsim.FGFDMExec(str(folder))
-        load_model(instance, folder, aircraft, dt, read_output, flat_earth=flat_earth, is_tested=is_tested, gear=gear)
-    return instance

@@ -117,7 +117,7 @@ class PropertyAccess:
     def getter(self, name: str) -> Getter:
         """Return a function that reads a property; for "" it returns zero. Raises FlightError if it is undefined."""
         if not name:
-            return _read_zero
+            return lambda: 0.0
         return self._node(name).get_double_value
 
     def setter(self, name: str) -> Setter:
@@ -143,8 +143,3 @@ class PropertyAccess:
         """Set a property; do nothing if the model lacks it and the value is its default."""
         if value != default or self._manager.hasNode(name):
             self.set(name, value)
-
-
-def _read_zero() -> float:
-    """Return zero, as the reading of a quantity that the aircraft lacks."""
-    return 0.0

@@ -166,7 +166,10 @@ def check_model(
     while pending_readers:
         reader = pending_readers.pop()
         for name, location in reader.included_files.items():
-            path = _find_file(name, folders)
+            # The name may omit the suffix ".xml".
+            names = () if Path(name).name != name or name.startswith(".") else (name, f"{name}.xml")
+            files = (folder / file_name for folder in folders for file_name in names)
+            path = next((file for file in files if file.is_file()), None)
             if path is None:
                 message = f"{reader.file}:{location} includes another file, which is not in the aircraft's folder"
                 raise FlightError(message, file=reader.file, field="file", value=name)
@@ -174,7 +177,16 @@ def check_model(
                 readers[path.name] = _read_model(path, main=False, remove_channels=shipped)
                 pending_readers.append(readers[path.name])
     if not shipped:
-        _check_property_names(list(readers.values()), provided)
+        created_names = set().union(*(reader.created_names for reader in readers.values()))
+        has_parts = any(reader.has_parts for reader in readers.values())
+        for reader in readers.values():
+            for name, line in reader.used_names.items():
+                if name in created_names or (has_parts and _PART_PROPERTIES.match(name)) or provided(name):
+                    continue
+                message = (
+                    f"{reader.file}:{line}: the property {name} is read, but neither JSBSim nor the model defines it"
+                )
+                raise FlightError(message, file=reader.file, field=name)
     return {name: reader.without_channels() for name, reader in readers.items()}
 
 
@@ -205,32 +217,6 @@ def _read_stamped_model(file: Path, _stamp: tuple[int, ...] | None, main: bool, 
     reader = _Reader(file, main=main, remove_channels=remove_channels)
     reader.read()
     return reader
-
-
-def _find_file(name: str, folders: Sequence[Path]) -> Path | None:
-    """Return the path of a file in one of the folders, or None; the name may omit the suffix ".xml"."""
-    if Path(name).name != name or name.startswith("."):
-        return None
-    file_names = (name, f"{name}.xml")
-    return next(
-        (folder / file_name for folder in folders for file_name in file_names if (folder / file_name).is_file()), None
-    )
-
-
-def _check_property_names(readers: Sequence[_Reader], provided: Callable[[str], bool]) -> None:
-    """Raise FlightError if a model reads a property that neither JSBSim nor the model creates.
-
-    readers: readers of the model's files.
-    provided: function that returns True for the name of a property that JSBSim creates.
-    """
-    created_names = set().union(*(reader.created_names for reader in readers))
-    has_parts = any(reader.has_parts for reader in readers)
-    for reader in readers:
-        for name, line in reader.used_names.items():
-            if name in created_names or (has_parts and _PART_PROPERTIES.match(name)) or provided(name):
-                continue
-            message = f"{reader.file}:{line}: the property {name} is read, but neither JSBSim nor the model defines it"
-            raise FlightError(message, file=reader.file, field=name)
 
 
 # ----------------------------------------------------------------------

@@ -206,7 +206,15 @@ class _Translator:
         self.properties = {
             name: frame_register(*field_and_element) for name, field_and_element in FRAME_PROPERTIES.items()
         }
-        self._declare_properties()
+        # Each property that the model creates has a register, because it may be read before it is computed.
+        for section in self.sections:
+            for element in section.iter():
+                if element.tag == "property" and "value" in element.attrib:
+                    self._property_register(_element_text(element))
+                elif element.tag in _COMPONENTS:
+                    self._property_register(_check_model_property(_component_property(element)))
+                elif element.tag == "function" and "name" in element.attrib:
+                    self._property_register(_check_model_property(element.attrib["name"]))
         controls, aerodynamics, reactions = self.sections
         fcs = self._translate_section(self._translate_flight_control, controls)
         aero = self._translate_section(self._translate_aerodynamics, aerodynamics)
@@ -221,17 +229,6 @@ class _Translator:
         return tuple(self._code)
 
     # Registers and instructions.
-
-    def _declare_properties(self) -> None:
-        """Assign a register to each property that the model creates, which may be read before it is computed."""
-        for section in self.sections:
-            for element in section.iter():
-                if element.tag == "property" and "value" in element.attrib:
-                    self._property_register(_element_text(element))
-                elif element.tag in _COMPONENTS:
-                    self._property_register(_check_model_property(_component_property(element)))
-                elif element.tag == "function" and "name" in element.attrib:
-                    self._property_register(_check_model_property(element.attrib["name"]))
 
     def _property_register(self, name: str) -> int:
         """Return the register of a property; assign a new register to a new property."""

@@ -219,7 +219,10 @@ def solve_trim(
     for quantity, value in fixed_values.items():
         values[QUANTITIES.index(quantity)] = value
     free_indices = np.array([k for k, quantity in enumerate(QUANTITIES) if quantity not in fixed_values])
-    lower_bounds, upper_bounds = _trim_bounds(limits)
+    # Airspeed (m/s), climb, angle of attack, bank, elevator, aileron, rudder (rad) and throttle.
+    elevator, aileron, rudder = limits
+    lower_bounds = np.array([5.0, -1.2, -0.4, -0.5, -elevator, -aileron, -rudder, 0.0])
+    upper_bounds = np.array([80.0, 1.2, 0.4, 0.5, elevator, aileron, rudder, 1.0])
     residual = apply_trim(values)
     min_residual, stalled_steps, failed_steps = math.inf, 0, 0
     for _ in range(_MAX_ITERATIONS):
@@ -254,19 +257,6 @@ def solve_trim(
             failed_steps += 1
         values, residual = trial, trial_residual
     return values if np.abs(residual).max() < 10.0 * _MAX_TRIM_ACCELERATION else None
-
-
-def _trim_bounds(limits: tuple[float, float, float]) -> tuple[Floats, Floats]:
-    """Return the lower and the upper bounds of a trim vector, each (8,).
-
-    The elements are airspeed (m/s), climb, angle of attack, bank, elevator, aileron, rudder (rad) and throttle.
-
-    limits: elevator, aileron and rudder limits, rad.
-    """
-    elevator, aileron, rudder = limits
-    lower_bounds = np.array([5.0, -1.2, -0.4, -0.5, -elevator, -aileron, -rudder, 0.0])
-    upper_bounds = np.array([80.0, 1.2, 0.4, 0.5, elevator, aileron, rudder, 1.0])
-    return lower_bounds, upper_bounds
 
 
 def trim(

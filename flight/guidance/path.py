@@ -481,40 +481,21 @@ def waypoint_records(route: Route, mission: Mission | None = None, *, fly_over: 
         for name, value in zip(names, route.rtl_loiter, strict=True):
             return_waypoints[name] = value
     if last_before_return is not None and last_before_return >= 0:
-        waypoints["turn"][last_before_return] = _turn_before_return(route, last_before_return, items)
-        _set_exit_bearing(waypoints, last_before_return, items)
+        # ArduPlane reads the missing position of an RTL item as 0 N, 0 E (`AP_Mission::get_next_ground_course_cd`): the
+        # bearing of that place decides the turn before the RTL, and is that on which a loiter there is left.
+        last_item, turn = items.get(int(route.items[last_before_return])), 0.5 * math.pi
+        if last_item is not None and last_item.has_position:
+            lat, lon = last_item.lat_deg, last_item.lon_deg
+            # `Location::get_bearing_to`.
+            bearing = math.atan2(-lon, -lat / math.cos(math.radians(0.5 * lat)))
+            if last_before_return > 0:
+                turn = abs(wrap(bearing - float(leg_courses(route.positions)[last_before_return - 1])))
+            if stated_loiter(last_item) is not None:
+                is_loiter = waypoints["stop"] == waypoints["stop"][last_before_return]
+                waypoints["exit_bearing"][is_loiter] = bearing % (2.0 * math.pi) or 2.0 * math.pi
+        waypoints["turn"][last_before_return] = turn
     _set_landing(waypoints, mission)
     return waypoints
-
-
-def _turn_before_return(route: Route, index: int, items: dict[int, MissionItem]) -> float:
-    """Return the turn angle that ArduPlane computes at the waypoint before an RTL, rad.
-
-    The angle is a right angle if it is unknown. The RTL item has no position, which ArduPlane reads as 0 N, 0 E
-    (`AP_Mission::get_next_ground_course_cd`, `Location::get_bearing_to`).
-    """
-    item = items.get(int(route.items[index]))
-    if index == 0 or item is None or not item.has_position:
-        return 0.5 * math.pi
-    return float(abs(wrap(_bearing_to_origin(item) - float(leg_courses(route.positions)[index - 1]))))
-
-
-def _bearing_to_origin(item: MissionItem) -> float:
-    """Return the bearing from an item to 0 N, 0 E, rad (`Location::get_bearing_to`)."""
-    return math.atan2(-item.lon_deg, -item.lat_deg / math.cos(math.radians(0.5 * item.lat_deg)))
-
-
-def _set_exit_bearing(waypoints: Records, last_index: int, items: dict[int, MissionItem]) -> None:
-    """Set the bearing at which ArduPlane leaves a loiter before an RTL, if there is such a loiter.
-
-    It is the bearing of 0 N, 0 E, because the RTL item has no position, and ArduPlane reads this as 0 N, 0 E.
-
-    last_index: index of the last waypoint before the RTL.
-    """
-    item = items.get(int(waypoints["item"][last_index]))
-    if item is not None and item.has_position and stated_loiter(item) is not None:
-        bearing = _bearing_to_origin(item) % (2.0 * math.pi)
-        waypoints["exit_bearing"][waypoints["stop"] == waypoints["stop"][last_index]] = bearing or 2.0 * math.pi
 
 
 def _set_landing(waypoints: Records, mission: Mission | None) -> None:
@@ -570,22 +551,6 @@ def _piece_index(path: FlyByPath, distances: Floats) -> NDArray[np.intp]:
     return np.maximum(0, np.searchsorted(path.pieces["start"], distances, side="right") - 1)
 
 
-def _path_points(path: FlyByPath, distances: Floats) -> Floats:
-    """Return the points at n distances (m) along the path, (n, 3) m."""
-    pieces = path.pieces[_piece_index(path, distances)]
-    course, curvature, distances_along = pieces["course"], pieces["curvature"], distances - pieces["start"]
-    is_straight = curvature == 0.0
-    nonzero_curvature, end_course = np.where(is_straight, 1.0, curvature), course + curvature * distances_along
-    east = np.where(
-        is_straight, distances_along * np.sin(course), (np.cos(course) - np.cos(end_course)) / nonzero_curvature
-    )
-    north = np.where(
-        is_straight, distances_along * np.cos(course), (np.sin(end_course) - np.sin(course)) / nonzero_curvature
-    )
-    up = [profile_at(path.nodes, float(s))[0] for s in distances]
-    return np.column_stack([pieces["east"] + east, pieces["north"] + north, up])
-
-
 def path_polyline(path: FlyByPath) -> tuple[Floats, NDArray[np.int64]]:
     """Return the path as a polyline: n points, (n, 3) m, and the leg of each of the n - 1 segments.
 
@@ -608,7 +573,19 @@ def path_polyline(path: FlyByPath) -> tuple[Floats, NDArray[np.int64]]:
         unsorted_distances += [node.distance + node.half_length * fraction for fraction in (-1.0, -0.5, 0.0, 0.5, 1.0)]
     clipped_distances = np.clip(np.array(unsorted_distances), 0.0, path.length)
     distances = np.unique(np.round(clipped_distances, 6))
-    points = _path_points(path, distances)
+    point_pieces = path.pieces[_piece_index(path, distances)]
+    course, distances_along = point_pieces["course"], distances - point_pieces["start"]
+    is_straight = point_pieces["curvature"] == 0.0
+    nonzero_curvature = np.where(is_straight, 1.0, point_pieces["curvature"])
+    end_course = course + point_pieces["curvature"] * distances_along
+    east = np.where(
+        is_straight, distances_along * np.sin(course), (np.cos(course) - np.cos(end_course)) / nonzero_curvature
+    )
+    north = np.where(
+        is_straight, distances_along * np.cos(course), (np.sin(end_course) - np.sin(course)) / nonzero_curvature
+    )
+    up = [profile_at(path.nodes, float(s))[0] for s in distances]
+    points = np.column_stack([point_pieces["east"] + east, point_pieces["north"] + north, up])
     midpoints = 0.5 * (distances[1:] + distances[:-1])
     pieces = path.pieces[_piece_index(path, midpoints)]
     return points, (pieces["leg"] + (midpoints > pieces["leg_change"])).astype(np.int64)

@@ -461,7 +461,12 @@ class Link:
             if message is None:
                 continue
             peer = self.peers.get(source)
-            if frame.number == mavlink.MAVLINK_MSG_ID_HEARTBEAT or self._is_local_request(message, source):
+            # A message from this machine is accepted even if its sender sends no heartbeats.
+            if frame.number == mavlink.MAVLINK_MSG_ID_HEARTBEAT or (
+                is_loopback(source[0])
+                and getattr(message, "target_system", 0) == SYSTEM
+                and self._is_for_vehicle(message)
+            ):
                 peer = self._register_peer(source, frame.system, frame.component)
             if peer is None:
                 self.dropped.stranger += 1
@@ -472,15 +477,6 @@ class Link:
                 peer.system, peer.component = frame.system, frame.component
                 messages.append((message, peer))
         return messages
-
-    def _is_local_request(self, message: Any, source: Address) -> bool:
-        """Return True if a message comes from this machine and states the vehicle's system id as its target.
-
-        Such a message is accepted even if its sender sends no heartbeats.
-        """
-        return (
-            is_loopback(source[0]) and getattr(message, "target_system", 0) == SYSTEM and self._is_for_vehicle(message)
-        )
 
     def _notice_stranger(self, message: Any, host: str) -> None:
         """Add a notice that messages from an address are not answered, once for each address."""
@@ -531,16 +527,18 @@ class Link:
             if len(self.peers) >= MAX_PEERS:
                 return None
             # Each station gets one sequence of frames: it would treat gaps between two sequences as lost packets.
-            peer = Peer(source, system, component, now, self._frame_encoder(source))
+            peer = Peer(
+                source,
+                system,
+                component,
+                now,
+                self._expected_stations.get(source) or mavlink.MAVLink(None, SYSTEM, COMPONENT),
+            )
             # Spread over the first tenth of a second, so that not everything is sent at once.
             peer.due = {name: now + 0.1 * index / len(PERIODS) for index, name in enumerate(PERIODS)}
             self.peers[source] = peer
         peer.last_heard_time = now
         return peer
-
-    def _frame_encoder(self, address: Address) -> Any:
-        """Return the encoder of frames to an address; each address has its own sequence numbers."""
-        return self._expected_stations.get(address) or mavlink.MAVLink(None, SYSTEM, COMPONENT)
 
     @staticmethod
     def _is_for_vehicle(message: Any) -> bool:

@@ -322,11 +322,6 @@ class _FinishedUpload:
     remaining_count: int
 
 
-def _deny_go_to(_item: MissionItem) -> str:
-    """Return the refusal of a command to fly to a position, by a vehicle that is not in flight."""
-    return "go-to denied: not in flight"
-
-
 @dataclass(slots=True)
 class MissionServer:
     """Three lists of items and their transfers.
@@ -341,7 +336,7 @@ class MissionServer:
     lists: dict[MissionType, tuple[MissionItem, ...]] = field(default_factory=lambda: dict.fromkeys(MissionType, ()))
     changed: set[MissionType] = field(default_factory=set)
     locked: str = ""
-    go_to: Callable[[MissionItem], str] = _deny_go_to
+    go_to: Callable[[MissionItem], str] = lambda item: "go-to denied: not in flight"
     _uploads: dict[MissionType, _Upload] = field(default_factory=dict)
     # Station of the last finished upload of each list: its final ACK is repeated if its last item arrives again.
     _finished: dict[MissionType, _FinishedUpload] = field(default_factory=dict)
@@ -352,7 +347,10 @@ class MissionServer:
         now: time of any clock that never goes back, s.
         """
         if message.get_type() in _HANDLERS and message.get_type() not in _ITEM_MESSAGES:
-            self._stop_confirmations(station)
+            # A station that sends other messages needs no last items again.
+            for finished in self._finished.values():
+                if finished.station == station:
+                    finished.remaining_count = 0
         try:
             kind = MissionType(getattr(message, "mission_type", 0))
         except ValueError:
@@ -396,7 +394,8 @@ class MissionServer:
         if count > MAX_UPLOADED_ITEMS:
             text = f"{count} items: at most {MAX_UPLOADED_ITEMS} are stored"
             return [self._ack(station, mavlink.MAV_MISSION_NO_SPACE, kind, text)]
-        self._drop_other_uploads(station)
+        # The uploads of other, silent stations are dropped.
+        self._uploads = {kind: upload for kind, upload in self._uploads.items() if upload.station == station}
         if count == 0:
             return self._clear_lists(station, (kind,), kind, now)
         # MISSION_COUNT always begins a new upload: a station that starts over with the same count must not have its
@@ -445,7 +444,14 @@ class MissionServer:
             item = from_message(message, _TITLES[kind])
         except MissionError as error:
             return [self._reject_upload(upload, kind, _refusal_result(message), str(error))]
-        placement_problem = _placement_problem(item, kind)
+        is_allowed = (
+            item.command in _ALLOWED_COMMANDS[kind]
+            if kind in _ALLOWED_COMMANDS
+            else item.command not in _ALLOWED_COMMANDS[MissionType.FENCE]
+        )
+        placement_problem = (
+            "" if is_allowed else f"{_TITLES[kind]}: item {item.seq}: command {item.command} does not belong there"
+        )
         if placement_problem:
             return [self._reject_upload(upload, kind, mavlink.MAV_MISSION_UNSUPPORTED, placement_problem)]
         upload.items.append(item)
@@ -525,12 +531,6 @@ class MissionServer:
         del self._uploads[kind]
         return []
 
-    def _stop_confirmations(self, station: Station) -> None:
-        """Stop requesting a station's last items again, because the station now sends other messages."""
-        for finished in self._finished.values():
-            if finished.station == station:
-                finished.remaining_count = 0
-
     def _upload_refusal(self, station: Station, kind: MissionType, now: float) -> str:
         """Return the reason why a station must not change a list now, or ""."""
         if self.locked and kind == MissionType.MISSION:
@@ -539,10 +539,6 @@ class MissionServer:
             if upload.station != station and now - upload.last_message_time <= LOCK_TIMEOUT_S:
                 return f"another station (system {upload.station.system}) is uploading"
         return ""
-
-    def _drop_other_uploads(self, station: Station) -> None:
-        """Drop the uploads of other, silent stations when a station takes the upload lock."""
-        self._uploads = {kind: upload for kind, upload in self._uploads.items() if upload.station == station}
 
     def _request_next_item(self, upload: _Upload, kind: MissionType, now: float) -> MissionReply:
         """Return the request for the next item of an upload."""
@@ -567,16 +563,6 @@ def _item_request(
 ) -> MissionReply:
     """Return the request for an item of an upload."""
     return MissionReply(station, message_class(station.system, station.component, seq, int(kind)))
-
-
-def _placement_problem(item: MissionItem, kind: MissionType) -> str:
-    """Return the reason why an item does not belong in a list, or ""."""
-    is_allowed = (
-        item.command in _ALLOWED_COMMANDS[kind]
-        if kind in _ALLOWED_COMMANDS
-        else item.command not in _ALLOWED_COMMANDS[MissionType.FENCE]
-    )
-    return "" if is_allowed else f"{_TITLES[kind]}: item {item.seq}: command {item.command} does not belong there"
 
 
 def _refusal_result(message: Any) -> int:

@@ -263,9 +263,48 @@ class Requests:
     _waiting_commands: list[_WaitingArmCommand] = field(default_factory=list)
 
     def handle(self, message: Any, peer: Peer, now: float) -> list[Response]:
-        """Return the responses to a message; a message without a handler has none."""
-        handler = _HANDLERS.get(message.get_type())
-        return handler(self, message, peer, now) if handler else []
+        """Return the responses to a message; messages of other types have none."""
+        match message.get_type():
+            case "COMMAND_LONG" | "COMMAND_INT":
+                return self._on_command(message, peer, now)
+            case "SET_MODE":
+                # SET_MODE is a message; ArduPilot acknowledges it as the command of its number.
+                reply, command = self.arming.set_mode(int(message.custom_mode)), mavlink.MAVLINK_MSG_ID_SET_MODE
+                return self._acknowledge(peer, message.get_srcSystem(), message.get_srcComponent(), command, reply)
+            case "MISSION_SET_CURRENT":
+                return self._on_mission_set_current(message, peer, now)
+            case "SET_POSITION_TARGET_GLOBAL_INT" | "SET_POSITION_TARGET_LOCAL_NED":
+                return [StatusText(_NO_GUIDED_TARGET_TEXT, WARNING)]
+            case "REQUEST_DATA_STREAM":
+                rate = int(message.req_message_rate)
+                period = min(_MAX_PERIOD_S, max(_MIN_PERIOD_S, 1.0 / rate)) if message.start_stop and rate else None
+                for name in STREAMS.get(int(message.req_stream_id), ()):
+                    peer.periods[name], peer.due[name] = period, now
+            case "PARAM_REQUEST_LIST":
+                # All parameters are sent, from the first one.
+                peer.next_parameter = 0.0
+            case "PARAM_REQUEST_READ":
+                number = self.parameters.find(message.param_id, int(message.param_index))
+                return [] if number is None else [PeerMessage(peer, self.parameters.message(number))]
+            case "PARAM_SET":
+                number, problem = self.parameters.set(
+                    message.param_id, float(message.param_value), in_flight=self.arming.flying
+                )
+                # A new value of the parameter `FORCE` applies to the next arming.
+                self.arming.force = self.parameters[FORCE] != 0.0
+                replies: list[Response] = [StatusText(problem, WARNING)] if problem else []
+                if number is not None:
+                    replies.append(PeerMessage(peer, self.parameters.message(number)))
+                return replies
+            # A PING with a target and a TIMESYNC with tc1 are answers, which get no response.
+            case "PING" if not (message.target_system or message.target_component):
+                pong = mavlink.MAVLink_ping_message(
+                    message.time_usec, message.seq, message.get_srcSystem(), message.get_srcComponent()
+                )
+                return [PeerMessage(peer, pong)]
+            case "TIMESYNC" if message.tc1 == 0:
+                return [PeerMessage(peer, mavlink.MAVLink_timesync_message(int(self.status.wall * 1e9), message.ts1))]
+        return []
 
     def on_verdict(self) -> list[Response]:
         """Return the responses to arm commands that have waited for the verdict."""
@@ -354,22 +393,6 @@ class Requests:
             peer.due[name] = now
         return CommandResult(ACCEPTED)
 
-    def _set_streams(self, message: Any, peer: Peer, now: float) -> list[Response]:
-        """Set the rate of all messages of a stream (REQUEST_DATA_STREAM)."""
-        for name in STREAMS.get(int(message.req_stream_id), ()):
-            rate = int(message.req_message_rate)
-            period = min(_MAX_PERIOD_S, max(_MIN_PERIOD_S, 1.0 / rate)) if message.start_stop and rate else None
-            peer.periods[name] = period
-            peer.due[name] = now
-        return []
-
-    def _set_mode(self, message: Any, peer: Peer, _now: float) -> list[Response]:
-        """Set the mode that SET_MODE states, and acknowledge it."""
-        reply = self.arming.set_mode(int(message.custom_mode))
-        # SET_MODE is a message; ArduPilot acknowledges it as the command of its number.
-        number = mavlink.MAVLINK_MSG_ID_SET_MODE
-        return self._acknowledge(peer, message.get_srcSystem(), message.get_srcComponent(), number, reply)
-
     def _on_mission_set_current(self, message: Any, peer: Peer, now: float) -> list[Response]:
         """Set the item at which the mission starts or continues (MISSION_SET_CURRENT).
 
@@ -383,49 +406,6 @@ class Requests:
         # the refusal still causes one repetition.
         peer.due["MISSION_CURRENT"] = now + _MISSION_CURRENT_PAUSE_S
         return [StatusText(reply.text, WARNING)]
-
-    def _refuse_guided_item(self, _message: Any, _peer: Peer, _now: float) -> list[Response]:
-        """Refuse a target position for GUIDED in a SET_POSITION_TARGET message, with a text on the alternative."""
-        return [StatusText(_NO_GUIDED_TARGET_TEXT, WARNING)]
-
-    def _list_parameters(self, _message: Any, peer: Peer, _now: float) -> list[Response]:
-        """Start to send all parameters to a station, from the first one."""
-        peer.next_parameter = 0.0
-        return []
-
-    def _read_parameter(self, message: Any, peer: Peer, _now: float) -> list[Response]:
-        """Return the parameter that a station requests."""
-        number = self.parameters.find(message.param_id, int(message.param_index))
-        return [] if number is None else [PeerMessage(peer, self.parameters.message(number))]
-
-    def _write_parameter(self, message: Any, peer: Peer, _now: float) -> list[Response]:
-        """Set a parameter for a station; answer with its value, and with the reason if the value is refused.
-
-        A new value of the parameter `FORCE` applies to the next arming.
-        """
-        number, problem = self.parameters.set(
-            message.param_id, float(message.param_value), in_flight=self.arming.flying
-        )
-        self.arming.force = self.parameters[FORCE] != 0.0
-        replies: list[Response] = [StatusText(problem, WARNING)] if problem else []
-        if number is not None:
-            replies.append(PeerMessage(peer, self.parameters.message(number)))
-        return replies
-
-    def _on_ping(self, message: Any, peer: Peer, _now: float) -> list[Response]:
-        """Answer a PING request; a PING with a target is an answer and gets no response."""
-        if message.target_system or message.target_component:
-            return []
-        pong = mavlink.MAVLink_ping_message(
-            message.time_usec, message.seq, message.get_srcSystem(), message.get_srcComponent()
-        )
-        return [PeerMessage(peer, pong)]
-
-    def _on_timesync(self, message: Any, peer: Peer, _now: float) -> list[Response]:
-        """Answer a TIMESYNC request; a TIMESYNC answer (tc1 not 0) gets no response."""
-        if message.tc1 != 0:
-            return []
-        return [PeerMessage(peer, mavlink.MAVLink_timesync_message(int(self.status.wall * 1e9), message.ts1))]
 
     @staticmethod
     def _acknowledge(peer: Peer, system: int, component: int, number: int, reply: CommandResult) -> list[Response]:
@@ -486,18 +466,4 @@ _MESSAGE_COMMANDS: dict[int, int | None] = {
     mavlink.MAV_CMD_GET_MESSAGE_INTERVAL: None,
     mavlink.MAV_CMD_GET_HOME_POSITION: mavlink.MAVLINK_MSG_ID_HOME_POSITION,
     mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION,
-}
-_HANDLERS: dict[str, Callable[[Requests, Any, Peer, float], list[Response]]] = {
-    "COMMAND_LONG": Requests._on_command,
-    "COMMAND_INT": Requests._on_command,
-    "SET_MODE": Requests._set_mode,
-    "MISSION_SET_CURRENT": Requests._on_mission_set_current,
-    "SET_POSITION_TARGET_GLOBAL_INT": Requests._refuse_guided_item,
-    "SET_POSITION_TARGET_LOCAL_NED": Requests._refuse_guided_item,
-    "REQUEST_DATA_STREAM": Requests._set_streams,
-    "PARAM_REQUEST_LIST": Requests._list_parameters,
-    "PARAM_REQUEST_READ": Requests._read_parameter,
-    "PARAM_SET": Requests._write_parameter,
-    "PING": Requests._on_ping,
-    "TIMESYNC": Requests._on_timesync,
 }

@@ -2,6 +2,7 @@
 
 import math
 import struct
+from collections.abc import Callable
 from dataclasses import astuple, dataclass, fields, replace
 from typing import Any, NamedTuple
 
@@ -131,7 +132,7 @@ class SnapshotMaker:
             v_down=-v_up,
             roll=roll,
             pitch=pitch,
-            yaw=_wrap_angle(yaw - convergence),
+            yaw=math.remainder(yaw - convergence, 2.0 * math.pi),
             p=p,
             q=q,
             r=r,
@@ -153,11 +154,6 @@ def _rotate_to_true_north(vector: Floats, convergence: float) -> tuple[float, fl
     east, north, up = (float(value) for value in vector)
     cos, sin = math.cos(convergence), math.sin(convergence)
     return east * cos - north * sin, north * cos + east * sin, up
-
-
-def _wrap_angle(angle: float) -> float:
-    """Return an angle within -pi..pi, rad."""
-    return math.remainder(angle, 2.0 * math.pi)
 
 
 # ----------------------------------------------------------------------
@@ -395,11 +391,6 @@ def _hud_message(status: Status) -> Any:
     )
 
 
-def _mission_current_message(status: Status) -> Any:
-    """Return MISSION_CURRENT for a status."""
-    return mavlink.MAVLink_mission_current_message(status.current, status.total, status.mission_state, 0)
-
-
 def _sys_status_message(status: Status) -> Any:
     """Return SYS_STATUS for a status."""
     healthy_sensors = _SENSORS | (_PREARM if status.ready else 0)
@@ -489,18 +480,6 @@ def _home_message(status: Status) -> Any:
     )
 
 
-def _autopilot_version_message(_status: Status) -> Any:
-    """Return AUTOPILOT_VERSION, which is the same for every status."""
-    return mavlink.MAVLink_autopilot_version_message(
-        _CAPABILITIES, _VERSION, 0, 0, 0, list(b"planfly\0"), [0] * 8, [0] * 8, 0, 0, 0x706C616E
-    )
-
-
-def _system_time_message(status: Status) -> Any:
-    """Return SYSTEM_TIME for a status."""
-    return mavlink.MAVLink_system_time_message(int(status.wall * 1e6), _boot_ms(status))
-
-
 def _to_int16(value: float) -> int:
     """Return a rounded number, limited to the range of an int16."""
     return max(-32767, min(32767, round(value)))
@@ -511,18 +490,22 @@ def _to_degrees(angle: float) -> float:
     return math.degrees(angle) % 360.0
 
 
-_MESSAGE_MAKERS = {
+_MESSAGE_MAKERS: dict[str, Callable[[Status], Any]] = {
     "HEARTBEAT": heartbeat,
     "ATTITUDE": _attitude_message,
     "GLOBAL_POSITION_INT": _position_message,
     "VFR_HUD": _hud_message,
-    "MISSION_CURRENT": _mission_current_message,
+    "MISSION_CURRENT": lambda status: mavlink.MAVLink_mission_current_message(
+        status.current, status.total, status.mission_state, 0
+    ),
     "SYS_STATUS": _sys_status_message,
     "GPS_RAW_INT": _gps_message,
     "WIND": _wind_message,
     "WIND_COV": _wind_cov_message,
     "EXTENDED_SYS_STATE": _extended_state_message,
     "HOME_POSITION": _home_message,
-    "AUTOPILOT_VERSION": _autopilot_version_message,
-    "SYSTEM_TIME": _system_time_message,
+    "AUTOPILOT_VERSION": lambda status: mavlink.MAVLink_autopilot_version_message(
+        _CAPABILITIES, _VERSION, 0, 0, 0, list(b"planfly\0"), [0] * 8, [0] * 8, 0, 0, 0x706C616E
+    ),
+    "SYSTEM_TIME": lambda status: mavlink.MAVLink_system_time_message(int(status.wall * 1e6), _boot_ms(status)),
 }

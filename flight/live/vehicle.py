@@ -122,34 +122,25 @@ class Downlink:
             self._link.remove_silent_peers()
             self._link.send_heartbeat(heartbeat(self._status))
         for peer in self._link.peers.values():
-            self._send_telemetry(peer, now)
-            self._stream_parameters(peer)
-
-    def _send_telemetry(self, peer: Peer, now: float) -> None:
-        """Send the telemetry messages that are due to a station.
-
-        A message that the station has switched off becomes due again after a heartbeat's period.
-        """
-        for name, due_time in peer.due.items():
-            if now < due_time:
-                continue
-            period = peer.periods[name]
-            if period is None:
-                peer.due[name] = now + _HEARTBEAT_PERIOD_S
-                continue
-            self._link.send(telemetry_message(name, self._status), peer)
-            peer.due[name] = due_time + period if now - due_time < _MAX_DELAY_S else now + period
-
-    def _stream_parameters(self, peer: Peer) -> None:
-        """Send the next parameters to a station that requested all of them."""
-        if peer.next_parameter is None:
-            return
-        first_number, entries = int(peer.next_parameter), self._parameters.entries
-        peer.next_parameter += max(1.0, PARAMETERS_PER_SECOND * self._pause)
-        for number in range(first_number, min(int(peer.next_parameter), len(entries))):
-            self._link.send(self._parameters.message(number), peer)
-        if peer.next_parameter >= len(entries):
-            peer.next_parameter = None
+            # Send the telemetry that is due. A message that the station has switched off becomes due again after a
+            # heartbeat's period.
+            for name, due_time in peer.due.items():
+                if now < due_time:
+                    continue
+                period = peer.periods[name]
+                if period is None:
+                    peer.due[name] = now + _HEARTBEAT_PERIOD_S
+                    continue
+                self._link.send(telemetry_message(name, self._status), peer)
+                peer.due[name] = due_time + period if now - due_time < _MAX_DELAY_S else now + period
+            # Send the next parameters to a station that requested all of them.
+            if peer.next_parameter is not None:
+                first_number, entries = int(peer.next_parameter), self._parameters.entries
+                peer.next_parameter += max(1.0, PARAMETERS_PER_SECOND * self._pause)
+                for number in range(first_number, min(int(peer.next_parameter), len(entries))):
+                    self._link.send(self._parameters.message(number), peer)
+                if peer.next_parameter >= len(entries):
+                    peer.next_parameter = None
 
 
 # ----------------------------------------------------------------------
@@ -289,7 +280,10 @@ class Vehicle:
         """
         self.link = link
         self.arming = ArmingState()
-        self.server = MissionServer(go_to=self._go_to)
+        self.server = MissionServer(
+            # Fly to the item's position, and loiter there.
+            go_to=lambda item: self.arming.go_to(LoiterCenter(item.lat_deg, item.lon_deg, item.alt, item.frame)).text
+        )
         self.status = Status(standby.snapshot, standby.home, battery=battery, volts=volts)
         self.downlink = Downlink(link, self.status, parameters, show, _MAX_WAIT_S)
         self.requests = Requests(self.arming, parameters, self.status, self._set_start_item)
@@ -353,7 +347,12 @@ class Vehicle:
         now = self._clock()
         self.status.boot, self.status.wall = now - self._start_time, time.time()
         if self._flight in ready_sources:
-            self._receive_events()
+            # A flight process that has died is started again.
+            try:
+                while self._flight.poll():
+                    self._handle_event(read_event(self._flight.recv_bytes()))
+            except (EOFError, BrokenPipeError, ConnectionResetError):
+                self._restart_process()
         if self.link in ready_sources:
             for message, peer in self.link.receive():
                 self._handle_message(message, peer, now)
@@ -413,7 +412,12 @@ class Vehicle:
             self.arming.end_requested = False
             self._send_request(EndFlight())
         if self.arming.loiter_center is not None:
-            self._divert(self.arming.loiter_center)
+            # Divert to the mission's current item, to home, or to a loiter.
+            mission, shift = uploaded_mission(self.server.lists, self._standby.home)
+            mission = replace(mission, home=self.status.home)
+            if self.arming.mode == AUTO:
+                mission = mission_from_item(mission, self.status.current - shift)
+            self._send_request(DivertFlight(self.arming.mode, mission, self.arming.loiter_center))
             self.arming.loiter_center = None
         if self.arming.should_start:
             self.arming.on_flight_started()
@@ -451,29 +455,6 @@ class Vehicle:
         self._send_request(JudgeMission(mission, self._mission_number, self._autopilot_parameters))
         self._refresh_status()
 
-    def _divert(self, center: LoiterCenter) -> None:
-        """Request a diversion for the current mode: to the mission's current item, to home, or to a loiter."""
-        mission, shift = uploaded_mission(self.server.lists, self._standby.home)
-        mission = replace(mission, home=self.status.home)
-        if self.arming.mode == AUTO:
-            mission = mission_from_item(mission, self.status.current - shift)
-        self._send_request(DivertFlight(self.arming.mode, mission, center))
-
-    def _go_to(self, item: MissionItem) -> str:
-        """Request a flight to an item's position and a loiter there; return the reason for a refusal, or ""."""
-        return self.arming.go_to(LoiterCenter(item.lat_deg, item.lon_deg, item.alt, item.frame)).text
-
-    def _handle_diversion(self, event: FlightDiverted) -> None:
-        """Report a diversion to stations, or restore the previous mode if the flight cannot be diverted."""
-        if event.problem:
-            requested_mode, self.arming.mode = self.arming.mode, event.mode
-            self.arming.set_flight_mode(event.mode)
-            self.downlink.send_text(f"{MODE_NAMES[requested_mode]} refused: {event.problem}", WARNING)
-        else:
-            self._progress.start_route(event.items if event.mode == AUTO else ())
-            self.downlink.send_text(f"flying in {MODE_NAMES[event.mode]}")
-        self._refresh_status()
-
     def _set_start_item(self, seq: int) -> CommandResult:
         """Set the item from which the next flight starts or, in flight, at which the flight continues.
 
@@ -504,14 +485,6 @@ class Vehicle:
         except (BrokenPipeError, ConnectionResetError):
             self._restart_process()
 
-    def _receive_events(self) -> None:
-        """Handle all waiting events of the flight process; restart the process if it has died."""
-        try:
-            while self._flight.poll():
-                self._handle_event(read_event(self._flight.recv_bytes()))
-        except (EOFError, BrokenPipeError, ConnectionResetError):
-            self._restart_process()
-
     def _restart_process(self) -> None:
         """Start another flight process after a crash, because an abort of JSBSim must not end the vehicle."""
         self._flight.close()
@@ -535,7 +508,15 @@ class Vehicle:
         elif isinstance(event, MissionJudged):
             self._handle_verdict(event)
         elif isinstance(event, FlightDiverted):
-            self._handle_diversion(event)
+            # Without a diversion, the previous mode is restored.
+            if event.problem:
+                requested_mode, self.arming.mode = self.arming.mode, event.mode
+                self.arming.set_flight_mode(event.mode)
+                self.downlink.send_text(f"{MODE_NAMES[requested_mode]} refused: {event.problem}", WARNING)
+            else:
+                self._progress.start_route(event.items if event.mode == AUTO else ())
+                self.downlink.send_text(f"flying in {MODE_NAMES[event.mode]}")
+            self._refresh_status()
         elif isinstance(event, FlightEnded):
             self._handle_flight_end(event.end_reason)
         elif isinstance(event, ProcessReady):

@@ -236,7 +236,15 @@ def view_shape(records: ZoneRecords, z: int, line: MapSegment, max_distance: flo
         east_offset, north_offset = zone.centre_east - line.east, zone.centre_north - line.north
         along = east_offset * line.course_east + north_offset * line.course_north
         across = north_offset * line.course_east - east_offset * line.course_north
-        return _view_circle(along, across, zone.radius, line.length)
+        distance_beyond_end = along - min(line.length, max(0.0, along))
+        min_distance = math.sqrt(distance_beyond_end * distance_beyond_end + across * across) - zone.radius
+        max_inside_distance = math.sqrt(max(abs(along), abs(along - line.length)) ** 2 + across * across) - zone.radius
+        is_inside = along * along + across * across <= zone.radius * zone.radius
+        # The line is outside, or inside, or crosses the outline.
+        distance = min_distance if min_distance > 0.0 else max(0.0, -max_inside_distance)
+        return ShapeView(
+            is_inside, distance, across - zone.radius, across + zone.radius, along - zone.radius, along + zone.radius
+        )
     is_inside, distance2 = False, math.inf
     right = math.inf
     left = -math.inf
@@ -273,23 +281,6 @@ def view_shape(records: ZoneRecords, z: int, line: MapSegment, max_distance: flo
         distance2 = min(distance2, _edge_distance2(along, across, to_along, to_across, line.length))
     distance = math.sqrt(distance2)
     return ShapeView(is_inside, distance if distance <= max_distance else math.inf, right, left, first, last)
-
-
-@inlined
-def _view_circle(along: float, across: float, radius: float, horizontal_length: float) -> ShapeView:
-    """Measure a circle in the axes of a line.
-
-    along, across: position of the centre along and across the line, from the start of the line, m.
-    radius: m.
-    horizontal_length: length of the line, m.
-    """
-    distance_beyond_end = along - min(horizontal_length, max(0.0, along))
-    min_distance = math.sqrt(distance_beyond_end * distance_beyond_end + across * across) - radius
-    max_inside_distance = math.sqrt(max(abs(along), abs(along - horizontal_length)) ** 2 + across * across) - radius
-    is_inside = along * along + across * across <= radius * radius
-    # The line is outside, or inside, or crosses the outline.
-    distance = min_distance if min_distance > 0.0 else max(0.0, -max_inside_distance)
-    return ShapeView(is_inside, distance, across - radius, across + radius, along - radius, along + radius)
 
 
 @inlined

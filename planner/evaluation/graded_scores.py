@@ -144,7 +144,12 @@ def score_legs(
     add_leg_violations(data, limits, path, legs, corners, True, violations)
     if data.tracking.has_error:
         compute_height_lags(data.tracking, aircraft, limits.wind, path, legs, lags)
-        _measure_tracked_corners(corners, flown_corners, extents)
+        # The flown corners have the tracking error's excursion.
+        for i in range(1, corners.shape[0] - 1):
+            flown, excursion = flown_corners[i], corners[i].excursion
+            flown.radius, flown.blend_deviation, flown.fly_by_offset = 0.0, 0.0, excursion
+            flown.missile_distance = excursion if excursion <= CORNER_TOLERANCE_M else 0.0
+            extents[i] = max(corners[i].before, corners[i].after)
     else:
         _measure_arcs(aircraft, data.legs_hold_turns, data.fly_over, path, legs, corners, flown_corners, extents)
     length = 0.0
@@ -357,16 +362,6 @@ def _max_lag_near(lag: Record, leg: Record, corner: Record) -> tuple[float, floa
     """
     start_lag, settled_lag = lag_at(lag, 0.0), lag_at(lag, min(1.0, corner.after / max(leg.run, 1e-6)))
     return max(0.0, start_lag, settled_lag), max(0.0, -start_lag, -settled_lag)
-
-
-@inlined
-def _measure_tracked_corners(corners: Records, flown: Records, extents: Floats) -> None:
-    """Fill `FLOWN_CORNER` records (w,) and extents (w,) for corners that are flown with tracking error."""
-    for i in range(1, corners.shape[0] - 1):
-        excursion = corners[i].excursion
-        flown[i].radius, flown[i].blend_deviation, flown[i].fly_by_offset = 0.0, 0.0, excursion
-        flown[i].missile_distance = excursion if excursion <= CORNER_TOLERANCE_M else 0.0
-        extents[i] = max(corners[i].before, corners[i].after)
 
 
 @inner

@@ -207,6 +207,9 @@ def precompute_limits(data: ProblemArrays) -> PrecomputedLimits:
         # No leg, whatever its slope, may lead to an altitude at which the aircraft cannot fly level.
         if data.aircraft.equivalent > 0.0 and _min_slope_limit(data, data.aircraft.climb) < 0.0:
             dive = -1.0
+    straight_distance2 = 0.0
+    for k in range(3):
+        straight_distance2 += (data.destination[k] - data.start[k]) ** 2
     return PrecomputedLimits(
         # No turn exceeds half a circle; -2 is below any rounded cosine.
         math.cos(data.max_turn) if data.max_turn < math.pi else -2.0,
@@ -214,7 +217,7 @@ def precompute_limits(data: ProblemArrays) -> PrecomputedLimits:
         math.tan(climb - data.angle_margin),
         math.tan(dive - data.angle_margin),
         slopes_by_aircraft,
-        _straight_distance(data.start, data.destination),
+        math.sqrt(straight_distance2),
         required_clearance(data),
     )
 
@@ -235,15 +238,6 @@ def _min_slope_limit(data: ProblemArrays, air_angles: Floats) -> float:
     if not air_angle > 0.0 or wind >= 0.99 * speed * math.cos(air_angle):
         return -1.0
     return math.atan2(speed * math.sin(air_angle), speed * math.cos(air_angle) + wind)
-
-
-@inlined
-def _straight_distance(start: Floats, destination: Floats) -> float:
-    """Return the distance between start and destination, m."""
-    total = 0.0
-    for k in range(3):
-        total += (destination[k] - start[k]) ** 2
-    return math.sqrt(total)
 
 
 @inlined

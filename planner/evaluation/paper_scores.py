@@ -74,7 +74,9 @@ def _score_paths(
     """
     path_count, block = paths.shape[0], scratch[0]
     limits = precompute_limits(data)
-    has_fixed_limits = _are_limits_fixed(data, limits)
+    # Limits of turns and slopes are constants, and no end course is prescribed.
+    has_free_courses = math.isnan(data.start_course) and math.isnan(data.destination_course)
+    has_fixed_limits = has_free_courses and not data.legs_hold_turns and not limits.slopes_by_aircraft
     for first_path in range(0, path_count, PATHS_PER_BLOCK):
         size = min(PATHS_PER_BLOCK, path_count - first_path)
         _score_block(data, limits, paths, first_path, size, block)
@@ -94,13 +96,6 @@ def _score_paths(
             objective.length_ratio = sums.length[b] / limits.straight_distance
             objective.kill_exposure, objective.detection_exposure = sums.kill[b], sums.detection[b]
             objective.height_sum = sums.height[b] / POINTS_PER_LEG
-
-
-@inlined
-def _are_limits_fixed(data: ProblemArrays, limits: PrecomputedLimits) -> bool:
-    """Return True if the limits of turns and slopes are constants, and no end course is prescribed."""
-    has_free_courses = math.isnan(data.start_course) and math.isnan(data.destination_course)
-    return has_free_courses and not data.legs_hold_turns and not limits.slopes_by_aircraft
 
 
 @inner

@@ -338,7 +338,12 @@ def make_problem(scenario: Scenario, limits: Limits, attempt: int = 0) -> Proble
     # Include the rise of the ground across the tracking error, where the certificate measures the ground.
     extra_buffer = limits.reserve_height + up + across * certified.slope_bounds.steepest
     buffer = SEARCH_BUFFER_M + attempt * ATTEMPT_BUFFER_M + extra_buffer
-    airspace = _search_airspace(scenario, certified, attempt, up, limits)
+    # The margins of a search exceed those of the certificate, and grow with each attempt.
+    zone_buffer = SEARCH_BUFFER_M + attempt * ATTEMPT_BUFFER_M + up
+    margins = _zone_margins(scenario, SEARCH_ZONE_MARGIN_M, zone_buffer + limits.reserve_threats, 1.0)
+    airspace = make_airspace(
+        scenario, margins, min(zone_buffer + limits.reserve_above, _max_buffer(certified, certified.airspace.buffer))
+    )
     if airspace.max_height < math.inf:
         buffer = min(buffer, _max_buffer(certified, certified.buffer))
     search = _shrink_area(
@@ -352,7 +357,13 @@ def make_problem(scenario: Scenario, limits: Limits, attempt: int = 0) -> Proble
         MAP_MARGIN_M,
         HEIGHT_MARGIN_M,
     )
-    return Problem(scenario, limits, search, certified, _make_space(scenario, search))
+    # The lowest altitude of the search is the lowest one that the ground allows.
+    lowest_end = min(scenario.start[2], scenario.destination[2])
+    min_altitude = min(max(search.floor, float(np.nanmin(search.heights)) + search.clearance), lowest_end)
+    altitude_range = (float(min_altitude), float(max(search.ceiling, min_altitude + 1.0)))
+    bounds = np.array([[search.west, search.east], [search.south, search.north]])
+    space = Space(scenario.start, scenario.destination, bounds, altitude_range, scenario.planner.across_m)
+    return Problem(scenario, limits, search, certified, space)
 
 
 def _certified_arrays(scenario: Scenario, limits: Limits, terrain: Terrain) -> ProblemArrays:
@@ -363,13 +374,17 @@ def _certified_arrays(scenario: Scenario, limits: Limits, terrain: Terrain) -> P
     vertical, end_fraction = CERTIFIED_BUFFER_M + float(tracking.up), CERTIFIED_END_FRACTION
     buffer, vertical_zone_margin = vertical + limits.reserve_height, vertical + limits.reserve_threats
     aircraft = _reduced_performance(scenario, limits)
+    (west, east), (south, north) = scenario.bounds.tolist()
     arrays = ProblemArrays(
         heights=terrain.heights,
         to_pixel=terrain.to_pixel.record,
         threats=threats,
         spheres=sphere_records(threats),
         aircraft=aircraft,
-        **_map_edges(scenario.bounds),
+        west=west,
+        east=east,
+        south=south,
+        north=north,
         start=scenario.start,
         destination=scenario.destination,
         floor=float(scenario.floor),
@@ -403,23 +418,6 @@ def _certified_arrays(scenario: Scenario, limits: Limits, terrain: Terrain) -> P
         travel=LENGTH_COST._replace(winds=make_wind_grid(scenario, aircraft)),
     )
     return _shrink_area(arrays, float(tracking.across), float(tracking.up)) if tracking.has_error else arrays
-
-
-def _search_airspace(
-    scenario: Scenario, certified: ProblemArrays, attempt: int, up: float, limits: Limits
-) -> PlannerAirspace:
-    """Return the airspace of a scenario with the margins of a search, which exceed those of the certificate.
-
-    certified: problem with the certificate's margins.
-    attempt: number of the attempt, from 0; the margins grow with it.
-    up: additional buffer above ground, m.
-    limits: limits of the path, with the reserves for the tracking error.
-    """
-    buffer = SEARCH_BUFFER_M + attempt * ATTEMPT_BUFFER_M + up
-    margins = _zone_margins(scenario, SEARCH_ZONE_MARGIN_M, buffer + limits.reserve_threats, 1.0)
-    return make_airspace(
-        scenario, margins, min(buffer + limits.reserve_above, _max_buffer(certified, certified.airspace.buffer))
-    )
 
 
 def _zone_margins(scenario: Scenario, horizontal: float, vertical: float, end_fraction: float) -> ZoneMargins:
@@ -472,12 +470,6 @@ def _buffer_growth(scenario: Scenario, limits: Limits, aircraft: PerformanceTabl
         for angles in (aircraft.climb, aircraft.descent)
     ]
     return min(BUFFER_GROWTH_RATIO, MAX_GROWTH_FRACTION * max(0.0, math.tan(min(slopes))))
-
-
-def _map_edges(bounds: Floats) -> dict[str, float]:
-    """Return the edges of a map with some bounds (2, 2), by name."""
-    (west, east), (south, north) = bounds.tolist()
-    return {"west": west, "east": east, "south": south, "north": north}
 
 
 def _none_to_nan(value: float | None) -> float:
@@ -544,13 +536,3 @@ def _shrink_area(data: ProblemArrays, lateral: float, height: float) -> ProblemA
         floor=min(data.floor + height, max(data.floor, float(min_end[2]))),
         ceiling=max(data.ceiling - height, min(data.ceiling, float(max_end[2]))),
     )
-
-
-def _make_space(scenario: Scenario, data: ProblemArrays) -> Space:
-    """Return the search space, whose lowest altitude is the lowest altitude that the ground allows."""
-    lowest_end = min(scenario.start[2], scenario.destination[2])
-    min_altitude = min(max(data.floor, float(np.nanmin(data.heights)) + data.clearance), lowest_end)
-    max_altitude = max(data.ceiling, min_altitude + 1.0)
-    altitude_range = (float(min_altitude), float(max_altitude))
-    bounds = np.array([[data.west, data.east], [data.south, data.north]])
-    return Space(scenario.start, scenario.destination, bounds, altitude_range, scenario.planner.across_m)

@@ -44,15 +44,8 @@ class DifferentialEvolution(BoxSearch):
             self.samples[rows[is_better]] = self._pending_samples[is_better]
             self.scores[rows[is_better]] = scores[is_better]
             self._generation += 1
-        self._pending_samples = self._trial_vectors(self._target_rows())
-
-    def _target_rows(self) -> Ints:
-        """Return the rows that this generation challenges; the two halves of the population alternate."""
-        count = len(self.samples)
-        return np.arange(self._half) if self._generation % 2 == 0 else np.arange(count - self._half, count)
-
-    def _trial_vectors(self, rows: Ints) -> Floats:
-        """Return a trial vector for each row: a + F (b - c) in most variables, the row's own value in the others."""
+        # A trial vector is a + F (b - c) in most variables, the row's own value in the others.
+        rows = self._target_rows()
         count, size = self.samples.shape
         parent_rows = self._rng.integers(0, count, (3, rows.size))
         a, b, c = (self.samples[index] for index in parent_rows)
@@ -64,4 +57,9 @@ class DifferentialEvolution(BoxSearch):
         # on it.
         targets = self.samples[rows]
         trials = np.where(trials < self.lower, 0.5 * (targets + self.lower), trials)
-        return np.where(trials > self.upper, 0.5 * (targets + self.upper), trials)
+        self._pending_samples = np.where(trials > self.upper, 0.5 * (targets + self.upper), trials)
+
+    def _target_rows(self) -> Ints:
+        """Return the rows that this generation challenges; the two halves of the population alternate."""
+        count = len(self.samples)
+        return np.arange(self._half) if self._generation % 2 == 0 else np.arange(count - self._half, count)

@@ -189,7 +189,16 @@ class FrontSampling:
         is_in_archive = np.zeros(len(vectors), dtype=bool)
         if feasible_rows.size:
             values = np.concatenate([self.objectives, objectives[feasible_rows]])
-            archive_rows = self._archive_rows(values)
+            # Keep the distinct, non-dominated rows; of more than the archive can hold, those that cover most of the
+            # hypervolume.
+            level = Level(tuple(range(values.shape[1])), (NO_GOAL,) * values.shape[1])
+            front = np.flatnonzero(ranks(values, (level,)) == 0)
+            _, first_rows = np.unique(values[front], axis=0, return_index=True)
+            front = front[np.sort(first_rows)]
+            if len(front) <= self._size:
+                archive_rows = front
+            else:
+                archive_rows = np.asarray(front[covering_order(values[front], self.reference, self._size, self._rng)])
             is_in_archive[feasible_rows[archive_rows[archive_rows >= len(self.vectors)] - len(self.vectors)]] = True
             self.vectors = np.concatenate([self.vectors, vectors[feasible_rows]])[archive_rows]
             self.objectives = values[archive_rows]
@@ -199,17 +208,3 @@ class FrontSampling:
             self._scales[kind] = np.clip(
                 self._scales[kind] * (GROWTH_FACTOR if should_grow else SHRINK_FACTOR), MIN_SCALE, MAX_SCALE
             )
-
-    def _archive_rows(self, values: Floats) -> Ints:
-        """Return the row numbers of the objectives (n, m) that the archive keeps.
-
-        These are the distinct, non-dominated rows. If there are more than the archive can hold, keep those that cover
-        most of the hypervolume.
-        """
-        level = Level(tuple(range(values.shape[1])), (NO_GOAL,) * values.shape[1])
-        front = np.flatnonzero(ranks(values, (level,)) == 0)
-        _, first_rows = np.unique(values[front], axis=0, return_index=True)
-        front = front[np.sort(first_rows)]
-        if len(front) <= self._size:
-            return front
-        return np.asarray(front[covering_order(values[front], self.reference, self._size, self._rng)])

@@ -38,17 +38,12 @@ def hypervolume(points: Floats, reference: Floats) -> float:
     total = 0.0
     for k in range(len(order)):
         if heights[k + 1] > heights[k]:
-            slab = points_below[order[: k + 1], :-1]
-            total += float(heights[k + 1] - heights[k]) * hypervolume(_non_dominated(slab), reference[:-1])
+            slab = np.unique(points_below[order[: k + 1], :-1], axis=0)
+            # A distinct point is non-dominated if no point but itself is at or below it in all objectives.
+            is_below = np.asarray((slab[:, None, :] <= slab[None, :, :]).all(axis=2))
+            slab = slab[is_below.sum(axis=0) == 1]
+            total += float(heights[k + 1] - heights[k]) * hypervolume(slab, reference[:-1])
     return total
-
-
-def _non_dominated(points: Floats) -> Floats:
-    """Return the distinct non-dominated points (n, m)."""
-    points = np.unique(points, axis=0)
-    is_below = np.asarray((points[:, None, :] <= points[None, :, :]).all(axis=2))
-    # A distinct point is non-dominated if no point but itself is at or below it in all objectives.
-    return np.asarray(points[is_below.sum(axis=0) == 1])
 
 
 def covering_order(points: Floats, reference: Floats, count: int, rng: np.random.Generator | None = None) -> Ints:

@@ -214,9 +214,14 @@ class Multistart(BoxSearch):
         """Process the scores (n, c) of the last samples of `ask`, and draw the next generation."""
         ranks, noise = self._rank(scores), self._rng.random(len(scores))
         order = np.lexsort((noise, ranks))
-        self._store_generation(self._pending_samples[order], scores[order])
+        # The best sample of all generations, then this generation.
+        points, sorted_scores = self._pending_samples[order], scores[order]
+        if len(self.scores) and self._rank(np.stack([self.scores[0], sorted_scores[0]]))[0] == 0:
+            points = np.concatenate([self.samples[:1], points])
+            sorted_scores = np.concatenate([self.scores[:1], sorted_scores])
+        self.samples, self.scores = points, sorted_scores
         if self._search is None:
-            better_half = self._to_unit_box(self._pending_samples[order[: self._half]])
+            better_half = (self._pending_samples[order[: self._half]] - self.lower) / (self.upper - self.lower)
             self._centre, deviations = better_half.mean(axis=0), np.maximum(better_half.std(axis=0), WIDTH_RANGE[0])
             self._scale = deviations / math.sqrt(float((deviations**2).mean()))
             self._search = self._start_search()
@@ -226,18 +231,12 @@ class Multistart(BoxSearch):
                 self._search.is_done
                 or self._search.evaluations - self._slice_start >= SLICE_EVALUATIONS * self.lower.size
             ):
-                self._search = self._next_search(self._search)
+                # The next slice of evaluations continues this search, or goes to another one.
+                self._spent_evaluations[self._is_continued] += self._search.evaluations - self._slice_start
+                next_search = self._search if self._may_continue(self._search) else self._choose_search()
+                self._slice_start = next_search.evaluations
+                self._search = next_search
         self._draw_generation(self._search)
-
-    def _store_generation(self, points: Floats, scores: Floats) -> None:
-        """Set `samples` and `scores`: the best sample of all generations, then this sorted generation."""
-        if len(self.scores) and self._rank(np.stack([self.scores[0], scores[0]]))[0] == 0:
-            points, scores = np.concatenate([self.samples[:1], points]), np.concatenate([self.scores[:1], scores])
-        self.samples, self.scores = points, scores
-
-    def _to_unit_box(self, points: Floats) -> Floats:
-        """Scale points (n, d) of the search box to the unit box."""
-        return (points - self.lower) / (self.upper - self.lower)
 
     def _draw_generation(self, search: Gaussian) -> None:
         """Draw the next generation of a search; store it scaled to the unit box and to the search box."""
@@ -245,13 +244,6 @@ class Multistart(BoxSearch):
         self._pending_samples = np.clip(
             self.lower + self._pending_unit_samples * (self.upper - self.lower), self.lower, self.upper
         )
-
-    def _next_search(self, search: Gaussian) -> Gaussian:
-        """Return the search that gets the next slice of evaluations after a slice of `search`."""
-        self._spent_evaluations[self._is_continued] += search.evaluations - self._slice_start
-        next_search = search if self._may_continue(search) else self._choose_search()
-        self._slice_start = next_search.evaluations
-        return next_search
 
     def _may_continue(self, search: Gaussian) -> bool:
         """Return True if a search may continue at once with another slice of evaluations.

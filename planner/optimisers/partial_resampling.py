@@ -23,7 +23,7 @@ import numpy as np
 
 from planner.optimisers.box_search import BoxSearch
 from planner.optimisers.multistart import Gaussian, reflect_into_box
-from world.arrays import Flags, Floats, Ints
+from world.arrays import Floats, Ints
 
 # Number of samples of the first population, per variable.
 FIRST_POPULATION_PER_VARIABLE = 2
@@ -204,19 +204,16 @@ class PartialResampling(BoxSearch):
         first_members, second_members = self._rng.integers(0, count, (2, count))
         steps = (points[first_members] - points[second_members]) / math.sqrt(2.0)
         drawn = reflect_into_box(centres + self._widths[:, None] * steps)
-        samples = self.lower + np.where(self._draw_redrawn_variables(), drawn, points) * (self.upper - self.lower)
-        self._pending_samples = np.clip(samples, self.lower, self.upper)
-
-    def _draw_redrawn_variables(self) -> Flags:
-        """Return a mask (n, d), True for the variables of each sample that are redrawn; at least one per sample.
-
-        The variables are regarded as a ring, so that the last one is a neighbour of the first.
-        """
-        count, size = len(self._points), self.lower.size
+        # Some variables of each sample are redrawn, at least one: single ones, or neighbours on the ring of all
+        # variables.
+        size = self.lower.size
         is_redrawn = self._rng.random((count, size)) < self._fractions[:, None]
         first_variables = self._rng.integers(0, size, count)
         is_redrawn[np.arange(count), first_variables] = True
         neighbour_counts = np.maximum(1, np.round(self._fractions * size))
         is_neighbour = (np.arange(size) - first_variables[:, None]) % size < neighbour_counts[:, None]
         redraws_neighbours = self._rng.random(count) < NEIGHBOURS_FRACTION
-        return np.where(redraws_neighbours[:, None], is_neighbour, is_redrawn)
+        samples = self.lower + np.where(
+            np.where(redraws_neighbours[:, None], is_neighbour, is_redrawn), drawn, points
+        ) * (self.upper - self.lower)
+        self._pending_samples = np.clip(samples, self.lower, self.upper)

@@ -109,19 +109,14 @@ def blocking_missiles(data: ProblemArrays) -> list[int] | None:
         group_start = 0
         while group_start < len(remaining):
             reduced = np.delete(remaining, slice(group_start, group_start + group_size))
-            if is_closed(data, _index_mask(reduced, len(data.threats))):
+            flags = np.zeros(len(data.threats), dtype=np.bool_)
+            flags[reduced] = True
+            if is_closed(data, flags):
                 remaining = reduced
             else:
                 group_start += group_size
         group_size //= 2
     return [int(k) for k in remaining]
-
-
-def _index_mask(indices: Ints, count: int) -> Flags:
-    """Return a mask (count,) that is True at the given indices."""
-    flags = np.zeros(count, dtype=np.bool_)
-    flags[indices] = True
-    return flags
 
 
 @compiled

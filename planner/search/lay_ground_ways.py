@@ -154,7 +154,13 @@ def add_departure_and_approach(
         climb, reason = _find_departure(site, scenario.launch)
         problems += [f"climb-out: {reason}"] if reason else []
     if scenario.landing is not None:
-        careful_site = _make_site(plan, _with_map_error(limits), scenario.home, scenario.terrain)
+        # The height reserve grows by the error of the elevation file. The limits already allow for the autopilot's
+        # altitude error; both errors are independent and add as squares.
+        altitude_error = 0.0 if limits.tracking is None else limits.tracking.up
+        added_height = math.hypot(altitude_error, _MAP_HEIGHT_SIGMAS * MAP_HEIGHT_SD_M) - altitude_error
+        careful_site = _make_site(
+            plan, replace(limits, reserve_height=limits.reserve_height + added_height), scenario.home, scenario.terrain
+        )
         descent, reason = _find_approach(careful_site, scenario.landing, final_model)
         if descent is None:
             descent, reason = _find_approach(site, scenario.landing, final_model)
@@ -288,7 +294,8 @@ def _make_site(plan: Plan, limits: Limits, home: Floats, terrain: Terrain) -> _S
         # An estimate, as ground speeds depend on the course; the certificate decides.
         speed_ratio = 1.0 + _WIND_FRACTION * scenario.wind.speed / algorithm_limits.airspeed
         lengths_before, lengths_after = (
-            _interpolate_turn_lengths(length_table, speed_ratio) for length_table in (tracking.before, tracking.after)
+            [float(np.interp(speed_ratio, SPEED_RATIOS, row)) for row in length_table]
+            for length_table in (tracking.before, tracking.after)
         )
         turn_lengths = TurnLengths(
             *(
@@ -297,24 +304,6 @@ def _make_site(plan: Plan, limits: Limits, home: Floats, terrain: Terrain) -> _S
             )
         )
     return _Site(plan, algorithm_limits, home, terrain, problem, low_problem, turn_radius, turn_lengths)
-
-
-def _with_map_error(limits: Limits) -> Limits:
-    """Return limits with a larger height reserve, which allows for the error of the elevation file.
-
-    The limits already allow for the autopilot's altitude error. Both errors are independent and add as squares.
-    """
-    altitude_error = 0.0 if limits.tracking is None else limits.tracking.up
-    added_height = math.hypot(altitude_error, _MAP_HEIGHT_SIGMAS * MAP_HEIGHT_SD_M) - altitude_error
-    return replace(limits, reserve_height=limits.reserve_height + added_height)
-
-
-def _interpolate_turn_lengths(length_table: Floats, speed_ratio: float) -> list[float]:
-    """Return the turn length (m) of each turn angle in `TURNS`, at a ratio of ground speed to airspeed.
-
-    length_table: lengths before or after a corner, m: a row per angle in `TURNS`, a column per ratio in `SPEED_RATIOS`.
-    """
-    return [float(np.interp(speed_ratio, SPEED_RATIOS, row)) for row in length_table]
 
 
 def _read_only(position: Floats) -> Floats:
@@ -680,7 +669,10 @@ def _find_finals(
             fault = f"the approach needs a glide of {flown_deg:.1f}°, but the aircraft can fly at most {max_deg:.1f}°"
             best_rejected = max(best_rejected, (-1e6, fault))
             continue
-        final = _Final(course, length, height, _line_up_points(site, point, course, length, height), point)
+        # Start of the line-up leg and start of the glide.
+        distances = np.array([length + max(_MIN_LINE_UP_M, _LINE_UP_RADII * site.turn_radius), length])
+        east, north = point[0] - distances * math.sin(course), point[1] - distances * math.cos(course)
+        final = _Final(course, length, height, np.column_stack([east, north, np.full(2, point[2] + height)]), point)
         margin, obstacle = _check_final(site, final)
         if obstacle:
             best_rejected = max(
@@ -689,17 +681,6 @@ def _find_finals(
         else:
             finals.append(final)
     return finals, f"on a course of {round(math.degrees(course)) % 360}°, {best_rejected[1]}"
-
-
-def _line_up_points(site: _Site, point: Floats, course: float, length: float, height: float) -> Floats:
-    """Return the start of the line-up leg and the start of the glide, (2, 3) m.
-
-    course, length: course (rad) and length (m) of the final.
-    height: height of both points above the landing point, m.
-    """
-    distances = np.array([length + max(_MIN_LINE_UP_M, _LINE_UP_RADII * site.turn_radius), length])
-    east, north = point[0] - distances * math.sin(course), point[1] - distances * math.cos(course)
-    return np.column_stack([east, north, np.full(2, point[2] + height)])
 
 
 def _check_final(site: _Site, final: _Final) -> tuple[float, str]:

@@ -543,7 +543,16 @@ def _certify_distinct(
         for row in rows:
             if row not in plans:
                 path = task.to_paths(search.vectors[row][None])[0]
-                plans[row] = _with_values(task, finish(_make_plan(task, path, template)))
+                counts, objectives = paper_scores(task.problem.certified, path[None])
+                plan = replace(
+                    template,
+                    waypoints=path,
+                    violations=Violations(*counts[0]),
+                    objectives=Objectives(*objectives[0]),
+                    certificate=certify(task.problem, path),
+                    procedures=None,
+                )
+                plans[row] = _with_values(task, finish(plan))
         rejected_rows = [row for row in rows if not plans[row].plan.safe]
         accepted_plans: list[FrontPlan] = []
         if not rejected_rows:
@@ -567,19 +576,3 @@ def _drop_dominated(plans: list[FrontPlan], fourth: str, amounts: Floats) -> lis
     is_dominated = ((objectives[:, None] <= objectives[None]).all(axis=2) & is_better).any(axis=0)
     undominated_rows = np.flatnonzero(~is_dominated)
     return [plans[k] for k in undominated_rows[distinct_rows(objectives[undominated_rows], amounts)].tolist()]
-
-
-def _make_plan(task: FrontTask, path: Floats, template: Plan) -> Plan:
-    """Make the plan of a path (w, 3) with its scores and certificate.
-
-    Copy all other fields from the template.
-    """
-    counts, objectives = paper_scores(task.problem.certified, path[None])
-    return replace(
-        template,
-        waypoints=path,
-        violations=Violations(*counts[0]),
-        objectives=Objectives(*objectives[0]),
-        certificate=certify(task.problem, path),
-        procedures=None,
-    )

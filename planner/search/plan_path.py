@@ -244,7 +244,12 @@ def _search_repeatedly(search: Search, previous_path: Floats | None) -> tuple[Fl
     best_result: tuple[Floats, Certificate] | None = None
     for attempt in range(attempts):
         if attempt > 0:
-            _prepare_retry(search, attempt)
+            # With each attempt the clearance buffer grows, and paths may pass missiles more closely. The samples in the
+            # archive are evaluated again.
+            search.problem = with_narrow_margins(make_problem(search.problem.scenario, search.problem.limits, attempt))
+            vectors = search.archive.vectors
+            search.archive = Archive(vectors[:0], no_scores())
+            search.evaluate(vectors)
         try:
             _run_attempt(search, attempt, previous_path)
         except SearchEnded:
@@ -311,17 +316,6 @@ def _check_options(scenario: Scenario, airspeed: float) -> None:
             )
 
 
-def _prepare_retry(search: Search, attempt: int) -> None:
-    """Prepare the search's problem for another attempt, and evaluate the samples in the archive again.
-
-    With each attempt the clearance buffer grows, and paths may pass missiles more closely.
-    """
-    search.problem = with_narrow_margins(make_problem(search.problem.scenario, search.problem.limits, attempt))
-    vectors = search.archive.vectors
-    search.archive = Archive(vectors[:0], no_scores())
-    search.evaluate(vectors)
-
-
 def _run_attempt(search: Search, attempt: int, previous_path: Floats | None) -> None:
     """Search once, from the first population to the last generation; store the results in `search`.
 
@@ -355,27 +349,18 @@ def _run_attempt(search: Search, attempt: int, previous_path: Floats | None) -> 
     else:
         last_vector = run_path_generations(search, population, settings.generations, starts)
     if algorithm.final_shortening and search.end_reason == "completed":
-        _finish_search(search, last_vector)
-
-
-def _finish_search(search: Search, last_vector: Floats | None) -> None:
-    """Shorten the best path and the path of the last generation.
-
-    Move waypoints if this finds no finished path.
-
-    last_vector: vector (d,) of the best path of the last generation, or None.
-    """
-    if search.can_shorten:
-        if last_vector is not None:
-            search.shorten(search.encoding.decode(last_vector[None])[0])
-        shorten_best(search)
-    if search.shortest is None:
-        # The result of the generations may take another route than the improved seed.
-        if last_vector is not None:
-            search.move_and_improve(last_vector, FINAL_MOVE_ROUNDS, 0.5, FINAL_SEARCH_EVALUATIONS)
-        for scale in FINAL_MOVE_SCALES:
-            if search.must_end():
-                break
-            search.move_and_improve(search.archive.vectors[0], FINAL_MOVE_ROUNDS, scale, FINAL_SEARCH_EVALUATIONS)
-    search.record_history()
-    search.report_progress(0)
+        # Shorten the best path and the path of the last generation; move waypoints if this finds no finished path.
+        if search.can_shorten:
+            if last_vector is not None:
+                search.shorten(search.encoding.decode(last_vector[None])[0])
+            shorten_best(search)
+        if search.shortest is None:
+            # The result of the generations may take another route than the improved seed.
+            if last_vector is not None:
+                search.move_and_improve(last_vector, FINAL_MOVE_ROUNDS, 0.5, FINAL_SEARCH_EVALUATIONS)
+            for scale in FINAL_MOVE_SCALES:
+                if search.must_end():
+                    break
+                search.move_and_improve(search.archive.vectors[0], FINAL_MOVE_ROUNDS, scale, FINAL_SEARCH_EVALUATIONS)
+        search.record_history()
+        search.report_progress(0)

@@ -236,7 +236,14 @@ class Search:
             scores = np.concatenate([scores, self.score(vectors[batch_start : batch_start + batch_size])])
             if len(scores) < len(vectors) and self.should_stop():
                 break
-        self._archive_and_count(vectors[: len(scores)], scores)
+        self.evaluations += len(scores)
+        old_best = self.archive.vectors[:1]
+        self.archive.insert(vectors[: len(scores)], scores)
+        new_best = self.archive.vectors[:1]
+        if self.improved is not None and self.archive.is_feasible() and not np.array_equal(old_best, new_best):
+            ratio = self.archive.scores[0][LENGTH]
+            if self.shortest is None or ratio * self._straight_length() < path_length(self.shortest[0]):
+                self.improved(self.encoding.decode(new_best)[0])
         if len(scores) < len(vectors):
             raise SearchEnded
         return scores
@@ -275,18 +282,6 @@ class Search:
         reason = self.stop_condition() if self.stop_condition is not None else ""
         self.end_reason = reason or self.end_reason
         return bool(reason)
-
-    def _archive_and_count(self, vectors: Floats, scores: Floats) -> None:
-        """Count evaluated vectors, insert them into the archive, and pass a new best path to `improved`."""
-        self.evaluations += len(vectors)
-        old_best = self.archive.vectors[:1]
-        self.archive.insert(vectors, scores)
-        new_best = self.archive.vectors[:1]
-        if self.improved is None or not self.archive.is_feasible() or np.array_equal(old_best, new_best):
-            return
-        ratio = self.archive.scores[0][LENGTH]
-        if self.shortest is None or ratio * self._straight_length() < path_length(self.shortest[0]):
-            self.improved(self.encoding.decode(new_best)[0])
 
     def improve(self, vector: Floats, max_evaluations: int) -> Floats:
         """Improve a vector (d,) by a pattern search, insert the result into the archive; return its scores (8,)."""
@@ -481,7 +476,11 @@ class Search:
             if index >= CERTIFICATES_PER_PAUSE and self.should_stop():
                 break
             path = np.ascontiguousarray(self.encoding.decode(vector[None])[0])
-            certificate = self._certify_vector(vector, path)
+            # The certificate is the same in all attempts.
+            key = vector.tobytes()
+            certificate = self.certificates.get(key)
+            if certificate is None:
+                certificate = self.certificates[key] = certify(self.problem, path)
             if certificate.ok and certificate.kill_distance >= CERTIFIED_KILL_MARGIN_M:
                 return path, certificate
             first_path = first_path or (path, certificate)
@@ -512,14 +511,3 @@ class Search:
         ):
             return path, certificate
         return self.shortest
-
-    def _certify_vector(self, vector: Floats, path: Floats) -> Certificate:
-        """Return the certificate of a vector's path, from a cache if it has been computed before.
-
-        The certificate is the same in all attempts.
-        """
-        key = vector.tobytes()
-        certificate = self.certificates.get(key)
-        if certificate is None:
-            certificate = self.certificates[key] = certify(self.problem, path)
-        return certificate

@@ -16,7 +16,6 @@ import numpy as np
 from planner.airspace.zone_limits import is_limited
 from planner.evaluation.certify import certify
 from planner.evaluation.encoding import (
-    Encoding,
     require_frames,
     rotated_frame,
     rotated_vectors,
@@ -67,14 +66,8 @@ def try_straight_line(search: Search) -> bool:
     if are_safe(search.score(vectors)[0]):
         search.evaluate(vectors)
         return search.meets_goal(search.best_certified()[1])
-    return _try_equal_legs(search)
-
-
-def _try_equal_legs(search: Search) -> bool:
-    """Return True if the straight line is safe with equal legs, the longest possible between ends close together.
-
-    It is tried only if nothing but short legs violates a constraint: the certificate allows shorter legs than scores.
-    """
+    # Equal legs are the longest possible between ends close together. They are tried only if nothing but short legs
+    # violates a constraint: the certificate allows shorter legs than scores.
     vectors = search.straight_vectors(has_equal_legs=True)
     scores = search.score(vectors)[0]
     scores[Violation.TURN] = 0.0
@@ -214,7 +207,17 @@ def search_other_sides(search: Search) -> None:
     if not search.has_safe() or search.length_ratio() > 1.0 + LONG_PATH_EXCESS_FRACTION:
         tried_paths += _try_grids(search, FINER_GRIDS) + _try_ceiling_routes(search)
     if not search.has_safe():
-        _shorten_with_narrow_margins(search, tried_paths)
+        # No path is safe with the usual margins: shorten the tried ones with narrow margins.
+        usual_problem = search.problem
+        search.problem = with_narrow_margins(usual_problem)
+        try:
+            for path in tried_paths:
+                if search.must_end():
+                    break
+                search.shorten(path)
+        finally:
+            # Also restored if the search is interrupted, which raises SearchEnded.
+            search.problem = usual_problem
 
 
 def _try_grids(search: Search, grids: tuple[tuple[int, float, float], ...]) -> list[Floats]:
@@ -283,20 +286,6 @@ def _try_ceiling_routes(search: Search) -> list[Floats]:
             tried_paths.append(path)
             search.shorten(path)
     return tried_paths
-
-
-def _shorten_with_narrow_margins(search: Search, paths: list[Floats]) -> None:
-    """Shorten paths (w, 3) with narrow margins, if no path is safe with the usual margins."""
-    usual_problem = search.problem
-    search.problem = with_narrow_margins(usual_problem)
-    try:
-        for path in paths:
-            if search.must_end():
-                break
-            search.shorten(path)
-    finally:
-        # Also restored if the search is interrupted, which raises SearchEnded.
-        search.problem = usual_problem
 
 
 def shorten_best(search: Search) -> None:
@@ -444,7 +433,13 @@ def _search_along_route(search: Search, route: Floats) -> tuple[Floats, Certific
         evaluations=search.evaluations,
     )
     frames = require_frames(encoding)
-    path = fit_points(inner_search.problem.search, frames, _candidate_points(route, encoding), CLOSE_FIT)
+    # Candidates for each inner waypoint lie on its piece of the route, in the waypoints' frames.
+    count = encoding.waypoints - 2
+    dense_points, _ = sample_route(route, count * (CLOSE_FIT.candidates + 1) + 1)
+    point_rows = np.arange(count)[:, None] * (CLOSE_FIT.candidates + 1) + 1 + np.arange(CLOSE_FIT.candidates)
+    points = frames.to_frame(dense_points[point_rows].transpose(1, 0, 2)).transpose(1, 0, 2)
+    points[..., 0] = np.clip(points[..., 0], frames.edges[:-1, None], frames.edges[1:, None])
+    path = fit_points(inner_search.problem.search, frames, points, CLOSE_FIT)
     vector = np.clip(frames.to_frame(path[1:-1]).ravel(), encoding.lower, encoding.upper)
     with suppress(SearchEnded):
         _improve_and_shorten(inner_search, vector, (path, route))
@@ -467,19 +462,3 @@ def _improve_and_shorten(search: Search, vector: Floats, routes: tuple[Floats, .
         for route in routes:
             search.shorten(resample(route, search.encoding.waypoints))
         shorten_best(search)
-
-
-def _candidate_points(route: Floats, encoding: Encoding) -> Floats:
-    """Return candidates for each inner waypoint on its piece of a route, (w - 2, candidates, 3).
-
-    route: (k, 3) m.
-
-    The candidates are in the waypoints' frames.
-    """
-    count = encoding.waypoints - 2
-    dense_points, _ = sample_route(route, count * (CLOSE_FIT.candidates + 1) + 1)
-    point_rows = np.arange(count)[:, None] * (CLOSE_FIT.candidates + 1) + 1 + np.arange(CLOSE_FIT.candidates)
-    frames = require_frames(encoding)
-    points = frames.to_frame(dense_points[point_rows].transpose(1, 0, 2)).transpose(1, 0, 2)
-    points[..., 0] = np.clip(points[..., 0], frames.edges[:-1, None], frames.edges[1:, None])
-    return points

@@ -58,26 +58,8 @@ def describe_failed_arming_checks(
         if not lowest <= values[name] <= highest:
             limit_text = f"at least {lowest:g}" if math.isinf(highest) else f"at most {highest:g}"
             yield f"{name} {values[name]:g} prevents arming: ArduPlane requires {limit_text}"
-    yield from _describe_mission_faults(parameters, values, mission)
-    yield from _describe_pulse_faults(values)
-    yield from _describe_radio_failsafe_faults(parameters, values)
-    for monitor in monitored_batteries(parameters):
-        yield from _describe_battery_faults(
-            values, monitor, mission.full_voltage, has_current=measures_current(parameters, monitor)
-        )
-    yield from _describe_fence_faults(parameters, values, mission)
-
-
-def _describe_mission_faults(
-    parameters: ArduPilotParameters, values: Mapping[str, float], mission: MissionParts
-) -> Iterator[str]:
-    """Describe mission items that arming requires but the mission lacks, and items that it forbids.
-
-    Follows `AP_Arming::mission_checks` and `AP_Arming_Plane::mission_checks`.
-
-    parameters: ArduPlane's parameters.
-    values: value of every parameter by name; the default where no file states one.
-    """
+    # Items that arming requires but the mission lacks, and items that it forbids, as in `AP_Arming::mission_checks` and
+    # `AP_Arming_Plane::mission_checks`.
     if parameters.by_origin("file").get("RTL_AUTOLAND") == 0.0:
         for mark in _MARKS_OF_AUTOLAND:
             if mark in mission.commands:
@@ -90,13 +72,8 @@ def _describe_mission_faults(
         yield f"ARMING_MIS_ITEMS {bits} prevents arming, because no rally point is within RALLY_LIMIT_KM of home"
     elif bits & _RALLY_FOR_ARMING and math.isinf(mission.rally_distance):
         yield f"ARMING_MIS_ITEMS {bits} prevents arming, because there is no rally point"
-
-
-def _describe_pulse_faults(values: Mapping[str, float]) -> Iterator[str]:
-    """Describe servo outputs and radio channels whose trim is outside their minimum and maximum.
-
-    Follows `AP_Arming::servo_checks` and `rc_calibration_checks`.
-    """
+    # Servo outputs and radio channels whose trim is outside their minimum and maximum, as in `AP_Arming::servo_checks`
+    # and `rc_calibration_checks`.
     outputs = [f"SERVO{output}" for output in range(1, _OUTPUT_COUNT + 1) if values[f"SERVO{output}_FUNCTION"] > 0.0]
     channels = [f"RC{channel}" for channel in range(1, RADIO_CHANNEL_COUNT + 1)]
     for name in (*outputs, *channels):
@@ -104,6 +81,12 @@ def _describe_pulse_faults(values: Mapping[str, float]) -> Iterator[str]:
         if not lowest <= trim <= highest:
             range_text = f"{name}_MIN {lowest:g} to {name}_MAX {highest:g}"
             yield f"{name}_TRIM {trim:g} prevents arming: ArduPlane requires {range_text}"
+    yield from _describe_radio_failsafe_faults(parameters, values)
+    for monitor in monitored_batteries(parameters):
+        yield from _describe_battery_faults(
+            values, monitor, mission.full_voltage, has_current=measures_current(parameters, monitor)
+        )
+    yield from _describe_fence_faults(parameters, values, mission)
 
 
 def _describe_radio_failsafe_faults(parameters: ArduPilotParameters, values: Mapping[str, float]) -> Iterator[str]:

@@ -35,7 +35,6 @@ from flight.autopilots.autopilot import Autopilot, Origin, StoredAutopilot, Stor
 from flight.autopilots.gust_height import updraft_altitude_gain
 from flight.autopilots.parts import (
     Candidate,
-    Cause,
     ControlLaw,
     Deviations,
     GroundRules,
@@ -52,7 +51,7 @@ from flight.autopilots.parts import (
     TurnRules,
 )
 from flight.guidance.equivalent_airspeed import eas_to_tas_ratio
-from flight.mission.ground_phases import Approach, GroundPhases, TakeOff
+from flight.mission.ground_phases import GroundPhases, TakeOff
 from flight.mission.items import LANDINGS, Command
 from flight.mission.itinerary import Loiter
 from flight.mission.loiter_circles import LoiterRules
@@ -245,20 +244,14 @@ class ArduPlane(Autopilot):
         parameters = self.parameters
         return TurnRules(
             acceptance_radius=parameters.wp_radius,
-            distance=self._turn_distance,
+            # WP_RADIUS for a right angle, proportionally less for a smaller turn, and more in thin air.
+            distance=lambda turn, amsl: float(
+                turn_distance(0.0, turn, parameters.wp_radius, math.inf, float(eas_to_tas_ratio(amsl)))
+            ),
             acceptance_limit=MAX_ACCEPTANCE_M,
             max_bank=parameters.roll_limit,
             bank_parameter="ROLL_LIMIT_DEG",
         )
-
-    def _turn_distance(self, turn: float, amsl: float) -> float:
-        """Return the distance before a waypoint at which ArduPlane turns, m.
-
-        The distance is WP_RADIUS for a right angle and proportionally less for a smaller turn. It increases in thin
-        air.
-        """
-        factor = float(eas_to_tas_ratio(amsl))
-        return float(turn_distance(0.0, turn, self.parameters.wp_radius, math.inf, factor))
 
     @property
     def speeds(self) -> SpeedRules:
@@ -287,17 +280,15 @@ class ArduPlane(Autopilot):
         """Rules of take-off, landing and go-around from TKOFF_*, LAND_* and TECS_LAND_*."""
         min_acceleration = self.parameters.takeoff_acceleration
         return GroundRules(
-            control_law=self._ground_law,
+            control_law=lambda phases, aircraft, contacts: (
+                ArduPlaneFromGround(self, phases, aircraft, tuple(contacts)).control_law
+            ),
             glide=self._landing_glide,
             airspeed=self._landing_airspeed,
             # The landing item's first parameter, or the take-off's height, or 30 m.
             go_around_height=go_around_height,
             launch_trigger=(min_acceleration, "TKOFF_THR_MINACC") if min_acceleration > 0.0 else None,
         )
-
-    def _ground_law(self, ground_phases: GroundPhases, aircraft: Aircraft, contacts: Sequence[Contact]) -> ControlLaw:
-        """Return the control law of a flight that starts or ends on the ground."""
-        return ArduPlaneFromGround(self, ground_phases, aircraft, tuple(contacts)).control_law
 
     def _landing_airspeed(self, cruise: float, tail_wind: float, amsl: float) -> float:
         """Return the true airspeed on the landing glide, m/s, by TECS_LAND_ARSPD and LAND_WIND_COMP.
@@ -312,16 +303,28 @@ class ArduPlane(Autopilot):
     @property
     def returns(self) -> ReturnBehaviour:
         """Behaviour of ArduPlane in an RTL, from its parameters."""
+        parameters = self.parameters
+        # RTL_CLIMB_MIN or FLIGHT_OPTIONS makes ArduPlane climb before it turns.
+        options = float(int(parameters.flight_options) | CLIMB_BEFORE_TURN)
+        climbs = [{"RTL_CLIMB_MIN": climb} for climb in _TRIED_CLIMBS_M]
+        altitude = {"RTL_ALTITUDE": max(0.0, parameters.rtl_altitude)}
         return ReturnBehaviour(
             self._return_rules,
             self._rtl_parameters,
-            after_link_loss=partial(link_loss_reactions, self.parameters),
+            after_link_loss=partial(link_loss_reactions, parameters),
             fly=self._fly_returns,
             flies_without_engine=True,
-            causes=self._failsafe_causes,
-            unsimulated_text=self._unsimulated_return_text,
+            # A landing sequence begins with DO_LAND_START; a mission with a landing item ends on the ground.
+            causes=lambda mission: failsafe_causes(
+                parameters,
+                has_fence=mission.has_fence,
+                has_landing_sequence=bool(mission.landings),
+                ends_with_landing=not mission.commands.isdisjoint(LANDINGS),
+            ),
+            # An RTL that follows the terrain is not simulated.
+            unsimulated_text=lambda mission: "terrain" if parameters.rtl_follows_terrain else "",
             unjudged_texts=self._unjudged_return_texts,
-            trials=self._return_trials,
+            trials=ReturnTrials((altitude,), (*climbs, {"FLIGHT_OPTIONS": options}), "RTL_ALTITUDE, climb"),
         )
 
     def _fly_returns(
@@ -364,22 +367,6 @@ class ArduPlane(Autopilot):
             engine_out=engine_out,
         )
 
-    def _failsafe_causes(self, mission: ReturnMission) -> tuple[Cause, ...]:
-        """Return the events that can end a mission in AUTO, each with ArduPlane's reaction.
-
-        A landing sequence begins with DO_LAND_START; a mission with a landing item ends on the ground.
-        """
-        return failsafe_causes(
-            self.parameters,
-            has_fence=mission.has_fence,
-            has_landing_sequence=bool(mission.landings),
-            ends_with_landing=not mission.commands.isdisjoint(LANDINGS),
-        )
-
-    def _unsimulated_return_text(self, mission: ReturnMission) -> str:
-        """Return the reason "terrain" if an RTL follows the terrain, which is not simulated; otherwise ""."""
-        return "terrain" if self.parameters.rtl_follows_terrain else ""
-
     def _unjudged_return_texts(self, mission: ReturnMission) -> tuple[str, ...]:
         """Return the parts of a mission's RTLs that are not simulated.
 
@@ -388,17 +375,6 @@ class ArduPlane(Autopilot):
         has_path = not mission.commands.isdisjoint((Command.DO_RETURN_PATH_START, Command.DO_LAND_START))
         path_parts = ("return path",) if has_path and int(self.parameters.rtl_autoland) == 4 else ()
         return (*path_parts, *self.describe_unsimulated_settings(MissionParts(), by_program=False))
-
-    @property
-    def _return_trials(self) -> ReturnTrials:
-        """Parameter changes to try for a safer RTL: RTL_ALTITUDE, then a climb before the turn.
-
-        RTL_CLIMB_MIN or FLIGHT_OPTIONS makes ArduPlane climb before it turns.
-        """
-        options = float(int(self.parameters.flight_options) | CLIMB_BEFORE_TURN)
-        climbs = [{"RTL_CLIMB_MIN": climb} for climb in _TRIED_CLIMBS_M]
-        altitude = {"RTL_ALTITUDE": max(0.0, self.parameters.rtl_altitude)}
-        return ReturnTrials((altitude,), (*climbs, {"FLIGHT_OPTIONS": options}), "RTL_ALTITUDE, climb")
 
     def _rtl_parameters(self, settings: RtlSettings) -> dict[str, float]:
         """Return the values of RTL_ALTITUDE, RTL_AUTOLAND and TECS_LAND_PMAX for a scenario's RTL settings.
@@ -464,7 +440,10 @@ class ArduPlane(Autopilot):
         >>> rules.radius, round(rules.radius_scale(1300.0), 3)
         (-80.0, 1.135)
         """
-        parameters = self.parameters
+        parameters, bank = self.parameters, self.parameters.navl1_lim_bank
+        # With a bank limit for loiters, `AP_L1_Control::loiter_radius` increases the radius with altitude only if the
+        # radius cannot be flown at this bank.
+        bank_text = f"NAVL1_LIM_BANK {bank:g} is not simulated: ArduPlane may fly smaller loiters than the simulation"
         return LoiterRules(
             radius=parameters.loiter_radius,
             radius_name="WP_LOITER_RAD",
@@ -475,19 +454,24 @@ class ArduPlane(Autopilot):
             max_climb_rate=self.speeds.climb_limit.rate,
             max_sink_rate=self.speeds.sink_limit.rate,
             altitude_tolerance=LOITER_ALTITUDE_TOLERANCE_M,
-            unflown_note=_bank_limit_note(parameters.navl1_lim_bank),
+            unflown_note=bank_text if bank > 0.0 else "",
             rtl_exit_note=_EXIT_BEFORE_RTL_TEXT,
         )
 
     @property
     def deviations(self) -> Deviations:
         """Deviations from the legs, and the altitude that ArduPlane gains in updrafts while it holds its airspeed."""
+        # The values end where another parameter becomes the limit of the pitch.
+        name, *other_names = self._max_pitch_parameters
+        higher_limits = (limit for limit in self._pitch_limits.values() if limit > self._max_pitch)
+        max_tried = min(MAX_TRIED_PITCH_DEG, *map(math.degrees, higher_limits), math.inf)
+        is_raised = max_tried > math.degrees(self._max_pitch)
         return Deviations(
             tracking_error=partial(tracking_error, self.parameters),
             gust_rise=updraft_altitude_gain,
             altitude_candidates=HEIGHT_CANDIDATES,
             track_candidates=SIDE_CANDIDATES,
-            pitch_candidates=self._pitch_candidates,
+            pitch_candidates=(Candidate(name, 1.0, max_tried, "deg", others=tuple(other_names)),) if is_raised else (),
         )
 
     @property
@@ -508,18 +492,6 @@ class ArduPlane(Autopilot):
             "TECS_PITCH_MAX": parameters.tecs_pitch_max or math.inf,
             "PTCH_LIM_MAX_DEG": parameters.pitch_limit_max,
         }
-
-    @property
-    def _pitch_candidates(self) -> tuple[Candidate, ...]:
-        """Parameters that set the largest pitch, with the values to try if a climb reaches this pitch.
-
-        The values end where another parameter becomes the limit.
-        """
-        name, *other_names = self._max_pitch_parameters
-        higher_limits = (limit for limit in self._pitch_limits.values() if limit > self._max_pitch)
-        max_tried = min(MAX_TRIED_PITCH_DEG, *map(math.degrees, higher_limits), math.inf)
-        is_raised = max_tried > math.degrees(self._max_pitch)
-        return (Candidate(name, 1.0, max_tried, "deg", others=tuple(other_names)),) if is_raised else ()
 
     def with_parameters(self, origin: Origin = "file", /, **values: float) -> "ArduPlane":
         """Return a copy with the given parameters changed; also for an autopilot that runs the ArduPlane program."""
@@ -595,27 +567,34 @@ class ArduPlaneFromGround:
             ground.is_support[index] = contact.is_support
         ground.turnover_speed = _TURNOVER_SPEED_RATIO * self.aircraft.stall_speed
         ground.stage = IN_AIR
-        if self.ground_phases.take_off is not None:
-            self._begin_take_off(self.ground_phases.take_off, ground)
-        if self.ground_phases.approach is not None:
-            self._begin_landing(self.ground_phases.approach, ground)
-
-    def _begin_take_off(self, take_off: TakeOff, ground: Record) -> None:
-        """Set stage, throttle, pitch and altitudes of a take-off in the ground record (`GROUND_STATE`)."""
-        parameters, launch = self.parameters, take_off.launch
-        ground.stage, ground.is_on_runway = TAKING_OFF, launch.method == "runway"
-        ground.motor_start = self.motor_start
-        ground.throttle_slew = takeoff_slew(parameters)
-        ground.takeoff_throttle = parameters.takeoff_throttle or parameters.throttle_max
-        ground.home_up = take_off.home_altitude
-        ground.takeoff_end_altitude = take_off.end_altitude
-        ground.launch_up = take_off.home[2]
-        ground.takeoff_pitch, ground.leg = self._climb_pitch(take_off), take_off.waypoint
-        # Time since the ground speed reached 5 m/s, from which on ArduPlane knows its course over the ground.
-        acceleration = take_off.acceleration
-        ground.time_at_course_speed = (
-            max(0.0, take_off.speed - _COURSE_SPEED_MPS) / acceleration if acceleration else 0.0
-        )
+        take_off, approach = self.ground_phases.take_off, self.ground_phases.approach
+        if take_off is not None:
+            parameters, launch = self.parameters, take_off.launch
+            ground.stage, ground.is_on_runway = TAKING_OFF, launch.method == "runway"
+            ground.motor_start = self.motor_start
+            ground.throttle_slew = takeoff_slew(parameters)
+            ground.takeoff_throttle = parameters.takeoff_throttle or parameters.throttle_max
+            ground.home_up = take_off.home_altitude
+            ground.takeoff_end_altitude = take_off.end_altitude
+            ground.launch_up = take_off.home[2]
+            ground.takeoff_pitch, ground.leg = self._climb_pitch(take_off), take_off.waypoint
+            # Time since the ground speed reached 5 m/s, from which on ArduPlane knows its course over the ground.
+            acceleration = take_off.acceleration
+            ground.time_at_course_speed = (
+                max(0.0, take_off.speed - _COURSE_SPEED_MPS) / acceleration if acceleration else 0.0
+            )
+        if approach is not None:
+            landing_altitude = float(approach.point[2])
+            glide = self.autopilot.ground.glide(
+                approach.start_altitude - landing_altitude, approach.length, approach.tail_wind, landing_altitude
+            )
+            ground.has_landing, ground.landing_leg = True, approach.leg
+            ground.east, ground.north, ground.up = approach.point
+            ground.glide_start_altitude, ground.slope = approach.start_altitude, glide.slope
+            # `AP_TECS::_update_height_demand`.
+            ground.flares_by_demand = self.parameters.version != "4.6"
+            ground.flare_height, ground.flare_distance = glide.flare_height, glide.flare_distance
+            ground.airspeed = landing_airspeed(self.parameters, approach.tail_wind)
 
     def _climb_pitch(self, take_off: TakeOff) -> float:
         """Return the climb pitch of a take-off, rad: the pitch of the take-off item, or the maximum pitch.
@@ -628,20 +607,6 @@ class ArduPlaneFromGround:
             return take_off.pitch
         parameters = self.parameters
         return max(take_off.pitch, min(parameters.pitch_limit_max, parameters.tecs_pitch_max or math.inf))
-
-    def _begin_landing(self, approach: Approach, ground: Record) -> None:
-        """Set glide, flare and airspeed of a landing in the ground record (`GROUND_STATE`)."""
-        landing_altitude = float(approach.point[2])
-        glide = self.autopilot.ground.glide(
-            approach.start_altitude - landing_altitude, approach.length, approach.tail_wind, landing_altitude
-        )
-        ground.has_landing, ground.landing_leg = True, approach.leg
-        ground.east, ground.north, ground.up = approach.point
-        ground.glide_start_altitude, ground.slope = approach.start_altitude, glide.slope
-        # `AP_TECS::_update_height_demand`.
-        ground.flares_by_demand = self.parameters.version != "4.6"
-        ground.flare_height, ground.flare_distance = glide.flare_height, glide.flare_distance
-        ground.airspeed = landing_airspeed(self.parameters, approach.tail_wind)
 
 
 # On a field lower than home by more than this, m, the flare climbs ...
@@ -741,14 +706,3 @@ def _mission_notes(parameters: ArduPilotParameters) -> list[str]:
         f"MIS_OPTIONS {parameters['MIS_OPTIONS']:g} clears the mission each time ArduPlane starts: upload the mission"
         " after the last power-up"
     ]
-
-
-def _bank_limit_note(bank: float) -> str:
-    """Return a note that a bank limit for loiters (deg) is not simulated; "" if ArduPlane has no limit.
-
-    With a limit, `AP_L1_Control::loiter_radius` increases the radius with altitude only if the radius cannot be flown
-    at this bank.
-    """
-    if bank <= 0.0:
-        return ""
-    return f"NAVL1_LIM_BANK {bank:g} is not simulated: ArduPlane may fly smaller loiters than the simulation"

@@ -110,28 +110,19 @@ def navigate_legs(
         _update_loiter(estimated, waypoints, target, parameters, memory, l1_distance, ground_speed, eas2tas, dt)
         return
     memory.reached_loiter_target = False
-    end_e, end_n = _leg_end(target, memory)
+    # `Plane::verify_nav_wp` moves the waypoint along the leg by the pass-by distance.
+    leg_e, leg_n = target.east - memory.from_east, target.north - memory.from_north
+    leg_length = math.hypot(leg_e, leg_n)
+    end_e, end_n = target.east, target.north
+    if target.pass_by > 0.0 and leg_length > 0.0:
+        end_e += target.pass_by * leg_e / leg_length
+        end_n += target.pass_by * leg_n / leg_length
     _follow_line(estimated, end_e, end_n, parameters, memory, l1_distance, ground_speed, dt, target.without_crosstrack)
     turn_angle = _turn_angle(waypoints, target, memory)
     if memory.leg + 2 < waypoints.shape[0] and _is_leg_over(
         estimated, target, end_e, end_n, turn_angle, parameters, memory, l1_distance, eas2tas
     ):
         _begin_leg(estimated, waypoints, memory.leg + 1, memory)
-
-
-@inner
-def _leg_end(target: Record, memory: Record) -> tuple[float, float]:
-    """Return east and north of the leg's end, m: the target, or a point beyond a target with a pass-by distance.
-
-    Follows `Plane::verify_nav_wp`, which moves the waypoint along the leg by the pass-by distance.
-
-    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record.
-    """
-    leg_e, leg_n = target.east - memory.from_east, target.north - memory.from_north
-    leg_length = math.hypot(leg_e, leg_n)
-    if target.pass_by <= 0.0 or leg_length <= 0.0:
-        return target.east, target.north
-    return target.east + target.pass_by * leg_e / leg_length, target.north + target.pass_by * leg_n / leg_length
 
 
 @inner

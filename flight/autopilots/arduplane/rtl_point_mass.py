@@ -391,7 +391,14 @@ def _is_stage_complete(
     if climb.is_required and is_first_stage:
         # The climb lasts at least one tick.
         return time > 0.0 and estimated.up > climb.top
-    return _is_target_reached(estimated, target, memory, loiter, is_last_stage, arrival_radius, dt)
+    # The leg ends at the waypoint.  A loiter before a landing sequence is complete as soon as the aircraft is on its
+    # circle and near the target altitude; the last one after one lap and `ENDLESS_LOITER_TIME_S`.
+    if target.loiter_radius == 0.0:
+        return memory.leg > 0
+    altitude_error = abs(estimated.up - target.up)
+    if not is_last_stage:
+        return memory.reached_loiter_target and altitude_error < LANDING_JOIN_ALTITUDE_TOLERANCE_M
+    return advance_loiter(estimated, target, loiter, arrival_radius, dt)
 
 
 @inner
@@ -430,37 +437,6 @@ def _demand_climb(
     # The pitch integrators do not change: `AP_TECS::_update_pitch` starts them from the minimum pitch here.
     memory.seb_integrator, memory.ske_integrator = seb_integrator, ske_integrator
     memory.throttle_demand = max(previous_throttle, min(climb.throttle, previous_throttle + climb.slew * dt))
-
-
-@inner
-def _is_target_reached(
-    estimated: Record,
-    target: Record,
-    memory: Record,
-    loiter: Record,
-    is_last_stage: bool,
-    arrival_radius: float,
-    dt: float,
-) -> bool:
-    """Return True once the waypoint is reached or the loiter is complete.
-
-    A loiter before a landing sequence is complete as soon as the aircraft is on its circle and near the target
-    altitude. The last loiter is complete after one lap and `flight.mission.itinerary.ENDLESS_LOITER_TIME_S`; its
-    progress ``loiter`` is updated here.
-
-    target: waypoint of the stage.
-    loiter: progress around the last loiter, a record of `flight.autopilots.return_steps.LOITER_PROGRESS`.
-    arrival_radius: distance from the center, m, within which the aircraft has arrived at the loiter.
-    dt: s since the last call.
-    estimated: position and velocity over the ground, a `MOTION` record.
-    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record.
-    """
-    if target.loiter_radius == 0.0:
-        return memory.leg > 0
-    altitude_error = abs(estimated.up - target.up)
-    if not is_last_stage:
-        return memory.reached_loiter_target and altitude_error < LANDING_JOIN_ALTITUDE_TOLERANCE_M
-    return advance_loiter(estimated, target, loiter, arrival_radius, dt)
 
 
 @inner
@@ -579,42 +555,10 @@ def _update_demands(
         memory.from_up = target.up
     update_height_demand(estimated, target, parameters, memory, dt)
     airspeed_demand = airspeed_target(state, estimated, target.airspeed, target, parameters, memory, eas2tas)
-    _demand_throttle_and_pitch(
-        state, estimated, parameters, memory, aircraft, excess_table, airspeed_demand, eas2tas, is_gliding, dt
-    )
-
-
-@inner
-def _demand_throttle_and_pitch(
-    state: Record,
-    estimated: Record,
-    parameters: Record,
-    memory: Record,
-    aircraft: Record,
-    excess_table: Floats,
-    airspeed_demand: float,
-    eas2tas: float,
-    is_gliding: bool,
-    dt: float,
-) -> None:
-    """Demand throttle and pitch by TECS; in a gliding turn, demand the pitch that holds the airspeed.
-
-    state: attitude, airspeed and rates of the aircraft, a `STATE` record.
-    estimated: position and velocity over the ground, a `MOTION` record.
-    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
-    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record; updated.
-    aircraft: a `POINT_MASS` record.
-    excess_table: specific excess power, m/s, `PointMass.excess`.
-    airspeed_demand: equivalent airspeed, m/s. In a gliding turn it is multiplied by the square root of the load factor,
-        so that the angle of attack stays the same.
-    eas2tas: ratio of true to equivalent airspeed.
-    is_gliding: True while the aircraft flies its RTL without an engine.
-    dt: duration of a tick, s.
-
-    In six of eight ArduPlane flights, the aircraft held its airspeed in this way and lost 55 m in the turn back. In the
-    other two, which had been sinking before, it held its altitude, slowed down, and lost half as much. The worse case
-    is simulated.
-    """
+    # In a gliding turn the pitch holds the airspeed, multiplied by the square root of the load factor, so that the
+    # angle of attack stays the same.  In six of eight ArduPlane flights, the aircraft held its airspeed in this way and
+    # lost 55 m in the turn back.  In the other two, which had been sinking before, it held its altitude, slowed down,
+    # and lost half as much.  The worse case is simulated.
     seb_integrator, ske_integrator = memory.seb_integrator, memory.ske_integrator
     update_tecs(state, estimated, parameters, memory, airspeed_demand * eas2tas, eas2tas, dt)
     if not is_gliding or abs(state.roll) < _TURN_BANK_RAD:

@@ -275,7 +275,15 @@ def update_tecs(
     # If the aircraft cannot climb as demanded, a lower STE rate is assumed at full throttle.
     ste_rate_max = GRAVITY * parameters.tecs_climb_max * memory.max_climb_scaler
     ste_rate_min = -GRAVITY * parameters.tecs_sink_min
-    tas_max = _update_tas_max(parameters, memory, tas_min, eas2tas, ste_rate_max, ste_rate_min, dt)
+    # The maximum true airspeed falls towards AIRSPEED_CRUISE while the throttle is saturated, and rises again
+    # afterwards. With this rule `AP_TECS::_update_speed` slows down an aircraft that cannot climb at its maximum
+    # airspeed.
+    tas_max = parameters.airspeed_max * eas2tas
+    saturated_rate = ste_rate_min if memory.is_throttle_saturated else ste_rate_max
+    tas_max_change = _SPEED_RATE_FRACTION * saturated_rate / max(memory.tas, parameters.airspeed_min * eas2tas) * dt
+    max_drop = max(0.0, tas_max - parameters.airspeed_cruise * eas2tas)
+    memory.tas_max_drop = min(max_drop, max(0.0, memory.tas_max_drop - tas_max_change))
+    tas_max = max(tas_min, tas_max - memory.tas_max_drop)
     is_underspeed = detect_underspeed(estimated, parameters, memory, tas_min, dt)
     limited_tas_target = tas_min if is_underspeed or memory.bad_descent else min(tas_max, max(tas_min, tas_target))
     ske_rate_demand = _update_speed_demand(parameters, memory, limited_tas_target, tas_min, tas_max, eas2tas, dt)
@@ -292,36 +300,6 @@ def update_tecs(
         memory.throttle_demand = parameters.throttle_max
     memory.bad_descent = not is_underspeed and _is_bad_descent(parameters, memory, ste_error, ste_rate)
     _update_pitch(state, parameters, memory, spe_error, ske_error, spe_rate, ske_rate, is_underspeed, dt)
-
-
-@inner
-def _update_tas_max(
-    parameters: Record,
-    memory: Record,
-    tas_min: float,
-    eas2tas: float,
-    ste_rate_max: float,
-    ste_rate_min: float,
-    dt: float,
-) -> float:
-    """Update and return the maximum true airspeed, m/s.
-
-    The maximum falls towards AIRSPEED_CRUISE while the throttle is saturated, and rises again afterwards. With this
-    rule `AP_TECS::_update_speed` slows down an aircraft that cannot climb at its maximum airspeed.
-
-    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
-    memory: `ARDUPILOT_MEMORY` record; its drop of the maximum airspeed is updated.
-    tas_min: minimum true airspeed, m/s.
-    eas2tas: ratio of true to equivalent airspeed.
-    ste_rate_max, ste_rate_min: rates of the specific total energy at full and at idle throttle, m^2/s^3.
-    dt: duration of a tick, s.
-    """
-    tas_max = parameters.airspeed_max * eas2tas
-    ste_rate = ste_rate_min if memory.is_throttle_saturated else ste_rate_max
-    change = _SPEED_RATE_FRACTION * ste_rate / max(memory.tas, parameters.airspeed_min * eas2tas) * dt
-    max_drop = max(0.0, tas_max - parameters.airspeed_cruise * eas2tas)
-    memory.tas_max_drop = min(max_drop, max(0.0, memory.tas_max_drop - change))
-    return max(tas_min, tas_max - memory.tas_max_drop)
 
 
 @inner

@@ -105,7 +105,7 @@ class PhysicsPort:
         # The kernel's own timeout: one system call a frame.
         check_interval = struct.pack("@ll", int(_CHECK_INTERVAL_S), int(_CHECK_INTERVAL_S % 1.0 * 1e6))
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, check_interval)
-        self.watch: Callable[[], None] = _do_nothing
+        self.watch: Callable[[], None] = lambda: None
         self._frame = -1
         self._last_answer = b""
         self._answered = 0.0
@@ -180,10 +180,6 @@ class PhysicsPort:
         except ConnectionRefusedError:
             # The program is gone: the next wait finds out why.
             return
-
-
-def _do_nothing() -> None:
-    """Do nothing: the default of `watch`."""
 
 
 class JsonLockstep(Lockstep):

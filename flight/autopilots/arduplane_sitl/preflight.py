@@ -7,7 +7,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from flight.autopilots.sitl.conversation import REPLY_TIMEOUT_S, Awaited, Conversation, ConversationStep
 from flight.autopilots.sitl.mission import UploadedMission
 from flight.live.mission_server import MissionType
-from flight.mission.items import Command, Frame, Home, MissionItem
+from flight.mission.items import Command, Frame, MissionItem
 
 # ArduPlane's number of the mode AUTO.
 AUTO = 10
@@ -37,7 +37,22 @@ class Preflight(Conversation):
         """
         reported, ekf = self._reported, mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT
         yield from self._wait_for_position(ekf, _MESSAGE_INTERVALS_US[ekf], mavlink.ESTIMATOR_CONST_POS_MODE)
-        yield from self._upload([_home_item(mission.home), *mission.items], MissionType.MISSION)
+        # Item 0 is home.
+        yield from self._upload(
+            [
+                MissionItem(
+                    0,
+                    int(Command.NAV_WAYPOINT),
+                    int(Frame.GLOBAL),
+                    (0.0,) * 4,
+                    mission.home.lat_deg,
+                    mission.home.lon_deg,
+                    mission.home.alt,
+                ),
+                *mission.items,
+            ],
+            MissionType.MISSION,
+        )
         if mission.rally:
             yield from self._upload(list(mission.rally), MissionType.RALLY)
         yield from self._send_until_accepted(Command.DO_SET_HOME, lambda: self._set_home(mission.home), "home")
@@ -53,13 +68,6 @@ class Preflight(Conversation):
         )
         auto_mode = Awaited("AUTO", REPLY_TIMEOUT_S, "did not change to AUTO, armed,")
         yield from self._wait_until(lambda: reported.mode == AUTO and reported.armed, auto_mode)
-
-
-def _home_item(home: Home) -> MissionItem:
-    """Return home as mission item 0."""
-    return MissionItem(
-        0, int(Command.NAV_WAYPOINT), int(Frame.GLOBAL), (0.0,) * 4, home.lat_deg, home.lon_deg, home.alt
-    )
 
 
 def version_text(texts: list[str], number: int | None) -> str:

@@ -18,7 +18,6 @@ from flight.autopilots.parameter_files import MAX_BYTES
 from flight.autopilots.parts import (
     BatteryFailsafe,
     Candidate,
-    Cause,
     ControlLaw,
     Deviations,
     FeasibilityLimits,
@@ -29,7 +28,6 @@ from flight.autopilots.parts import (
     ReturnMission,
     ReturnTimeFailsafe,
     ReturnTrials,
-    RtlSettings,
     SpeedLimits,
     SpeedRules,
     TurnRules,
@@ -451,29 +449,32 @@ class Px4(Autopilot):
     @property
     def returns(self) -> ReturnBehaviour:
         """Behaviour of PX4 in an RTL; a scenario's RTL altitude sets RTL_RETURN_ALT."""
+        parameters = self.parameters
+        return_altitude, descend_altitude = ({name: parameters[name]} for name in ("RTL_RETURN_ALT", "RTL_DESCEND_ALT"))
+        return_type = parameters["RTL_TYPE"]
+        other_types = sorted({0.0, 1.0, 3.0} - {return_type})
+        first_height, last_height = f"{parameters['RTL_RETURN_ALT']:g} m", f"{parameters['RTL_DESCEND_ALT']:g} m"
+        path_text = (
+            f"RTL_TYPE {return_type:g}: a return goes to {_DESTINATION_TEXTS[int(return_type)]}. An aircraft below"
+            f" RTL_RETURN_ALT ({first_height} above the destination) first climbs to this height in a loiter. Then it"
+            " flies level: to the loiter of a landing sequence up to NAV_FW_ALT_RAD"
+            f" ({parameters['NAV_FW_ALT_RAD']:g} m) lower, because the climb ends there. Over home or a rally point it"
+            f" descends in a loiter to RTL_DESCEND_ALT ({last_height})"
+        )
         return ReturnBehaviour(
             self._return_rules,
-            _rtl_parameters,
+            lambda settings: {} if settings.altitude is None else {"RTL_RETURN_ALT": settings.altitude},
             after_link_loss=partial(link_loss_reactions, self.parameters),
             fly=self._fly_returns,
-            causes=self._failsafe_causes,
+            causes=lambda mission: failsafe_causes(parameters, has_fence=mission.has_fence),
             unsimulated_text=self._unsimulated_returns,
             unjudged_texts=self._unjudged_returns,
-            path_text=self._return_path_text,
-            trials=self._return_trials,
-        )
-
-    @property
-    def _return_trials(self) -> ReturnTrials:
-        """Parameter changes to try for a safer RTL: RTL_RETURN_ALT, RTL_DESCEND_ALT, and RTL_TYPE."""
-        return_altitude, descend_altitude = (
-            {name: self.parameters[name]} for name in ("RTL_RETURN_ALT", "RTL_DESCEND_ALT")
-        )
-        other_types = sorted({0.0, 1.0, 3.0} - {self.parameters["RTL_TYPE"]})
-        return ReturnTrials(
-            (return_altitude, descend_altitude | return_altitude),
-            tuple({"RTL_TYPE": value} for value in other_types),
-            "RTL_RETURN_ALT, RTL_DESCEND_ALT, RTL_TYPE",
+            path_text=path_text,
+            trials=ReturnTrials(
+                (return_altitude, descend_altitude | return_altitude),
+                tuple({"RTL_TYPE": value} for value in other_types),
+                "RTL_RETURN_ALT, RTL_DESCEND_ALT, RTL_TYPE",
+            ),
         )
 
     def _fly_returns(
@@ -512,10 +513,6 @@ class Px4(Autopilot):
             abort_limits=abort_limits,
         )
 
-    def _failsafe_causes(self, mission: ReturnMission) -> tuple[Cause, ...]:
-        """Return the events that can end a mission, each with PX4's reaction."""
-        return failsafe_causes(self.parameters, has_fence=mission.has_fence)
-
     def _unsimulated_returns(self, mission: ReturnMission) -> str:
         """Return the reason why no RTL of a mission is simulated; "" if RTLs are simulated.
 
@@ -532,20 +529,6 @@ class Px4(Autopilot):
         is_unknown = return_type in _TO_LANDING and not has_sequence and not mission.commands.isdisjoint(LANDINGS)
         landing_text = f"RTL_TYPE {return_type:g} may return to a landing without DO_LAND_START, which is not simulated"
         return (*([landing_text] if is_unknown else []), *self._unjudged_return_texts(mission.rally_distance))
-
-    @property
-    def _return_path_text(self) -> str:
-        """Sentence about the path of an RTL."""
-        parameters = self.parameters
-        return_type = parameters["RTL_TYPE"]
-        first_height, last_height = f"{parameters['RTL_RETURN_ALT']:g} m", f"{parameters['RTL_DESCEND_ALT']:g} m"
-        return (
-            f"RTL_TYPE {return_type:g}: a return goes to {_DESTINATION_TEXTS[int(return_type)]}. An aircraft below"
-            f" RTL_RETURN_ALT ({first_height} above the destination) first climbs to this height in a loiter. Then it"
-            " flies level: to the loiter of a landing sequence up to NAV_FW_ALT_RAD"
-            f" ({parameters['NAV_FW_ALT_RAD']:g} m) lower, because the climb ends there. Over home or a rally point it"
-            f" descends in a loiter to RTL_DESCEND_ALT ({last_height})"
-        )
 
     @property
     def _return_rules(self) -> ReturnRules:
@@ -601,25 +584,21 @@ class Px4(Autopilot):
 
         PX4 loiters at a waypoint if its altitude error exceeds NAV_FW_ALT_RAD.
         """
+        # FW_T_CLMB_MAX is tried if it is the smaller limit of the climb rate, up to the other one.
+        largest_rate = self.parameters["FW_T_CLMB_R_SP"]
+        is_smaller = self.parameters["FW_T_CLMB_MAX"] < largest_rate
         return Deviations(
             tracking_error=self._tracking_error,
             gust_rise=updraft_altitude_gain,
             altitude_miss_probability=partial(altitude_miss_probability, self.parameters["NAV_FW_ALT_RAD"]),
             altitude_parameter="NAV_FW_ALT_RAD",
-            altitude_candidates=(*self._climb_candidates, *HEIGHT_CANDIDATES),
+            altitude_candidates=(
+                *((Candidate("FW_T_CLMB_MAX", 0.5, largest_rate, "m/s"),) if is_smaller else ()),
+                *HEIGHT_CANDIDATES,
+            ),
             track_candidates=SIDE_CANDIDATES,
             pitch_candidates=() if self.parameters["FW_P_LIM_MAX"] >= MAX_TRIED_PITCH_RAD else (PITCH_CANDIDATE,),
         )
-
-    @property
-    def _climb_candidates(self) -> tuple[Candidate, ...]:
-        """Range of values to try for FW_T_CLMB_MAX, if it is the smaller limit of the climb rate.
-
-        The range ends at FW_T_CLMB_R_SP, the other limit of the climb rate.
-        """
-        largest_rate = self.parameters["FW_T_CLMB_R_SP"]
-        is_smaller = self.parameters["FW_T_CLMB_MAX"] < largest_rate
-        return (Candidate("FW_T_CLMB_MAX", 0.5, largest_rate, "m/s"),) if is_smaller else ()
 
     def _tracking_error(
         self, airspeed: float, nav: Navigation, *, fly_over: bool = False, turbulence: Turbulence = "none"
@@ -645,8 +624,3 @@ def _transfer_state(previous_record: Record, record: Record, start: Floats) -> N
         setattr(record.memory, name, 0)
     record.memory.from_east, record.memory.from_north, record.memory.from_up = start
     record.memory.min_distance_to_end, record.memory.leg_start_altitude = math.inf, start[2]
-
-
-def _rtl_parameters(settings: RtlSettings) -> dict[str, float]:
-    """Return the value of RTL_RETURN_ALT that a scenario's RTL settings require; none without an altitude."""
-    return {} if settings.altitude is None else {"RTL_RETURN_ALT": settings.altitude}

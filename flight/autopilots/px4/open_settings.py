@@ -53,16 +53,7 @@ def describe_open_settings(parameters: Px4Parameters, aircraft: Aircraft | None,
     aircraft: None if the aircraft is not known.
     by_program: True if PX4's own program flies, which uses the gains of the rate controllers.
     """
-    yield from _describe_position_estimate(parameters)
-    yield from _describe_control_allocation(parameters)
-    yield from _describe_slew_rates(parameters)
-    yield from _describe_connections(parameters)
-    if not by_program:
-        yield from _describe_rate_gains(parameters, aircraft)
-
-
-def _describe_position_estimate(parameters: Px4Parameters) -> Iterator[str]:
-    """Describe settings with which EKF2 has no position or no altitude."""
+    # Settings with which EKF2 has no position or no altitude.
     gps_bits = int(parameters["EKF2_GPS_CTRL"])
     if not gps_bits & _GPS_POSITION_BIT:
         yield f"EKF2_GPS_CTRL {gps_bits} takes no position from GPS, which is not simulated"
@@ -71,6 +62,20 @@ def _describe_position_estimate(parameters: Px4Parameters) -> Iterator[str]:
         yield f"EKF2_GPS_CTRL {gps_bits} without a barometer leaves no altitude, which is not simulated"
     if not any(parameters[name] for name in _GPS_CONNECTIONS):
         yield "GPS_1_CONFIG 0 connects no GPS, which is not simulated"
+    yield from _describe_control_allocation(parameters)
+    # Slew rate limits are given in s for the whole range (`ControlAllocation::applySlewRateLimit`).
+    file_values = parameters.by_origin("file")
+    for name in SLEW_NAMES:
+        if (value := file_values.get(name, 0.0)) > 0.0:
+            yield f"{name} {value:g} s slows an actuator output, which is not simulated"
+    # Output functions that connect no motor or no control surface.
+    functions = {file_values[name] for name in OUTPUT_FUNCTION_NAMES if name in file_values}
+    if functions:
+        for part, (first_function, last_function) in _OUTPUT_FUNCTIONS_BY_PART.items():
+            if not any(first_function <= function <= last_function for function in functions):
+                yield f"the output functions (PWM_MAIN_FUNC1 and others) connect no {part}, which is not simulated"
+    if not by_program:
+        yield from _describe_rate_gains(parameters, aircraft)
 
 
 def _describe_control_allocation(parameters: Px4Parameters) -> Iterator[str]:
@@ -95,28 +100,6 @@ def _describe_control_allocation(parameters: Px4Parameters) -> Iterator[str]:
             }
             if moved_types.isdisjoint(types):
                 yield f"CA_SV_CS_COUNT {len(names)} and CA_SV_CS*_TYPE leave no {part}, which is not simulated"
-
-
-def _describe_slew_rates(parameters: Px4Parameters) -> Iterator[str]:
-    """Describe slew rate limits of the actuator outputs, which are given in s for the whole range.
-
-    Follows `ControlAllocation::applySlewRateLimit`.
-    """
-    file_values = parameters.by_origin("file")
-    for name in SLEW_NAMES:
-        if (value := file_values.get(name, 0.0)) > 0.0:
-            yield f"{name} {value:g} s slows an actuator output, which is not simulated"
-
-
-def _describe_connections(parameters: Px4Parameters) -> Iterator[str]:
-    """Describe output functions in the user's file that lack a motor or any control surface."""
-    file_values = parameters.by_origin("file")
-    functions = {file_values[name] for name in OUTPUT_FUNCTION_NAMES if name in file_values}
-    if not functions:
-        return
-    for part, (first_function, last_function) in _OUTPUT_FUNCTIONS_BY_PART.items():
-        if not any(first_function <= function <= last_function for function in functions):
-            yield f"the output functions (PWM_MAIN_FUNC1 and others) connect no {part}, which is not simulated"
 
 
 def _describe_rate_gains(parameters: Px4Parameters, aircraft: Aircraft | None) -> Iterator[str]:

@@ -47,7 +47,7 @@ from flight.dynamics.state import STATE
 from flight.guidance.equivalent_airspeed import eas_to_tas_ratio
 from flight.guidance.lateral_reference_laws import waypoint_column
 from flight.guidance.navigation_error import MOTION
-from flight.mission.return_path import LandingStart, ReturnTarget
+from flight.mission.return_path import ReturnTarget
 from flight.simulation.tick import RTL_ARRIVAL_LOITER_RADII
 from world.arrays import Floats, Heights
 from world.frames import PolyMapRecord
@@ -172,22 +172,18 @@ def _make_route(start: Record, target: ReturnTarget, parameters: Px4Parameters) 
         last_waypoint.loiter_radius, last_waypoint.is_rtl = parameters["RTL_LOITER_RAD"], True
         return route
     for waypoint, stop in zip(route[1:-1], stops, strict=True):
-        _fill_stop(waypoint, stop, parameters)
+        # A stop is a loiter to an altitude, or a plain waypoint.
+        waypoint.east, waypoint.north, waypoint.up = stop.position
+        if stop.to_altitude:
+            waypoint.centre_east, waypoint.centre_north, _ = stop.position
+            waypoint.loiter_radius = stop.radius or parameters["NAV_LOITER_RAD"]
+            waypoint.loiters_to_altitude = True
+            waypoint.exits_on_course, waypoint.exits_on_tangent = stop.exits_on_course, stop.exits_on_tangent
         # A waypoint of a landing is reached at any altitude (`MissionBase::isLanding`), except the first one.
         waypoint.ignores_altitude = not stop.to_altitude and stop is not target.landing
     route[-2].precedes_landing = True
     last_waypoint.east, last_waypoint.north, last_waypoint.up = target.landing.landing or target.position
     return route
-
-
-def _fill_stop(waypoint: Record, stop: LandingStart, parameters: Px4Parameters) -> None:
-    """Fill a waypoint from a stop of a landing sequence: a loiter to an altitude, or a plain waypoint."""
-    waypoint.east, waypoint.north, waypoint.up = stop.position
-    if stop.to_altitude:
-        waypoint.centre_east, waypoint.centre_north, _ = stop.position
-        waypoint.loiter_radius = stop.radius or parameters["NAV_LOITER_RAD"]
-        waypoint.loiters_to_altitude = True
-        waypoint.exits_on_course, waypoint.exits_on_tangent = stop.exits_on_course, stop.exits_on_tangent
 
 
 def _rtl_timeout(start: Record, target: ReturnTarget, parameters: Px4Parameters, aircraft: PointMass) -> float:
@@ -351,36 +347,20 @@ def _steer(
         )
     )
     if lands and not is_climbing and not has_begun_sequence:
-        _begin_sequence(estimated, waypoints, transit_altitude, parameters, memory)
+        # Begin the leg to the first stop. After a climb it begins at the center of the loiter in which the aircraft
+        # climbed. Without a climb PX4 has no previous setpoint, and the leg begins at the altitude of its end.
+        start, first_stop = waypoints[0], waypoints[1]
+        has_climbed = start.up < transit_altitude - parameters.altitude_acceptance_radius
+        memory.from_east, memory.from_north = start.east, start.north
+        memory.from_up = transit_altitude if has_climbed else first_stop.up
+        memory.leg, memory.leg_start_altitude, memory.min_distance_to_end = 0, estimated.up, math.inf
+        memory.is_loitering, memory.rim_reached, memory.time_since_reached = False, False, 0.0
     if not is_climbing:
         navigate(estimated, waypoints, wind_east, wind_north, airspeed * airspeed_scale, parameters, memory, dt)
     update_roll_setpoint(parameters, memory, dt)
     airspeed_setpoint = max(airspeed, memory.min_airspeed / airspeed_scale)
     update_tecs(state, estimated, parameters, memory, airspeed_setpoint, eas_to_tas, dt)
     return lands and not is_climbing
-
-
-@inner
-def _begin_sequence(
-    estimated: Record, waypoints: Records, transit_altitude: float, parameters: Record, memory: Record
-) -> None:
-    """Begin the leg to the first stop of a landing sequence.
-
-    After a climb the leg begins at the center of the loiter in which the aircraft climbed. Without a climb PX4 has no
-    previous setpoint. The leg then begins at the aircraft's position, and at the altitude of the leg's end.
-
-    estimated: position and velocity over the ground, a `MOTION` record.
-    waypoints: `WAYPOINT` records (w,): the start of the RTL, then the stops of the sequence.
-    transit_altitude: altitude to which the RTL climbs first, m AMSL.
-    parameters: PX4's parameters, a `PX4_PARAMETERS` record.
-    memory: memory of the control law between ticks, a `PX4_MEMORY` record; updated.
-    """
-    begin, first_stop = waypoints[0], waypoints[1]
-    has_climbed = begin.up < transit_altitude - parameters.altitude_acceptance_radius
-    memory.from_east, memory.from_north = begin.east, begin.north
-    memory.from_up = transit_altitude if has_climbed else first_stop.up
-    memory.leg, memory.leg_start_altitude, memory.min_distance_to_end = 0, estimated.up, math.inf
-    memory.is_loitering, memory.rim_reached, memory.time_since_reached = False, False, 0.0
 
 
 @inner

@@ -3,7 +3,6 @@
 import contextlib
 from collections.abc import Iterator
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 from aircraft.catalog import Aircraft
@@ -67,7 +66,13 @@ class Px4Flight(SitlFlight):
             self._preflight = Px4Preflight(link, lambda: lockstep.time)
             self._apply_gnss_error()
             port.connect(_CONNECT_TIMEOUT_S)
-            lockstep.boot(self._rail, partial(_has_started, process), _STALL_TIME_S, _STARTUP_TIMEOUT_S)
+            # The output shows when PX4's start-up script has ended.
+            lockstep.boot(
+                self._rail,
+                lambda: any(STARTED in line for line in process.lines()),
+                _STALL_TIME_S,
+                _STARTUP_TIMEOUT_S,
+            )
             self._hold_during(self._preflight.identify(flight_parameters.values))
             version: Px4Version = (
                 "1.16"
@@ -115,11 +120,6 @@ class Px4Flight(SitlFlight):
         super()._poll_link()
         self._preflight.send_periodic_messages()
         next(self._mode_start, None)
-
-
-def _has_started(process: AutopilotProcess) -> bool:
-    """Return True if the output of PX4 shows that its start-up script has ended."""
-    return any(STARTED in line for line in process.lines())
 
 
 def _reported_program(link: AutopilotLink, digest: str, parameters: Px4FlightParameters) -> AutopilotProgram:

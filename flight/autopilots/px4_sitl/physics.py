@@ -168,7 +168,7 @@ class SimulatorPort:
         self._listener.bind((LOOPBACK, 0))
         self._listener.listen(1)
         self.port = int(self._listener.getsockname()[1])
-        self.watch: Callable[[], None] = _do_nothing
+        self.watch: Callable[[], None] = lambda: None
         self._stream: socket.socket | None = None
         self._mav = mavlink.MAVLink(None, 1, mavlink.MAV_COMP_ID_AUTOPILOT1)
         self._mav.robust_parsing = True
@@ -277,10 +277,6 @@ class SimulatorPort:
         return True
 
 
-def _do_nothing() -> None:
-    """Do nothing: the default of `watch`."""
-
-
 # ----------------------------------------------------------------------
 # The exchange.
 
@@ -324,20 +320,16 @@ class HilLockstep(Lockstep):
         self._flown_outputs: tuple[float, ...] = self._last_answer
         self._awaits_answer = False
 
-    @property
-    def _answers_every_step(self) -> bool:
-        """True if PX4 answers every step."""
-        return self._answer_count >= _RUNNING_ANSWER_COUNT
-
     def _next_outputs(self) -> tuple[float, ...]:
         """Return the last answer of PX4; zeros before the first answer.
 
         If PX4 answers every step, the answer to the last step is awaited; otherwise only for `_EARLY_ANSWER_TIMEOUT_S`.
         """
         if self._awaits_answer:
+            # A running PX4 answers every step.
             answer = (
                 self._port.require_answer()
-                if self._answers_every_step
+                if self._answer_count >= _RUNNING_ANSWER_COUNT
                 else self._port.receive_answer(_EARLY_ANSWER_TIMEOUT_S)
             )
             self._answer_count = 0 if answer is None else self._answer_count + 1

@@ -114,7 +114,13 @@ class Conversation:
         self._send_command(mavlink.MAV_CMD_DO_SEND_BANNER)
         names = list(parameters)
         for first in range(0, len(names), _PARAMETERS_PER_REQUEST):
-            yield from self._read_parameters(names[first : first + _PARAMETERS_PER_REQUEST])
+            # The wait is limited because the autopilot does not answer for a parameter that it lacks.
+            requested = names[first : first + _PARAMETERS_PER_REQUEST]
+            for name in requested:
+                self._link.send(mavlink.MAVLink_param_request_read_message(SYSTEM, COMPONENT, name.encode("ascii"), -1))
+            stopwatch, received = self._start_stopwatch(), self._reported.parameters
+            while not (received.keys() >= set(requested) or stopwatch.has_passed(RETRY_INTERVAL_S)):
+                yield
 
     def _wait_for_position(self, message: int, interval: int, excluding_flags: int = 0) -> ConversationStep:
         """Wait until the autopilot's estimator has a position.  Raises FlightError after a timeout.
@@ -204,17 +210,6 @@ class Conversation:
             request,
         )
 
-    def _read_parameters(self, names: list[str]) -> ConversationStep:
-        """Request parameters, and wait up to a second for the values.
-
-        The wait is limited because the autopilot does not answer for a parameter that it lacks.
-        """
-        for name in names:
-            self._link.send(mavlink.MAVLink_param_request_read_message(SYSTEM, COMPONENT, name.encode("ascii"), -1))
-        stopwatch, parameters = self._start_stopwatch(), self._reported.parameters
-        while not (parameters.keys() >= set(names) or stopwatch.has_passed(RETRY_INTERVAL_S)):
-            yield
-
     def _upload(self, items: list[MissionItem], kind: MissionType) -> ConversationStep:
         """Upload a mission or rally points (MAVLink mission protocol).
 
@@ -224,7 +219,19 @@ class Conversation:
         stopwatch = self._start_stopwatch()
         list_name = "mission" if kind == MissionType.MISSION else "rally points"
         while True:
-            yield from self._send_items(items, kind)
+            # Send the number of items and each item that is requested, until an acknowledgment or a timeout.
+            reported, link = self._reported, self._link
+            reported.requested = reported.mission_result = None
+            link.send(mavlink.MAVLink_mission_count_message(SYSTEM, COMPONENT, len(items), kind))
+            last_item, item_stopwatch = None, self._start_stopwatch()
+            while reported.mission_result is None and not item_stopwatch.has_passed(REPLY_TIMEOUT_S):
+                if reported.requested is not None and (
+                    reported.requested != last_item or item_stopwatch.has_passed(RETRY_INTERVAL_S)
+                ):
+                    last_item, item_stopwatch = reported.requested, self._start_stopwatch()
+                    if last_item < len(items):
+                        link.send(to_message(items[last_item], target_component=COMPONENT, seq=last_item))
+                yield
             result = self._reported.mission_result
             if result == mavlink.MAV_MISSION_ACCEPTED:
                 return
@@ -238,25 +245,6 @@ class Conversation:
                 result_name = "no answer" if result is None else _MISSION_RESULTS.get(result, str(result))
                 message = f"refused the {list_name}{item_text}: {result_name}{self._last_status_text()}"
                 raise FlightError(message, field=list_name, value=result_name)
-            yield from self._wait(RETRY_INTERVAL_S)
-
-    def _send_items(self, items: list[MissionItem], kind: MissionType) -> ConversationStep:
-        """Send the number of items and each item that is requested, until an acknowledgment or a timeout."""
-        reported, link = self._reported, self._link
-        reported.requested = reported.mission_result = None
-        link.send(mavlink.MAVLink_mission_count_message(SYSTEM, COMPONENT, len(items), kind))
-        last_item, stopwatch = None, self._start_stopwatch()
-        while reported.mission_result is None and not stopwatch.has_passed(REPLY_TIMEOUT_S):
-            if reported.requested is not None and (
-                reported.requested != last_item or stopwatch.has_passed(RETRY_INTERVAL_S)
-            ):
-                last_item, stopwatch = reported.requested, self._start_stopwatch()
-                if last_item < len(items):
-                    link.send(to_message(items[last_item], target_component=COMPONENT, seq=last_item))
-            yield
-
-    def _wait(self, seconds: float) -> ConversationStep:
-        """Wait for a number of seconds by the autopilot's clock."""
-        start = self._now()
-        while self._now() - start < seconds:
-            yield
+            start = self._now()
+            while self._now() - start < RETRY_INTERVAL_S:
+                yield

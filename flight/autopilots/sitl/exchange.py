@@ -272,16 +272,6 @@ class Lockstep(ABC):
         battery: volts and amperes; None for an aircraft without a battery.
         """
 
-    def _battery(self) -> tuple[float, float] | None:
-        """Return the voltage (V) and the current (A) of the battery; None for an aircraft without a battery.
-
-        The voltage is constant.
-        """
-        if not self._volts:
-            return None
-        current, factor = self._current
-        return self._volts, current() * factor
-
     def hold(self, rail: RailEnd, time_since_launch: float = 0.0) -> None:
         """Run one frame with the aircraft on the rail, ``time_since_launch`` s after the acceleration began."""
         self._workspace.commands[:] = self._receive_commands()
@@ -308,6 +298,7 @@ class Lockstep(ABC):
         home_lat, home_lon, home_amsl = self._home
         north, east = offset_on_sphere(lat, lon, home_lat, home_lon)
         error_north, error_east, error_up, error_velocity_north, error_velocity_east, error_velocity_up = self.error
+        current, current_factor = self._current
         self._send_motion(
             (
                 *(self._next_time(), p, q, r, *self._fdm.specific_force()),
@@ -322,7 +313,8 @@ class Lockstep(ABC):
                     airspeed,
                 ),
             ),
-            self._battery(),
+            # The battery's voltage is constant.
+            (self._volts, current() * current_factor) if self._volts else None,
         )
 
     def make_loop(self, tick: Callable[[], int], steps: int, *, gusts: bool, ground: bool) -> Callable[[int], int]:

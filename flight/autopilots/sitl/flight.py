@@ -291,7 +291,14 @@ class SitlFlight(ProgramFlight):
             if self._release is None:
                 self._fly_to_first_waypoint()
             else:
-                self._start_free_flight(self._release)
+                # The simulated motion starts at the end of the launch, or at rest on the runway.
+                self._set_unit_factors()
+                commands = tuple(float(command) for command in self._workspace.commands)
+                self._work.commands = release(
+                    self.fdm, self._release, (commands[0], commands[1], commands[2], commands[3])
+                )
+                self._work.air.wind_north, self._work.air.wind_east = self._release.wind[:2]
+                self._make_loop(self._ground_tick)
 
     def _push(self, start_fraction: float = 0.0, end_fraction: float = 1.0) -> None:
         """Accelerate the aircraft along the rail from one fraction of the push time to another."""
@@ -354,14 +361,6 @@ class SitlFlight(ProgramFlight):
         scale = settings.navigation_sigma * math.sqrt(2.0)
         east, north, up = (scale * navigation.second).tolist()
         self._lockstep.error = (north, east, up, 0.0, 0.0, 0.0)
-
-    def _start_free_flight(self, release_state: Release) -> None:
-        """Start the simulated motion at the end of the launch, or at rest on the runway."""
-        self._set_unit_factors()
-        commands = tuple(float(command) for command in self._workspace.commands)
-        self._work.commands = release(self.fdm, release_state, (commands[0], commands[1], commands[2], commands[3]))
-        self._work.air.wind_north, self._work.air.wind_east = release_state.wind[:2]
-        self._make_loop(self._ground_tick)
 
     def _set_unit_factors(self) -> None:
         """Copy unit conversions from JSBSim into the workspace, for the compiled ticks.

@@ -74,20 +74,6 @@ class AutopilotLink(ABC):
         self.reported = ReportedState()
         self._mav = mavlink.MAVLink(None, _SYSTEM, _COMPONENT)
         self._mav.robust_parsing = True
-        self._handlers = {
-            "HEARTBEAT": self._on_heartbeat,
-            "STATUSTEXT": self._on_text,
-            "EKF_STATUS_REPORT": self._on_ekf,
-            "ESTIMATOR_STATUS": self._on_ekf,
-            "MISSION_CURRENT": self._on_mission_current,
-            "MISSION_ITEM_REACHED": self._on_mission_item_reached,
-            "PARAM_VALUE": self._on_parameter,
-            "COMMAND_ACK": self._on_command_ack,
-            "MISSION_REQUEST": self._on_mission_request,
-            "MISSION_REQUEST_INT": self._on_mission_request,
-            "MISSION_ACK": self._on_mission_ack,
-            "AUTOPILOT_VERSION": self._on_version,
-        }
 
     @abstractmethod
     def close(self) -> None:
@@ -102,69 +88,46 @@ class AutopilotLink(ABC):
         """Send bytes; if the program no longer accepts them, they are lost."""
 
     def poll(self) -> None:
-        """Process the received messages, without waiting."""
+        """Store what the received messages report, without waiting; ignore messages of other types."""
+        reported = self.reported
         while data := self._receive():
             try:
                 messages = self._mav.parse_buffer(data) or []
             except (mavlink.MAVError, struct.error):
                 continue
             for message in messages:
-                handler = self._handlers.get(message.get_type())
-                if handler is not None:
-                    handler(message)
+                match message.get_type():
+                    case "HEARTBEAT" if message.get_srcComponent() == mavlink.MAV_COMP_ID_AUTOPILOT1:
+                        reported.vehicle, reported.autopilot = int(message.type), int(message.autopilot)
+                        reported.mode = int(message.custom_mode)
+                        reported.armed = bool(message.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
+                    case "STATUSTEXT":
+                        reported.texts.append(str(message.text))
+                    case "EKF_STATUS_REPORT" | "ESTIMATOR_STATUS":
+                        reported.ekf = int(message.flags)
+                    case "MISSION_CURRENT":
+                        reported.mission_item = int(message.seq)
+                    case "MISSION_ITEM_REACHED":
+                        reported.reached = int(message.seq)
+                    case "PARAM_VALUE":
+                        value, integer_format = float(message.param_value), _INTEGER_FORMATS.get(message.param_type)
+                        if integer_format is not None and reported.autopilot == mavlink.MAV_AUTOPILOT_PX4:
+                            (value,) = struct.unpack(integer_format, struct.pack("<f", value))
+                        reported.parameters[str(message.param_id)] = float(value)
+                    case "COMMAND_ACK":
+                        reported.acknowledged[int(message.command)] = int(message.result)
+                    case "MISSION_REQUEST" | "MISSION_REQUEST_INT":
+                        reported.requested = int(message.seq)
+                    case "MISSION_ACK":
+                        reported.mission_result = int(message.type)
+                    case "AUTOPILOT_VERSION":
+                        reported.version = int(message.flight_sw_version)
 
     def send(self, message: Any) -> None:
         """Send a message; if the program no longer accepts it, it is lost."""
         data = message.pack(self._mav)
         self._mav.seq = (self._mav.seq + 1) % 256
         self._transmit(data)
-
-    def _on_heartbeat(self, message: Any) -> None:
-        """Store the vehicle type, autopilot, mode and arming state that a HEARTBEAT of the autopilot states."""
-        if message.get_srcComponent() != mavlink.MAV_COMP_ID_AUTOPILOT1:
-            return
-        self.reported.vehicle, self.reported.autopilot = int(message.type), int(message.autopilot)
-        self.reported.mode = int(message.custom_mode)
-        self.reported.armed = bool(message.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
-
-    def _on_text(self, message: Any) -> None:
-        """Store a status text."""
-        self.reported.texts.append(str(message.text))
-
-    def _on_ekf(self, message: Any) -> None:
-        """Store the flags of the estimator."""
-        self.reported.ekf = int(message.flags)
-
-    def _on_mission_current(self, message: Any) -> None:
-        """Store the number of the mission item to which the autopilot flies."""
-        self.reported.mission_item = int(message.seq)
-
-    def _on_mission_item_reached(self, message: Any) -> None:
-        """Store the number of the mission item that was reached."""
-        self.reported.reached = int(message.seq)
-
-    def _on_parameter(self, message: Any) -> None:
-        """Store the value of a parameter."""
-        value, integer_format = float(message.param_value), _INTEGER_FORMATS.get(message.param_type)
-        if integer_format is not None and self.reported.autopilot == mavlink.MAV_AUTOPILOT_PX4:
-            (value,) = struct.unpack(integer_format, struct.pack("<f", value))
-        self.reported.parameters[str(message.param_id)] = float(value)
-
-    def _on_command_ack(self, message: Any) -> None:
-        """Store the result of a command."""
-        self.reported.acknowledged[int(message.command)] = int(message.result)
-
-    def _on_mission_request(self, message: Any) -> None:
-        """Store the number of the item that the autopilot requests in an upload."""
-        self.reported.requested = int(message.seq)
-
-    def _on_mission_ack(self, message: Any) -> None:
-        """Store the result of an upload."""
-        self.reported.mission_result = int(message.type)
-
-    def _on_version(self, message: Any) -> None:
-        """Store the version of the autopilot."""
-        self.reported.version = int(message.flight_sw_version)
 
 
 class TcpLink(AutopilotLink):

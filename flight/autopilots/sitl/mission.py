@@ -67,14 +67,31 @@ def make_uploaded_mission(setup: FlightSetup) -> UploadedMission:
         elif item.command in _KEPT_COMMANDS or (has_landing and item.command == Command.DO_LAND_START):
             items.append(item)
     if not any(item.has_position for item in items):
-        items = _route_items(route, origin)
+        # Waypoints and speed changes for a route whose mission has no items with positions.
+        items = []
+        speed = math.nan
+        for index, point in enumerate(route.positions):
+            items.append(_make_waypoint(len(items) + 1, point, float(route.points["acceptance_radius"][index]), origin))
+            if index < route.legs and route.leg_airspeeds[index] != speed:
+                speed = float(route.leg_airspeeds[index])
+                change = (0.0, speed, -1.0, 0.0)
+                items.append(
+                    MissionItem(len(items) + 1, int(Command.DO_CHANGE_SPEED), int(Frame.MISSION), change, 0.0, 0.0, 0.0)
+                )
     elif route.items[-1] == NO_ITEM and items[-1].command != Command.NAV_LOITER_UNLIM:
         items.append(_make_waypoint(items[-1].seq + 1, route.positions[-1], 0.0, origin))
     if (route.rtl_start is not None and not has_landing) or items[-1].command == Command.NAV_LOITER_UNLIM:
         return UploadedMission(_home_for_upload(setup), _renumber(items), setup.mission.rally)
     if setup.autopilot.loiters.ends_in_circle and ends_at_plain_waypoint(route, setup.mission):
         return UploadedMission(_home_for_upload(setup), _renumber(items))
-    items.append(_make_waypoint(items[-1].seq + 1, _extra_point(route), 0.0, origin))
+    # The extra waypoint lies straight on after the last leg, at that leg's final altitude.
+    east, north, _ = route.positions[-1] - route.positions[-2]
+    scale = EXTRA_WAYPOINT_DISTANCE_M / math.hypot(east, north)
+    items.append(
+        _make_waypoint(
+            items[-1].seq + 1, route.positions[-1] + np.array([scale * east, scale * north, 0.0]), 0.0, origin
+        )
+    )
     return UploadedMission(_home_for_upload(setup), _renumber(items), setup.mission.rally if has_landing else ())
 
 
@@ -131,21 +148,6 @@ def _item_with_position(
     return MissionItem(item.seq, int(item.command), int(Frame.GLOBAL), (p1, p2, p3, p4), lat, lon, float(position[2]))
 
 
-def _route_items(route: Route, origin: GeoOrigin) -> list[MissionItem]:
-    """Return waypoints and speed changes for a route whose mission has no items with positions."""
-    items: list[MissionItem] = []
-    speed = math.nan
-    for index, point in enumerate(route.positions):
-        items.append(_make_waypoint(len(items) + 1, point, float(route.points["acceptance_radius"][index]), origin))
-        if index < route.legs and route.leg_airspeeds[index] != speed:
-            speed = float(route.leg_airspeeds[index])
-            change = (0.0, speed, -1.0, 0.0)
-            items.append(
-                MissionItem(len(items) + 1, int(Command.DO_CHANGE_SPEED), int(Frame.MISSION), change, 0.0, 0.0, 0.0)
-            )
-    return items
-
-
 def _make_waypoint(seq: int, point: Floats, acceptance: float, origin: GeoOrigin) -> MissionItem:
     """Return a plain waypoint with a number at a point of the route.
 
@@ -157,16 +159,6 @@ def _make_waypoint(seq: int, point: Floats, acceptance: float, origin: GeoOrigin
     lat, lon = to_geo(origin, point[0], point[1])
     position = (round_to_grid(float(lat)), round_to_grid(float(lon)), float(point[2]))
     return MissionItem(seq, int(Command.NAV_WAYPOINT), int(Frame.GLOBAL), (0.0, acceptance, 0.0, 0.0), *position)
-
-
-def _extra_point(route: Route) -> Floats:
-    """Return the position of the extra waypoint, (3,) m.
-
-    It lies straight on after the last leg, at that leg's final altitude.
-    """
-    east, north, _ = route.positions[-1] - route.positions[-2]
-    scale = EXTRA_WAYPOINT_DISTANCE_M / math.hypot(east, north)
-    return route.positions[-1] + np.array([scale * east, scale * north, 0.0])
 
 
 def _renumber(items_in_order: list[MissionItem]) -> tuple[MissionItem, ...]:

@@ -107,7 +107,8 @@ class AutopilotProcess:
             guard.register_group(os.getpid())
             signal.signal(signal.SIGPIPE, signal.SIG_DFL)
             if sys.platform == "linux":
-                _die_with_parent()
+                # The operating system kills the program if planfly is killed.
+                ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
 
         with (self._folder / _OUTPUT_FILE).open("wb") as output:
             try:
@@ -138,7 +139,7 @@ class AutopilotProcess:
 
     def watch(self) -> None:
         """Raise FlightError, with the last line of the program's output, if the program has panicked or ended."""
-        panic = self._panic_text()
+        panic = next((line.partition(_PANIC_MARK)[2].strip() for line in self.lines() if _PANIC_MARK in line), "")
         if panic:
             raise FlightError(f"panicked: {panic}", file=self.binary)
         code = self._process.poll()
@@ -202,12 +203,3 @@ class AutopilotProcess:
         except OSError:
             return []
         return [" ".join(line.split()) for line in text.splitlines() if line.strip()]
-
-    def _panic_text(self) -> str:
-        """Return the text with which the program panicked; "" if it has not panicked."""
-        return next((line.partition(_PANIC_MARK)[2].strip() for line in self.lines() if _PANIC_MARK in line), "")
-
-
-def _die_with_parent() -> None:
-    """Ask the operating system to kill the program if planfly is killed."""
-    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
