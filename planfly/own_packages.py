@@ -72,14 +72,9 @@ def check_hidden_packages() -> None:
         f"{hidden.hiding_file}: hides {hidden.package_file}, a package of planfly: rename it, or remove its folder from"
         " Python's path (python -P leaves out the current folder)"
     )
-    if _is_command():
+    # While Python looks for the module, argv[0] is "-m"; an embedded interpreter may have no arguments.
+    program = next(iter(getattr(sys, "argv", ())), "")
+    if Path(program).stem == "planfly" or (program == "-m" and "planfly" in sys.orig_argv):
         sys.stderr.write(f"planfly: {message}\n")
         raise SystemExit(_BAD_USAGE_CODE)
     raise ImportError(message, name="planfly", path=hidden.hiding_file)
-
-
-def _is_command() -> bool:
-    """Return True if Python was started for the command line, as ``planfly`` or as ``python -m planfly``."""
-    # While Python looks for the module, argv[0] is "-m"; an embedded interpreter may have no arguments.
-    program = next(iter(getattr(sys, "argv", ())), "")
-    return Path(program).stem == "planfly" or (program == "-m" and "planfly" in sys.orig_argv)

@@ -34,7 +34,13 @@ def threat_tables(threats: Any) -> list[dict[str, Any]]:
     """
     try:
         if isinstance(threats, Mapping):
-            rows = _rows_of_columns({name: np.ma.asarray(values) for name, values in threats.items()})
+            columns = {name: np.ma.asarray(values) for name, values in threats.items()}
+            distinct_shapes = {column.shape for column in columns.values()}
+            if len(distinct_shapes) > 1 or any(len(shape) != 1 for shape in distinct_shapes):
+                shapes = ", ".join(f"{name} of shape {column.shape}" for name, column in columns.items())
+                raise ArgumentError.of_argument("threats", shapes, "expected columns (n,) of equal length")
+            values = [column.tolist() for column in columns.values()]
+            rows = [dict(zip(columns, row, strict=True)) for row in zip(*values, strict=True)]
         elif hasattr(threats, "to_dict"):
             rows = threats.to_dict("records")
         elif len(threats) and all(isinstance(row, Mapping) for row in threats):
@@ -42,35 +48,15 @@ def threat_tables(threats: Any) -> list[dict[str, Any]]:
         elif np.iscomplexobj(threats):
             raise TypeError(_EXPECTED)
         else:
-            rows = _rows_of_array(np.ma.asarray(threats, dtype=np.float64))
+            array = np.ma.asarray(threats, dtype=np.float64)
+            if array.size and array.shape[1:] != (len(_ARRAY_COLUMNS),):
+                raise ArgumentError.of_argument("threats", array, _EXPECTED, shown=f"of shape {array.shape}")
+            rows = [dict(zip(_ARRAY_COLUMNS, row, strict=True)) for row in array.tolist()]
     except (TypeError, ValueError) as error:
         if isinstance(error, ArgumentError):
             raise
         raise ArgumentError.of_argument("threats", type(threats).__name__, _EXPECTED) from None
     return [_threat_table(number, row) for number, row in enumerate(rows)]
-
-
-def _rows_of_columns(columns: Mapping[str, np.ndarray[Any, Any]]) -> list[dict[str, Any]]:
-    """Return the rows of a mapping of columns, as dictionaries with the names of the columns.
-
-    Raises ArgumentError for columns of different lengths.
-    """
-    distinct_shapes = {column.shape for column in columns.values()}
-    if len(distinct_shapes) > 1 or any(len(shape) != 1 for shape in distinct_shapes):
-        shapes = ", ".join(f"{name} of shape {column.shape}" for name, column in columns.items())
-        raise ArgumentError.of_argument("threats", shapes, "expected columns (n,) of equal length")
-    values = [column.tolist() for column in columns.values()]
-    return [dict(zip(columns, row, strict=True)) for row in zip(*values, strict=True)]
-
-
-def _rows_of_array(array: np.ma.MaskedArray[Any, Any]) -> list[dict[str, Any]]:
-    """Return the rows of an array (n, 4) as dictionaries with the keys `_ARRAY_COLUMNS`.
-
-    Raises ArgumentError for an array of another shape, unless it is empty.
-    """
-    if array.size and array.shape[1:] != (len(_ARRAY_COLUMNS),):
-        raise ArgumentError.of_argument("threats", array, _EXPECTED, shown=f"of shape {array.shape}")
-    return [dict(zip(_ARRAY_COLUMNS, row, strict=True)) for row in array.tolist()]
 
 
 def _threat_table(number: int, row: Mapping[str, Any]) -> dict[str, Any]:

@@ -96,16 +96,12 @@ def require_extra(name: str, needs: str = "") -> None:
     """
     extra = EXTRAS[name]
     for module in extra.modules:
-        if not _is_installed(module):
+        try:
+            is_installed = find_spec(module) is not None
+        except (ImportError, ValueError):
+            is_installed = False
+        if not is_installed:
             raise missing_extra(extra, module, needs)
-
-
-def _is_installed(module: str) -> bool:
-    """Return True if a module is installed, without importing it."""
-    try:
-        return find_spec(module) is not None
-    except (ImportError, ValueError):
-        return False
 
 
 def missing_extra(extra: Extra, module: str, needs: str = "") -> MissingExtraError:

@@ -190,7 +190,11 @@ def _toml_lines(table: Mapping[str, Any], path: tuple[str, ...]) -> Iterator[str
 
     path: keys that lead to the table; () for the whole text.
     """
-    subtables = {key: value for key, value in table.items() if isinstance(value, Mapping) or _is_list_of_tables(value)}
+    subtables = {
+        key: value
+        for key, value in table.items()
+        if isinstance(value, Mapping) or (isinstance(value, list) and any(isinstance(item, Mapping) for item in value))
+    }
     for key, value in table.items():
         if key not in subtables:
             yield f"{_toml_key(key)} = {_toml_value(value)}"
@@ -201,11 +205,6 @@ def _toml_lines(table: Mapping[str, Any], path: tuple[str, ...]) -> Iterator[str
             yield ""
             yield f"[{name}]" if isinstance(value, Mapping) else f"[[{name}]]"
             yield from _toml_lines(subtable, keys)
-
-
-def _is_list_of_tables(value: Any) -> bool:
-    """Return True for a list that contains tables; such a list must not contain anything else."""
-    return isinstance(value, list) and any(isinstance(item, Mapping) for item in value)
 
 
 def _toml_key(key: str) -> str:

@@ -77,7 +77,18 @@ def _open_raster_file(file: Path, driver: str, failure_text: str) -> RasterFile:
             # For a file without a position on Earth, GDAL would return columns and rows.
             warnings.simplefilter("error", NotGeoreferencedWarning)
             with open_dataset(file, driver) as source:
-                _check_layout(file, source)
+                # The file has one band of real numbers, in blocks that fit into memory.
+                number_kind = np.dtype(source.dtypes[0]).kind
+                if source.count != 1 or number_kind not in "iuf":
+                    allowed = "an elevation file has 1 band of integers or real numbers"
+                    raise TerrainError.at(
+                        file, "bands", source.count, allowed, shown=f"{source.count} of {source.dtypes[0]}"
+                    )
+                block_pixels = math.prod(source.block_shapes[0])
+                if block_pixels > MAX_BLOCK_PIXELS:
+                    allowed = f"at most {MAX_BLOCK_PIXELS:,} are read at once; save the file with tiles"
+                    raise TerrainError.at(file, "pixels of a block", block_pixels, allowed, shown=f"{block_pixels:,}")
+                require_min_pixels(file, (source.height, source.width))
                 shape, grid = (source.height, source.width), tuple(source.transform)[:6]
                 scale, crs = (source.scales[0], source.offsets[0]), _read_crs(file, driver, source)
                 unit = _stated_height_unit(source.units[0] or "", {**source.tags(), **source.tags(1)}.items())
@@ -106,22 +117,6 @@ def first_error_line(error: BaseException) -> str:
     while error.__cause__ is not None:
         error = error.__cause__
     return one_line(error)
-
-
-def _check_layout(file: Path, source: Any) -> None:
-    """Raise TerrainError unless the file has one band of real numbers, in blocks that fit into memory.
-
-    A block has at most `MAX_BLOCK_PIXELS` pixels.
-    """
-    number_kind = np.dtype(source.dtypes[0]).kind
-    if source.count != 1 or number_kind not in "iuf":
-        allowed = "an elevation file has 1 band of integers or real numbers"
-        raise TerrainError.at(file, "bands", source.count, allowed, shown=f"{source.count} of {source.dtypes[0]}")
-    block_pixels = math.prod(source.block_shapes[0])
-    if block_pixels > MAX_BLOCK_PIXELS:
-        allowed = f"at most {MAX_BLOCK_PIXELS:,} are read at once; save the file with tiles"
-        raise TerrainError.at(file, "pixels of a block", block_pixels, allowed, shown=f"{block_pixels:,}")
-    require_min_pixels(file, (source.height, source.width))
 
 
 def _raise_unplaced(file: Path) -> NoReturn:

@@ -66,7 +66,7 @@ def height_datum(crs: str | None, stated_datum: StatedDatum | None) -> HeightDat
     if stated_datum is not None and not isinstance(stated_datum, str):
         return HeightDatum(
             f"{_MEAN_SEA_LEVEL}, at {stated_datum:g} m of the file's heights as stated",
-            _constant_sea_level(stated_datum),
+            lambda lon, _: np.full(np.shape(lon), stated_datum),
         )
     if stated_datum in ("egm96", "egm2008"):
         return HeightDatum(f"{_MEAN_SEA_LEVEL} ({stated_datum.upper()}, as stated)")
@@ -79,11 +79,6 @@ def height_datum(crs: str | None, stated_datum: StatedDatum | None) -> HeightDat
         raise ValueError("heights are positive downwards, as depths")
     name = "" if crs is None else _vertical_name(crs)
     return HeightDatum(f"{_MEAN_SEA_LEVEL} ({name}, as the file states)" if name else UNSTATED)
-
-
-def _constant_sea_level(height: float) -> Callable[[Floats, Floats], Floats]:
-    """Make a function of longitudes and latitudes that returns the same height of mean sea level, m, everywhere."""
-    return lambda lon, _: np.full(np.shape(lon), height)
 
 
 def _make_sea_level_function(transformer: Any) -> Callable[[Floats, Floats], Floats]:

@@ -42,19 +42,16 @@ def kernel_sources(root: Path) -> dict[str, bytes]:
         name = pending.pop()
         if name in contents and name not in sources:
             sources[name] = contents[name]
-            pending += _imported_paths(contents[name])
+            # Modules that the source may import; an imported name may be a module, too.
+            content = contents[name]
+            paths = []
+            # Splitting takes a tenth of the time of a search for lines that begin with "from".
+            for match in filter(None, map(_IMPORT.match, (b"\n" + content).split(b"\nfrom ")[1:])):
+                module, names = match.groups()
+                path = module.decode().replace(".", "/")
+                paths += [f"{path}.py", *(f"{path}/{name}.py" for name in re.findall(r"\w+", names.decode()))]
+            pending += paths
     return sources
-
-
-def _imported_paths(content: bytes) -> list[str]:
-    """Return the paths of the planfly modules that a source may import; an imported name may be a module, too."""
-    paths = []
-    # Splitting takes a tenth of the time of a search for lines that begin with "from".
-    for match in filter(None, map(_IMPORT.match, (b"\n" + content).split(b"\nfrom ")[1:])):
-        module, names = match.groups()
-        path = module.decode().replace(".", "/")
-        paths += [f"{path}.py", *(f"{path}/{name}.py" for name in re.findall(r"\w+", names.decode()))]
-    return paths
 
 
 def sources_digest(root: Path) -> str:

@@ -41,17 +41,13 @@ class CheckedCacheFiles(IndexDataCacheFile):
             if key not in forms:
                 used_names = set(forms.values())
                 forms[key] = next(name for name in map(self._data_name, itertools.count(1)) if name not in used_names)
-                self._save_index(forms)
+                self._write(self._folder / self._index_name, "", (self._version, self._source_stamp, forms))
             self._write(self._folder / forms[key], repr(key), data)
 
     def _load_index(self) -> dict[Any, str]:
         """Return the names of the data files by key; empty if the index is from another version of the source."""
         version, stamp, forms = _read_checked(self._folder / self._index_name, "") or (None, None, {})
         return forms if (version, stamp) == (self._version, self._source_stamp) else {}
-
-    def _save_index(self, overloads: dict[Any, str]) -> None:
-        """Write the index of data files."""
-        self._write(self._folder / self._index_name, "", (self._version, self._source_stamp, overloads))
 
     def _write(self, path: Path, label: str, data: Any) -> None:
         """Write a digest and an object to a file; the digest covers the object and a label."""

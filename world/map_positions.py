@@ -55,17 +55,13 @@ def check_in_area(key: str, point: Floats, source: str, bounds: Floats, origin: 
         if not min_coordinate <= point[axis] <= max_coordinate:
             outside = max(min_coordinate - point[axis], point[axis] - max_coordinate)
             outside_text = f"{outside:.1f}".removesuffix(".0")
+            lat, lon = to_geo(origin, bounds[0, [0, 1, 0, 1]], bounds[1, [0, 0, 1, 1]])
+            area_text = f"latitude {lat.min():.4f}..{lat.max():.4f}, longitude {lon.min():.4f}..{lon.max():.4f}"
             allowed = (
                 f"{outside_text} m outside the area, which reaches from {min_coordinate:.0f} to {max_coordinate:.0f} m"
-                f" (the area covers {_area_text(bounds, origin)})"
+                f" (the area covers {area_text})"
             )
             raise ScenarioError.at(source, key, float(point[axis]), allowed, shown=f"{name} {point[axis]:.0f} m")
-
-
-def _area_text(bounds: Floats, origin: GeoOrigin) -> str:
-    """Return the latitudes and longitudes of an area, (2, 2) m, as text."""
-    lat, lon = to_geo(origin, bounds[0, [0, 1, 0, 1]], bounds[1, [0, 0, 1, 1]])
-    return f"latitude {lat.min():.4f}..{lat.max():.4f}, longitude {lon.min():.4f}..{lon.max():.4f}"
 
 
 def check_altitude(key: str, point: Floats, source: str, floor: float, ceiling: float, ground: Terrain | None) -> None:

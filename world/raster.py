@@ -104,36 +104,27 @@ def open_npz(file: Path, name: str) -> RasterFile:
     """Open an .npz file of heights. Raises TerrainError for any other file.
 
     The file has `elevation` (rows from north to south) and xmin, xmax, ymin, ymax: pixel edges in degrees. The two
-    values of a pair may be in any order, except in the tile that planfly ships; see `_corrected_edges`.
+    values of a pair may be in any order, except in the tile that planfly ships; see `open_npz`.
     """
     heights, edges = _read_npz(file, name)
     if heights.ndim != 2 or heights.dtype.kind not in "iuf":
         allowed = "expected a 2-D array of numbers"
         shape_text = f"{heights.dtype} of shape {heights.shape}"
         raise TerrainError.at(name, "elevation", heights.shape, allowed, shown=shape_text)
-    return make_degree_raster(file, name, heights, _corrected_edges(edges, heights.shape[0]))
-
-
-def _corrected_edges(stated_edges: list[float], rows: int) -> tuple[float, float, float, float]:
-    """Return the west, east, south and north edges (deg) from a file's xmin, xmax, ymin and ymax.
-
-    stated_edges: xmin, xmax, ymin, ymax.
-
-    The edges of the tile that planfly ships are corrected, because its ymin lies one tile height north of its ymax
-    instead of south of it.
-    """
-    west, east = sorted(stated_edges[:2])
-    south, north = sorted(stated_edges[2:])
+    # The edges of the tile that planfly ships are corrected, because its ymin lies one tile height north of its
+    # ymax instead of south of it.
+    west, east = sorted(edges[:2])
+    south, north = sorted(edges[2:])
     # In the shipped tile of 344 rows, ymax, 36.44625, is the north edge, and ymin, 36.73292, is the north edge plus the
     # tile's extent in latitude.  Read as north and south edge, they place the tile 0.28667 degrees too far north.  The
     # ground confirms this: the highest pixel lies 0.2479 degrees south of the north edge, and Cross Mountain, of the
     # same height, at 36.1983 N; the lake ends 0.2208 degrees south of the north edge, and Norris Dam stands at
     # 36.2242 N (https://en.wikipedia.org/wiki/Cross_Mountain_(Tennessee), https://en.wikipedia.org/wiki/Norris_Dam).
-    if rows == _SHIPPED_TILE_ROWS and np.allclose(
-        stated_edges, _SHIPPED_TILE_EDGES_DEG, rtol=0.0, atol=_SHIPPED_TILE_TOLERANCE_DEG
+    if heights.shape[0] == _SHIPPED_TILE_ROWS and np.allclose(
+        edges, _SHIPPED_TILE_EDGES_DEG, rtol=0.0, atol=_SHIPPED_TILE_TOLERANCE_DEG
     ):
         south, north = south - (north - south), south
-    return west, east, south, north
+    return make_degree_raster(file, name, heights, (west, east, south, north))
 
 
 def _read_npz(file: Path, name: str) -> tuple[NDArray[np.generic], list[float]]:

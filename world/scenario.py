@@ -263,6 +263,10 @@ class Scenario:
     def _repr_html_(self) -> str:
         """Return an HTML table for notebooks."""
         ground, wind, limits = self.terrain, self.wind, self.limits
+        flight, steering = self.flight, self.flight.steering
+        corridor = self.limits.corridor_m
+        airspeed = "the aircraft's" if flight.airspeed_mps is None else f"{flight.airspeed_mps:g} m/s"
+        autopilot = f"planfly, {steering.guidance}" if steering.autopilot == OWN_GUIDANCE else steering.autopilot
         rows = [
             ("origin", f"{self.origin.lat_deg:.5f}, {self.origin.lon_deg:.5f}"),
             *(
@@ -273,24 +277,14 @@ class Scenario:
             ("threats, zones", f"{len(self.threats)}, {len(self.zones)}"),
             ("wind", f"{wind.speed:g} m/s from {math.degrees(wind.from_course):.0f}°, turbulence {wind.turbulence}"),
             ("clearance", f"at least {limits.min_clearance_m:g} m above ground"),
-            *self._flight_rows(),
-            *(("note", note) for note in self.notes),
-        ]
-        return html_table(f"Scenario {self.name}", rows)
-
-    def _flight_rows(self) -> list[tuple[str, str]]:
-        """Return the rows of the notebook's table about aircraft, autopilot and corridor."""
-        flight, steering = self.flight, self.flight.steering
-        corridor = self.limits.corridor_m
-        airspeed = "the aircraft's" if flight.airspeed_mps is None else f"{flight.airspeed_mps:g} m/s"
-        autopilot = f"planfly, {steering.guidance}" if steering.autopilot == OWN_GUIDANCE else steering.autopilot
-        return [
             ("aircraft", flight.aircraft),
             ("airspeed", airspeed),
             ("autopilot", autopilot if flight.params is None else f"{autopilot}, {flight.params}"),
             ("navigation", steering.nav),
             ("corridor", "as wide as the autopilot needs" if corridor is None else f"{corridor:g} m to each side"),
+            *(("note", note) for note in self.notes),
         ]
+        return html_table(f"Scenario {self.name}", rows)
 
     def to_toml(self, path: str | Path) -> None:
         """Write the scenario as a TOML file, from which `planfly.plan` and other functions make it again.

@@ -143,7 +143,15 @@ def _survey_ground(
     cover, and TerrainError if data is missing even with the smallest distance.
     """
     for fraction in _MARGIN_REDUCTIONS:
-        bounds = _clip_to_file(_enclosing_box(endpoints, fraction * margin), raster, origin)
+        # Clip the box to the area that the file covers.
+        area = _enclosing_box(endpoints, fraction * margin)
+        if is_covered(raster, origin, area):
+            bounds = area
+        else:
+            tile_area = tile_bounds(raster, origin)
+            bounds = np.stack(
+                [np.maximum(area[:, 0], tile_area[:, 0]), np.minimum(area[:, 1], tile_area[:, 1])], axis=1
+            )
         for (keyword, position), endpoint in zip(positions.items(), endpoints, strict=True):
             if not ((bounds[:, 0] + _EDGE_M <= endpoint) & (endpoint <= bounds[:, 1] - _EDGE_M)).all():
                 message = (
@@ -174,14 +182,6 @@ def _position_text(position: GeoPosition, distance: float | None = None) -> str:
     """Format a position in degrees for a message, with a distance (m) if one is given."""
     text = f"{position.lat:g},{position.lon:g}"
     return text if distance is None else f"{text}, {distance / 1000.0:,.3g} km away"
-
-
-def _clip_to_file(area: Floats, raster: RasterFile, origin: GeoOrigin) -> Floats:
-    """Clip a box on the map, (2, 2) m, to the area that an elevation file covers."""
-    if is_covered(raster, origin, area):
-        return area
-    tile_area = tile_bounds(raster, origin)
-    return np.stack([np.maximum(area[:, 0], tile_area[:, 0]), np.minimum(area[:, 1], tile_area[:, 1])], axis=1)
 
 
 # ----------------------------------------------------------------------
@@ -337,9 +337,19 @@ def _examples_text(draft: Draft) -> str:
     Threat and zone are near the line from start to destination, and small enough to fly around.
     """
     radius = max(50.0, round(float(np.diff(draft.box, axis=1).min()) / 200.0) * 10.0)
+    # Positions on both sides of the line from start to destination: each is a third of the line's length from one
+    # end, and half of the radius to the side.
+    endpoints = np.array([to_map(draft.origin, *place) for place in (draft.start, draft.destination)])
+    straight_line = endpoints[1] - endpoints[0]
+    offset = np.array([-straight_line[1], straight_line[0]]) / (math.hypot(*straight_line) or 1.0) * radius * 0.5
+    first_position = endpoints[0] + straight_line / 3.0 + offset
+    second_position = endpoints[1] - straight_line / 3.0 - offset
     threat, zone = (
         GeoPosition(*(float(degrees) for degrees in to_geo(draft.origin, *point)))
-        for point in _example_positions(draft, radius)
+        for point in (
+            (float(first_position[0]), float(first_position[1])),
+            (float(second_position[0]), float(second_position[1])),
+        )
     )
     return f"""\
 # A threat: a missile, a radar, or both; on the ground unless a height is given.
@@ -365,18 +375,3 @@ def _examples_text(draft: Draft) -> str:
 # [returns]
 # require = ["rtl", "glide"]  # from anywhere on the route a return to launch must be safe, and the engine may fail
 """
-
-
-def _example_positions(draft: Draft, radius: float) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return two positions for examples, (east, north) m, on both sides of the line from start to destination.
-
-    radius: radius of the examples, m.
-
-    Each position is a third of the line's length from one end of the line, and half of ``radius`` to the side of it.
-    """
-    endpoints = np.array([to_map(draft.origin, *place) for place in (draft.start, draft.destination)])
-    straight_line = endpoints[1] - endpoints[0]
-    offset = np.array([-straight_line[1], straight_line[0]]) / (math.hypot(*straight_line) or 1.0) * radius * 0.5
-    first_position = endpoints[0] + straight_line / 3.0 + offset
-    second_position = endpoints[1] - straight_line / 3.0 - offset
-    return (float(first_position[0]), float(first_position[1])), (float(second_position[0]), float(second_position[1]))

@@ -25,30 +25,25 @@ def silence() -> Iterator[Callable[[], str]]:
     What other threads print meanwhile is not suppressed.
     """
     with _SILENCE_LOCK:
-        yield from _suppressed_output()
+        sys.stdout.flush()
+        saved_descriptor = os.dup(1)
+        try:
+            with (
+                tempfile.TemporaryFile() as cpp_file,
+                _stream_to(saved_descriptor, sys.stdout) as other_threads,
+                contextlib.redirect_stdout(_ThreadOutput(other_threads, sys.stdout)) as python_output,
+            ):
+                os.dup2(cpp_file.fileno(), 1)
 
+                def text() -> str:
+                    """Return the output of this thread, and of libraries in C++, since the start of the block."""
+                    cpp_output = os.pread(cpp_file.fileno(), _MAX_PRINTED_BYTES, 0).decode(errors="replace")
+                    return cpp_output + python_output.getvalue()
 
-def _suppressed_output() -> Iterator[Callable[[], str]]:
-    """Suppress standard output, and yield a function that returns it; see `silence`."""
-    sys.stdout.flush()
-    saved_descriptor = os.dup(1)
-    try:
-        with (
-            tempfile.TemporaryFile() as cpp_file,
-            _stream_to(saved_descriptor, sys.stdout) as other_threads,
-            contextlib.redirect_stdout(_ThreadOutput(other_threads, sys.stdout)) as python_output,
-        ):
-            os.dup2(cpp_file.fileno(), 1)
-
-            def text() -> str:
-                """Return the output of this thread, and of libraries in C++, since the start of the block."""
-                cpp_output = os.pread(cpp_file.fileno(), _MAX_PRINTED_BYTES, 0).decode(errors="replace")
-                return cpp_output + python_output.getvalue()
-
-            yield text
-    finally:
-        os.dup2(saved_descriptor, 1)
-        os.close(saved_descriptor)
+                yield text
+        finally:
+            os.dup2(saved_descriptor, 1)
+            os.close(saved_descriptor)
 
 
 class _ThreadOutput(io.StringIO):

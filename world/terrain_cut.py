@@ -226,7 +226,16 @@ def _fetch_tile(remote: RemoteFile, box: Box, count_bytes: Callable[[int], None]
     for is_last in (not remote.parts, True):
         try:
             tile = _open_copy(remote, count_bytes, (_DIRECTORY_BYTES, remote.size) if is_last else (_DIRECTORY_BYTES,))
-            window = _padded_window(tile, box)
+            # Rows and columns that cover the area, with a margin for interpolation to another grid.
+            col, row = tile.to_pixels(*_box_outline(box))
+            rows, cols = tile.shape
+            ends = (
+                (row.min() - _MARGIN_PIXELS, row.max() + _MARGIN_PIXELS + 2.0),
+                (col.min() - _MARGIN_PIXELS, col.max() + _MARGIN_PIXELS + 2.0),
+            )
+            top, bottom = (int(np.clip(value, 0, rows)) for value in ends[0])
+            left, right = (int(np.clip(value, 0, cols)) for value in ends[1])
+            window = top, bottom, left, right
             for begin, end in block_spans(remote.copy, window):
                 remote.fetch(begin, end, count_bytes)
             if window[0] < window[1] and window[2] < window[3]:
@@ -268,22 +277,6 @@ def _open_copy(remote: RemoteFile, count_bytes: Callable[[int], None], sizes: Se
 
         return replace(tile, read=read)
     raise _UnreadableError
-
-
-def _padded_window(tile: RasterFile, box: Box) -> tuple[int, int, int, int]:
-    """Return the window of a tile that covers an area, with a margin for interpolation to another grid.
-
-    The window is first row, end row, first column, end column, limited to the tile.
-    """
-    col, row = tile.to_pixels(*_box_outline(box))
-    rows, cols = tile.shape
-    ends = (
-        (row.min() - _MARGIN_PIXELS, row.max() + _MARGIN_PIXELS + 2.0),
-        (col.min() - _MARGIN_PIXELS, col.max() + _MARGIN_PIXELS + 2.0),
-    )
-    top, bottom = (int(np.clip(value, 0, rows)) for value in ends[0])
-    left, right = (int(np.clip(value, 0, cols)) for value in ends[1])
-    return top, bottom, left, right
 
 
 # Largest offset of a tile from its degree, deg.

@@ -162,7 +162,11 @@ def clean_positions(series: LogSeries, earlier_jumps: tuple[float, ...] = ()) ->
     time, values = time[is_new], values[is_new]
     is_glitch = _find_glitches(time, values)
     time, values = time[~is_glitch], values[~is_glitch]
-    is_in_group = _is_in_large_group(time)
+    # The rows of small groups, whose times are far from all other times, are left out. A pause of more than
+    # `MAX_TIME_S` separates two groups.
+    groups = np.cumsum(np.concatenate([[0], np.diff(time) > MAX_TIME_S])) if time.size else np.zeros(0, np.int64)
+    counts = np.bincount(groups)
+    is_in_group = np.asarray((counts >= min(MIN_LATE_ROWS, int(counts.max(initial=0))))[groups])
     time, shifts = _remove_forward_jumps(time[is_in_group], values[is_in_group])
     is_in_range = time < MAX_TIME_S
     time, values = time[is_in_range], values[is_in_group][is_in_range]
@@ -258,19 +262,6 @@ def _is_reachable(time: Floats, values: Floats, first: int, second: int, max_spe
     rise = abs(float(values[second, 2] - values[first, 2]))
     duration = float(time[second] - time[first])
     return max(distance, 0.0 if math.isnan(rise) else rise) <= max_speed * duration
-
-
-def _is_in_large_group(time: Floats) -> Flags:
-    """Return a mask (n,): False for the rows of small groups, whose times are far from all other times.
-
-    A pause of more than `MAX_TIME_S` separates two groups.  A group is small if it has fewer than `MIN_LATE_ROWS` rows
-    and another group has more.
-
-    time: sorted times, s, (n,).
-    """
-    groups = np.cumsum(np.concatenate([[0], np.diff(time) > MAX_TIME_S])) if time.size else np.zeros(0, np.int64)
-    counts = np.bincount(groups)
-    return np.asarray((counts >= min(MIN_LATE_ROWS, int(counts.max(initial=0))))[groups])
 
 
 def _remove_forward_jumps(time: Floats, values: Floats) -> tuple[Floats, tuple[tuple[float, float], ...]]:

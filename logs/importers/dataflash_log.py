@@ -172,6 +172,8 @@ class _Reader:
                 f" (the log has {names or 'no known messages'})",
                 file=self._source,
             )
+        commands = self._select_messages("CMD")
+        command_times = self._compute_times(commands) if len(commands) else np.zeros(0)
         return RawLog(
             source=self._source,
             format=FORMAT,
@@ -181,7 +183,9 @@ class _Reader:
             heights=tuple(self._read_heights()),
             datum="amsl",
             modes=tuple(self._read_modes()),
-            missions=tuple(self._read_missions()),
+            missions=tuple(
+                make_dataflash_missions(commands, command_times, self._select_messages("ORGN"), self._source)
+            ),
             parameters=self._read_parameters(),
             events=tuple(self._read_events()),
             utc_start=self._find_utc_start(),
@@ -247,7 +251,9 @@ class _Reader:
             "attitude",
             self._read_first_table((("ATT", ("Roll", "Pitch", "Yaw")), ("AHR2", ("Roll", "Pitch", "Yaw"))), _DEGREE),
         )
-        yield "wind", self._read_wind()
+        wind = self._read_first_table([(name, ("VWE", "VWN")) for name in ("XKF2", "NKF2", "EKF2")])
+        # Without an estimate the wind stays zero.
+        yield "wind", wind if wind is not None and np.any(wind.values) else None
         yield "airspeed", self._read_airspeed()
         yield "battery", self._read_battery()
         yield "throttle", self._read_throttle()
@@ -295,12 +301,6 @@ class _Reader:
         speed, course, down = gps.values.T
         course = np.radians(course)
         return LogSeries("GPS", gps.time, np.stack([speed * np.sin(course), speed * np.cos(course), -down], axis=1))
-
-    def _read_wind(self) -> LogSeries | None:
-        """Return the estimated wind velocity to east and north, m/s, (n, 2); None if it is always 0."""
-        wind = self._read_first_table([(name, ("VWE", "VWN")) for name in ("XKF2", "NKF2", "EKF2")])
-        # Without an estimate the wind stays zero.
-        return wind if wind is not None and np.any(wind.values) else None
 
     def _read_airspeed(self) -> LogSeries | None:
         """Return the true airspeed, m/s, (n, 1); None if unknown.
@@ -383,12 +383,6 @@ class _Reader:
         for time, number in zip(self._compute_times(messages).tolist(), messages.rows[column].tolist(), strict=True):
             name, automatic = describe_plane_mode(int(number))
             yield ModeChange(time, name, automatic)
-
-    def _read_missions(self) -> Iterable[LoggedMission]:
-        """Return the missions in the order of the log."""
-        commands = self._select_messages("CMD")
-        time = self._compute_times(commands) if len(commands) else np.zeros(0)
-        return make_dataflash_missions(commands, time, self._select_messages("ORGN"), self._source)
 
     def _read_parameters(self) -> dict[str, float]:
         """Return the last finite value of each parameter."""

@@ -191,23 +191,17 @@ def without_gaps(logged: LoggedMission, total: int, last_number: int) -> LoggedM
     missing = tuple(sorted(set(range(1, last_number + 1)) - numbers))
     if not missing:
         return logged if len(numbers) > 1 else None
-    run = _find_longest_run(logged.mission.items)
-    first, last = (run[0].seq, run[-1].seq) if run else (0, 0)
-    missing_items = MissingItems(missing, total, first, last, last_number)
-    return replace(logged, mission=replace(logged.mission, items=tuple(run)), missing=missing_items)
-
-
-def _find_longest_run(items: Sequence[MissionItem]) -> Sequence[MissionItem]:
-    """Return the longest run of consecutively numbered items.
-
-    Each run is cut before its first DO_JUMP to an item outside the run.  Of equally long runs, the first is returned.
-    """
+    # Longest run of consecutively numbered items, the first of equally long ones.  Each run is cut before its first
+    # DO_JUMP to an item outside the run.
     runs: list[list[MissionItem]] = [[]]
-    for item in items:
+    for item in logged.mission.items:
         if runs[-1] and item.seq != runs[-1][-1].seq + 1:
             runs.append([])
         runs[-1].append(item)
-    return max((_cut_before_jump_out(run) for run in runs), key=len)
+    run = max((_cut_before_jump_out(run) for run in runs), key=len)
+    first, last = (run[0].seq, run[-1].seq) if run else (0, 0)
+    missing_items = MissingItems(missing, total, first, last, last_number)
+    return replace(logged, mission=replace(logged.mission, items=tuple(run)), missing=missing_items)
 
 
 def _cut_before_jump_out(run: Sequence[MissionItem]) -> Sequence[MissionItem]:

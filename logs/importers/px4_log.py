@@ -89,7 +89,8 @@ def open_topics(path: Path, names: list[str]) -> "Topics":
     except Exception as error:  # of any kind: the library raises errors of struct, its own and plain ones
         reason = " ".join(str(error).split())[:120] or type(error).__name__
         raise LogError(f"{path}: not a readable PX4 log: {reason}", file=path) from error
-    return Topics(log, str(path), _find_file_damage(path))
+    mapped_file = MappedFile(path)
+    return Topics(log, str(path), find_damage(mapped_file.data, mapped_file.release_memory))
 
 
 class _FormatCheckingFile:
@@ -148,12 +149,6 @@ def find_damage(data: Bytes, release_memory: Callable[[], None] = lambda: None) 
         _walk_records(read_only(data), end, state, np.frombuffer(_LETTERS, np.uint8))
     cut = bool(state[_IS_CUT]) or int(state[_NEXT_BYTE]) < data.size
     return Damage(int(state[_DAMAGED_PLACES]), int(state[_LOST_BYTES]), cut)
-
-
-def _find_file_damage(path: Path) -> Damage:
-    """Return the damage of a log file."""
-    file = MappedFile(path)
-    return find_damage(file.data, file.release_memory)
 
 
 # Indices of the state of a walk over records.
@@ -284,7 +279,8 @@ class Topics:
         yield "airspeed", self._read_airspeed()
         winds = (self.table(topic, ("windspeed_east", "windspeed_north")) for topic in WIND_TOPICS)
         yield "wind", next((wind for wind in winds if wind is not None and np.any(wind.values)), None)
-        yield "battery", self._read_battery_with_energy()
+        battery = self.battery()
+        yield "battery", None if battery is None else with_used_energy(battery)
         yield "throttle", self.table("actuator_controls_0", ("control[3]",))
 
     def _read_gps_position(self) -> LogSeries | None:
@@ -356,11 +352,6 @@ class Topics:
             for k in range(2)
         )
         return LogSeries(first.source, first.time, np.stack([volts.mean(axis=0), amps.sum(axis=0)], axis=1))
-
-    def _read_battery_with_energy(self) -> LogSeries | None:
-        """Return the battery current (A) and the energy used (Wh), (n, 2); None if the current is unknown."""
-        battery = self.battery()
-        return None if battery is None else with_used_energy(battery)
 
     def _read_heights(self) -> Iterable[HeightSource]:
         """Yield the altitudes in the log other than the altitude of the position."""

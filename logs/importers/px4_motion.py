@@ -233,7 +233,12 @@ def _read_controls(topics: Topics, parameters: Mapping[str, float]) -> tuple[Sam
         deflections = servos.values[np.isfinite(servos.values[:, k]), k]
         moves = len(deflections) > 0 and float(np.ptp(deflections)) > _FLAP_MOVE_TOLERANCE
         if kind in _MODELLED:
-            _check_flaperon(topics, parameters, k)
+            for name, (title, topic) in _ALSO_MOVE.items():
+                deflection_ratio = parameters.get(f"CA_SV_CS{k}_{name}", 0.0)
+                setpoints = _read_samples(topics, topic, ("normalized_setpoint",)).values
+                if len(setpoints) and abs(deflection_ratio) * float(np.ptp(setpoints)) > _FLAP_MOVE_TOLERANCE:
+                    fault = f"{title} deflect this surface in flight, which the model does not represent"
+                    raise _make_parameter_error(topics, f"CA_SV_CS{k}_{name}", deflection_ratio, fault)
             scales[:, k] = [parameters.get(f"CA_SV_CS{k}_TRQ_{axis}", 0.0) for axis in _AXES]
             has_elevons = has_elevons or kind in _ELEVONS
             servos.values[:, k] -= parameters.get(f"CA_SV_CS{k}_TRIM", 0.0)
@@ -277,19 +282,6 @@ def _find_forward_motors(topics: Topics, airframe: int, parameters: Mapping[str,
             raise _make_parameter_error(topics, "CA_ROTOR_COUNT", count, f"no rotor pushes forward; {allowed}")
         return forward_rotors
     return list(range(count)) or np.flatnonzero(np.isfinite(motors.values).any(axis=0)).tolist()
-
-
-def _check_flaperon(topics: Topics, parameters: Mapping[str, float], surface: int) -> None:
-    """Raise LogError if a control surface is also deflected as a flap or a spoiler during the flight.
-
-    surface: number of the surface in PX4's parameters, from 0.
-    """
-    for name, (title, topic) in _ALSO_MOVE.items():
-        deflection_ratio = parameters.get(f"CA_SV_CS{surface}_{name}", 0.0)
-        setpoints = _read_samples(topics, topic, ("normalized_setpoint",)).values
-        if len(setpoints) and abs(deflection_ratio) * float(np.ptp(setpoints)) > _FLAP_MOVE_TOLERANCE:
-            message = f"{title} deflect this surface in flight, which the model does not represent"
-            raise _make_parameter_error(topics, f"CA_SV_CS{surface}_{name}", deflection_ratio, message)
 
 
 def _read_actuators(topics: Topics, topic: str, size: int) -> Samples:

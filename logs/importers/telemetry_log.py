@@ -106,7 +106,14 @@ class TelemetryReader:
                 self.cut = True
                 break
             is_in_record = True
-            if self._read_message_number(position) in self.wanted:
+            packet = position + _STAMP.size
+            # MAVLink 1 has the number in byte 5, MAVLink 2 in bytes 7 to 9.
+            message_number = (
+                self.data[packet + 5]
+                if self.data[packet] == _V1
+                else self.data[packet + 7] | self.data[packet + 8] << 8 | self.data[packet + 9] << 16
+            )
+            if message_number in self.wanted:
                 stamp = _STAMP.unpack_from(self.data, position)[0] * 1e-6
                 message = self._decode(bytes(self.data[position + _STAMP.size : position + length]))
                 if message is None:
@@ -135,14 +142,6 @@ class TelemetryReader:
             signature_size = _SIGNATURE if self.data[packet + 2] & _SIGNED else 0
             return _STAMP.size + _V2_FRAME + payload_size + signature_size
         return 0
-
-    def _read_message_number(self, position: int) -> int:
-        """Return the message number of the packet in the record at a position."""
-        packet = position + _STAMP.size
-        # MAVLink 1 has the number in byte 5, MAVLink 2 in bytes 7 to 9.
-        if self.data[packet] == _V1:
-            return self.data[packet + 5]
-        return self.data[packet + 7] | self.data[packet + 8] << 8 | self.data[packet + 9] << 16
 
     def _decode(self, packet: bytes) -> Any:
         """Return the message in a packet, or None if it cannot be decoded."""
@@ -352,6 +351,11 @@ class VehicleMessages:
                 f"{self._source}: no GLOBAL_POSITION_INT or GPS_RAW_INT with a fix: the flown position is unknown",
                 file=self._source,
             )
+        parameters: dict[str, float] = {}
+        for _, message in self._named_messages.get("PARAM_VALUE", []):
+            name = _decode_text(message.param_id)
+            if name and math.isfinite(message.param_value):
+                parameters[name] = float(message.param_value)
         return RawLog(
             source=self._source,
             format=FORMAT,
@@ -362,7 +366,7 @@ class VehicleMessages:
             datum="amsl",
             modes=tuple(self._read_modes()),
             missions=tuple(self._read_missions()),
-            parameters=self._read_parameters(),
+            parameters=parameters,
             events=tuple(
                 (time, _decode_text(message.text)) for time, message in self._named_messages.get("STATUSTEXT", [])
             ),
@@ -533,15 +537,6 @@ class VehicleMessages:
         return any(
             heartbeat.autopilot == _PX4 for _, heartbeat in self._named_messages["HEARTBEAT"] if _is_vehicle(heartbeat)
         )
-
-    def _read_parameters(self) -> dict[str, float]:
-        """Return the last finite value of each parameter that the vehicle sent."""
-        values: dict[str, float] = {}
-        for _, message in self._named_messages.get("PARAM_VALUE", []):
-            name = _decode_text(message.param_id)
-            if name and math.isfinite(message.param_value):
-                values[name] = float(message.param_value)
-        return values
 
     def _find_program(self, heartbeat: Any) -> str:
         """Return ArduPilot's start message with its version, or the autopilot's name; "" if unknown."""

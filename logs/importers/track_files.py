@@ -184,17 +184,22 @@ def read_igc(path: Path) -> RawLog:
     if len(rows) < 2:
         raise LogError(f"{path}: {len(rows)} fixes (B records); expected at least 2", file=path)
     table = np.array(rows)
-    time = _unwrap_midnight(table[:, 0])
+    # A day is added after each midnight, so that the seconds keep increasing.
+    second_of_day = table[:, 0]
+    steps = np.diff(second_of_day)
+    days = np.cumsum(np.where(steps < -_HALF_DAY_S, 1.0, np.where(steps > _HALF_DAY_S, -1.0, 0.0)))
+    time = second_of_day + np.concatenate([[0.0], days]) * _DAY_S
     gnss, pressure = table[:, 4], table[:, 3]
     has_gnss = bool((np.isfinite(gnss) & (gnss != 0.0)).mean() > 0.5)
     up, source = (gnss, "B record, GNSS altitude") if has_gnss else (pressure, "B record, pressure altitude")
     midnight = _parse_midnight(lines)
     start = float(time.min())
     pressure_heights = HeightSource("pressure altitude", "pressure", LogSeries("B", time - start, pressure[:, None]))
+    recorder_line = next((line for line in lines if line.startswith("HFFTY")), "")
     return RawLog(
         source=str(path),
         format=IGC,
-        program=_parse_recorder(lines),
+        program=recorder_line.partition(":")[2].strip(),
         vehicle="unknown",
         series={"position": LogSeries(source, time - start, np.column_stack([table[:, 1:3], up]))},
         heights=(pressure_heights,) if has_gnss else (),
@@ -234,13 +239,6 @@ def _parse_fixes(lines: list[str]) -> tuple[list[tuple[float, float, float, floa
     return rows, unreadable
 
 
-def _unwrap_midnight(time: np.ndarray) -> np.ndarray:
-    """Add a day to the times after each midnight, so that seconds of the day keep increasing, s, (n,)."""
-    steps = np.diff(time)
-    days = np.cumsum(np.where(steps < -_HALF_DAY_S, 1.0, np.where(steps > _HALF_DAY_S, -1.0, 0.0)))
-    return time + np.concatenate([[0.0], days]) * _DAY_S
-
-
 def _parse_midnight(lines: list[str]) -> float:
     """Return the UTC midnight before the flight, s since 1970; NaN if no line has a valid date.
 
@@ -262,12 +260,6 @@ def _parse_datum(lines: list[str]) -> VerticalDatum:
             return next((datum for word, datum in _DATUMS.items() if word in line[5:]), "unstated")
     # The specification assumes the ellipsoid if nothing is stated.
     return "ellipsoid"
-
-
-def _parse_recorder(lines: list[str]) -> str:
-    """Return the type of the flight recorder, or "" if the file does not state it."""
-    recorder_line = next((line for line in lines if line.startswith("HFFTY")), "")
-    return recorder_line.partition(":")[2].strip()
 
 
 def _make_task(lines: list[str], source: str) -> tuple[LoggedMission, ...]:

@@ -18,7 +18,7 @@ from logs.verdict.measures.route_requirements import judged_airspace, judged_sur
 from world.errors import FlightError
 from world.json_schema import DocumentConfig
 from world.scenario import Scenario
-from world.scenario_tables import DEFAULT_AUTOPILOT, FlightTable, Navigation
+from world.scenario_tables import DEFAULT_AUTOPILOT, Navigation
 from world.wind import Turbulence
 from world.wording import count_text
 
@@ -90,6 +90,12 @@ def plan_conditions(scenario: Scenario, aircraft: str, airspeed: float, autopilo
     east, north = scenario.wind_velocity(scenario.start.tolist())
     has_field = wind.field is not None
     gradient = 0.0 if has_field else wind.gradient
+    # The file that decided the autopilot, if it was neither named nor the default.
+    source_text = (
+        ""
+        if flight_table.autopilot_from is None or flight_table.steering.autopilot == DEFAULT_AUTOPILOT
+        else f"; taken from {flight_table.autopilot_from}, because no autopilot was named"
+    )
     return Conditions(
         aircraft=aircraft,
         mass_kg=mass,
@@ -103,7 +109,7 @@ def plan_conditions(scenario: Scenario, aircraft: str, airspeed: float, autopilo
         ),
         turbulence=wind.turbulence,
         navigation=flight_table.steering.nav,
-        autopilot=autopilot.describe(aircraft) + _autopilot_source(flight_table),
+        autopilot=autopilot.describe(aircraft) + source_text,
         autopilot_version=autopilot.version,
         terrain=None if terrain is None else terrain.source,
         height_datum=None if terrain is None else terrain.datum,
@@ -113,13 +119,6 @@ def plan_conditions(scenario: Scenario, aircraft: str, airspeed: float, autopilo
         wind_amsl_m=wind.reference_amsl if gradient else None,
         unused_parameters=() if autopilot.parameters is None else autopilot.parameters.unused,
     )
-
-
-def _autopilot_source(flight_table: FlightTable) -> str:
-    """Return a clause on the file that decided the autopilot; "" for a named or default autopilot."""
-    if flight_table.autopilot_from is None or flight_table.steering.autopilot == DEFAULT_AUTOPILOT:
-        return ""
-    return f"; taken from {flight_table.autopilot_from}, because no autopilot was named"
 
 
 def _airspeed_source(scenario: Scenario, autopilot: Autopilot) -> AirspeedSource:
@@ -152,7 +151,21 @@ def judging_conditions(setup: FlightSetup) -> Conditions:
 
 def condition_lines(conditions: Conditions) -> list[str]:
     """Return the line on aircraft and airspeed, and the line on weather, navigation, terrain and zones."""
-    return [_aircraft_line(conditions), _world_line(conditions)]
+    speed = (
+        f"{conditions.airspeed_mps:.3g} m/s {conditions.airspeed_kind} airspeed"
+        f" ({_AIRSPEED_SOURCE_TEXTS[conditions.airspeed_source]})"
+    )
+    if not conditions.aircraft:
+        aircraft_line = f"Aircraft: not named, so none of its limits are judged (name yours with --aircraft); {speed}"
+    else:
+        mass = "" if conditions.mass_kg is None else f", {conditions.mass_kg:.3g} kg"
+        line = f"Aircraft: {conditions.aircraft}{mass}, {speed}"
+        aircraft_line = (
+            line
+            if conditions.aircraft_named
+            else f"{line}; no aircraft was named, so this is the default (name yours with --aircraft)"
+        )
+    return [aircraft_line, _world_line(conditions)]
 
 
 def autopilot_line(conditions: Conditions, *, is_flown: bool) -> str:
@@ -166,21 +179,6 @@ def autopilot_line(conditions: Conditions, *, is_flown: bool) -> str:
 def flown_lines(conditions: Conditions) -> list[str]:
     """Return the lines on a flight's aircraft, its conditions and the autopilot that flew."""
     return [*condition_lines(conditions), autopilot_line(conditions, is_flown=True)]
-
-
-def _aircraft_line(conditions: Conditions) -> str:
-    """Return the line on the aircraft and its airspeed; it notes that the user named no aircraft."""
-    speed = (
-        f"{conditions.airspeed_mps:.3g} m/s {conditions.airspeed_kind} airspeed"
-        f" ({_AIRSPEED_SOURCE_TEXTS[conditions.airspeed_source]})"
-    )
-    if not conditions.aircraft:
-        return f"Aircraft: not named, so none of its limits are judged (name yours with --aircraft); {speed}"
-    mass = "" if conditions.mass_kg is None else f", {conditions.mass_kg:.3g} kg"
-    line = f"Aircraft: {conditions.aircraft}{mass}, {speed}"
-    if conditions.aircraft_named:
-        return line
-    return f"{line}; no aircraft was named, so this is the default (name yours with --aircraft)"
 
 
 def _world_line(conditions: Conditions) -> str:

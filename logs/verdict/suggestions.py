@@ -585,14 +585,6 @@ def _suggest_lower_reading(setup: FlightSetup) -> tuple[Suggestion, ...]:
     return (*home_on_ground, *_suggest_other_frame(setup, Frame.GLOBAL))
 
 
-def _is_above_home(setup: FlightSetup, leg: int | None) -> bool:
-    """Return True if an end of a leg is placed at a height above home, as an RTL is."""
-    if leg is None or leg in setup.route.rtl_legs:
-        return True
-    items_above_home = {item.seq for item in setup.mission.items if item.frame in OVER_HOME}
-    return not items_above_home.isdisjoint(setup.route.items[leg : leg + 2].tolist())
-
-
 def suggest_flying_higher(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
@@ -612,7 +604,12 @@ def suggest_flying_higher(
         # A flight that ended early did not reach the lowest point.
         shortfall = max(shortfall, finding.limit - finding.planned + SUGGESTION_LENGTH_MARGIN_M)
     setup, depth = requirements.setup, -home_height(requirements.setup)
-    if depth > HOME_ALTITUDE_TOLERANCE_M and _is_above_home(setup, finding.place.index):
+    leg = finding.place.index
+    is_above_home = True
+    if leg is not None and leg not in setup.route.rtl_legs:
+        items_above_home = {item.seq for item in setup.mission.items if item.frame in OVER_HOME}
+        is_above_home = not items_above_home.isdisjoint(setup.route.items[leg : leg + 2].tolist())
+    if depth > HOME_ALTITUDE_TOLERANCE_M and is_above_home:
         home_on_ground = _suggest_home_on_ground(setup)
         remaining_shortfall = shortfall - depth
         if remaining_shortfall <= SUGGESTION_LENGTH_MARGIN_M or not home_on_ground:

@@ -11,7 +11,6 @@ from logs.verdict.places import (
     Disagreement,
     ItemMove,
     Place,
-    RemainingFinding,
     Suggestion,
 )
 from logs.verdict.tolerances import MIN_LEG_LENGTH_M
@@ -280,16 +279,17 @@ def suggestion_text(suggestion: Suggestion) -> str:
     notes += [
         f"later in the flight {state}: {', '.join(texts)}"
         for state, fails in (("fails", True), ("undecided", False))
-        if (texts := [_remaining_text(item) for item in remaining if item.fails is fails])
+        if (
+            texts := [
+                noun_with_place(RULE_NOUNS.get(item.rule, item.rule), item.place)
+                for item in remaining
+                if item.fails is fails
+            ]
+        )
     ]
     if any(change.not_flown for change in suggestion):
         notes.append(f"not tried by flight: the flight ended before this {suggestion[-1].place.kind}")
     return f"{text} ({'; '.join(notes)})" if notes else text
-
-
-def _remaining_text(finding: RemainingFinding) -> str:
-    """Name the rule and the place of a finding that remains failed or undecided after a change."""
-    return noun_with_place(RULE_NOUNS.get(finding.rule, finding.rule), finding.place)
 
 
 def without_trial(suggestion: Suggestion) -> Suggestion:

@@ -261,25 +261,21 @@ def draw_step_responses(aircraft: Aircraft, steps: Sequence[StepResponse]) -> Fi
                 if row >= len(step.quantities):
                     panel.axis("off")
                     continue
-                _draw_step_response(panel, step, row)
+                # Change of one quantity after the step; the time for which the step is held is shaded.
+                name, unit, factor = _QUANTITIES[step.quantities[row]]
+                values = factor * step.change[:, row]
+                panel.axhline(0.0, color=theme.colour("rim"), linewidth=0.6)
+                hold_time = min(step.hold_time, float(step.time[-1]) - 1.0)
+                panel.axvspan(1.0, 1.0 + hold_time, color=theme.colour("commanded"), alpha=0.12, linewidth=0)
+                panel.plot(step.time, values, color=theme.colour("flown"), linewidth=1.1)
+                panel.set_xlim(0.0, float(step.time[-1]))
+                panel.set_title(f"change of {name} ({unit})", fontsize=8.5, pad=3.0)
+                panel.grid(color=theme.colour("grid"), linewidth=0.5)
+                panel.set_axisbelow(True)
             column_box = axes[0, column].get_position()
             figure.text(column_box.x0, column_box.y1 + 0.035, _step_title(step), fontsize=9.0, fontweight="bold")
             axes[-1, column].set_xlabel("time (s)")
     return figure
-
-
-def _draw_step_response(axes: Any, step: StepResponse, row: int) -> None:
-    """Draw the change of one quantity after a step, and shade the time for which the step is held."""
-    name, unit, factor = _QUANTITIES[step.quantities[row]]
-    values = factor * step.change[:, row]
-    axes.axhline(0.0, color=theme.colour("rim"), linewidth=0.6)
-    hold_time = min(step.hold_time, float(step.time[-1]) - 1.0)
-    axes.axvspan(1.0, 1.0 + hold_time, color=theme.colour("commanded"), alpha=0.12, linewidth=0)
-    axes.plot(step.time, values, color=theme.colour("flown"), linewidth=1.1)
-    axes.set_xlim(0.0, float(step.time[-1]))
-    axes.set_title(f"change of {name} ({unit})", fontsize=8.5, pad=3.0)
-    axes.grid(color=theme.colour("grid"), linewidth=0.5)
-    axes.set_axisbelow(True)
 
 
 def _step_title(step: StepResponse) -> str:

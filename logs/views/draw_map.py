@@ -51,7 +51,11 @@ def draw_map(chart: MapChart) -> Figure:
     """Draw the top view: north up, equal scales, axes in m labelled in km from the scenario's origin."""
     with clean_style():
         handles = [make_legend_handle(entry) for entry in legend_entries([chart.panel])]
-        legend_height = _compute_legend_height(handles)
+        # A legend of four columns.
+        line_counts = [1 + str(handle.get_label()).count("\n") for handle in handles] + [1]
+        legend_height = max(
+            _LEGEND, 0.08 + _LEGEND_LINE * max(int(column.sum()) for column in np.array_split(line_counts, 4))
+        )
         figure, axes = make_map_axes(chart.east, chart.north, legend_height)
         axes.set_xlabel(f"east of {chart.origin} (km)")
         axes.set_ylabel("north (km)")
@@ -62,12 +66,6 @@ def draw_map(chart: MapChart) -> Figure:
         draw_compass(figure, chart.winds, _COLUMN, legend_height)
         draw_legend(figure, handles + ground_handles, _LEFT, (legend_height - 0.02) / figure.get_figheight())
     return figure
-
-
-def _compute_legend_height(handles: list[Any]) -> float:
-    """Return the height (inches) of a legend of four columns with contours, at least `_LEGEND`."""
-    lines = [1 + str(handle.get_label()).count("\n") for handle in handles] + [1]
-    return max(_LEGEND, 0.08 + _LEGEND_LINE * max(int(column.sum()) for column in np.array_split(lines, 4)))
 
 
 def make_map_axes(east: tuple[float, float], north: tuple[float, float], legend_height: float) -> tuple[Figure, Any]:

@@ -87,12 +87,23 @@ def draw_scene(view: SceneView) -> Figure:
     """
     setup, track, failed = view.setup, view.track, view.failed
     scene_limits = scene_bounds(setup, track)
-    bounds = _widen_bounds(scene_limits)
+    # A narrow scene is widened to the smallest allowed ratio of the sides.
+    sides = np.ptp(scene_limits, axis=1)
+    widening = 0.5 * np.maximum(_MIN_SIDE_RATIO * sides.max() - sides, 0.0)
+    bounds = np.asarray(scene_limits + np.stack([-widening, widening], axis=1))
     is_narrow = not np.array_equal(bounds, scene_limits)
     terrain = setup.scenario.terrain
     grid = ground_grid(terrain, bounds, _MAX_CELLS)
     route = setup.display_waypoints
-    projection = _make_projection(route, bounds, exaggeration(setup, bounds, grid), is_narrow)
+    # Look across the route from its south side, about the middle of the bounds.
+    step = route[-1] - route[0]
+    azimuth = math.atan2(step[1], step[0]) - math.pi / 2.0
+    if math.sin(azimuth) > 0.0:
+        azimuth += math.pi
+    azimuth += _NARROW_SCENE_AZIMUTH_RAD if is_narrow else 0.0
+    projection = Projection(
+        azimuth, np.array([*bounds.mean(axis=1), float(route[:, 2].mean())]), exaggeration(setup, bounds, grid)
+    )
     with clean_style():
         figure, axes = _make_axes(setup, projection, bounds, grid)
         handles = _draw_ground(axes, projection, grid, bounds)
@@ -103,44 +114,12 @@ def draw_scene(view: SceneView) -> Figure:
         _draw_labels(setup, projection, route, failed, placer)
         name = shorten(setup.scenario.name, 60)
         scale_text = "true to scale" if projection.stretch == 1.0 else f"heights × {projection.stretch:g}"
-        viewer_side = _name_compass_direction(projection.azimuth)
+        # Side from which the viewer looks; the azimuth is counter-clockwise from east.
+        names = ("east", "north-east", "north", "north-west", "west", "south-west", "south", "south-east")
+        viewer_side = names[round(projection.azimuth / (math.pi / 4.0)) % 8]
         axes.set_title(f"{name}: seen from the {viewer_side}, {scale_text}", fontweight="bold")
         draw_legend(figure, handles, _LEFT + 0.1, (_BOTTOM - 0.08) / float(figure.get_figheight()))
     return figure
-
-
-def _widen_bounds(bounds: Floats) -> Floats:
-    """Widen the shorter side of a map's bounds until its ratio to the longer side is at least `_MIN_SIDE_RATIO`.
-
-    bounds: minimum and maximum east, minimum and maximum north, (2, 2), m.
-    """
-    sides = np.ptp(bounds, axis=1)
-    widening = 0.5 * np.maximum(_MIN_SIDE_RATIO * sides.max() - sides, 0.0)
-    return np.asarray(bounds + np.stack([-widening, widening], axis=1))
-
-
-def _make_projection(route: Floats, bounds: Floats, stretch: float, is_narrow: bool) -> Projection:
-    """Make the projection that looks across the route from its south side, about the middle of the bounds.
-
-    route: waypoints, m, (w, 3).
-    stretch: factor on heights.
-    is_narrow: True to turn the view by `_NARROW_SCENE_AZIMUTH_RAD`.
-    """
-    step = route[-1] - route[0]
-    azimuth = math.atan2(step[1], step[0]) - math.pi / 2.0
-    if math.sin(azimuth) > 0.0:
-        azimuth += math.pi
-    azimuth += _NARROW_SCENE_AZIMUTH_RAD if is_narrow else 0.0
-    return Projection(azimuth, np.array([*bounds.mean(axis=1), float(route[:, 2].mean())]), stretch)
-
-
-def _name_compass_direction(azimuth: float) -> str:
-    """Return the name of the side from which a viewer looks, such as "south-west".
-
-    azimuth: direction of the viewer, rad, counter-clockwise from east.
-    """
-    names = ("east", "north-east", "north", "north-west", "west", "south-west", "south", "south-east")
-    return names[round(azimuth / (math.pi / 4.0)) % 8]
 
 
 def _make_axes(

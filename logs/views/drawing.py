@@ -231,7 +231,13 @@ def draw_chart(chart: Chart) -> Figure:
     top_margin = (_TOP if chart.legend == "beside" else _PLAIN_TOP) + (_SHARED_LEGEND if has_shared_legend else 0.0)
     right_margin = _LEGENDS if chart.legend == "beside" and not has_shared_legend else _RIGHT
     columns = _choose_legend_columns(entries)
-    legend_height = _compute_legend_height(entries, columns)
+    legend_height = 0.0
+    if entries:
+        legend_rows = -(-len(entries) // columns)
+        lines = sum(
+            max(len(textwrap.wrap(entry.text, 36)) for entry in entries[row::legend_rows]) for row in range(legend_rows)
+        )
+        legend_height = 0.1 + _LEGEND_LINE * lines
     rows = 1 if chart.widths else len(panels)
     gap = _GAP if chart.shared else _OWN_AXIS_GAP
     total_height = top_margin + _BOTTOM + legend_height + max(1, rows) * chart.print_height + max(0, rows - 1) * gap
@@ -244,11 +250,20 @@ def draw_chart(chart: Chart) -> Figure:
             axes = figure.add_axes((left, panel_bottom / total_height, width, chart.print_height / total_height))
             _draw_panel(axes, chart, panel, has_leg_numbers=k == 0)
             if chart.legend == "beside" and not has_shared_legend:
-                _add_legend_beside(axes)
+                handles, labels = axes.get_legend_handles_labels()
+                options: dict[str, Any] = {"loc": "center left", "bbox_to_anchor": (1.01, 0.5), "handlelength": 1.6}
+                axes.legend(handles, [textwrap.fill(str(label), 23) for label in labels], borderaxespad=0.2, **options)
             if chart.shared and row < rows - 1:
                 axes.tick_params(labelbottom=False)
             else:
-                axes.set_xlabel(_make_axis_label(chart, panel, axes))
+                label = f"{chart.along} ({chart.unit})" if chart.along else panel.along
+                axis_label = label
+                if chart.scaled:
+                    frame = axes.get_window_extent()
+                    metres_per_pixel = np.ptp(axes.get_xlim()) * 1000.0 / frame.width
+                    height_scale = metres_per_pixel / (np.ptp(axes.get_ylim()) / frame.height)
+                    axis_label = f"{label}; heights are drawn {height_scale:.2g} times larger than distances"
+                axes.set_xlabel(axis_label)
         text_style: dict[str, Any] = {"fontsize": 11, "fontweight": "bold", "va": "center"}
         figure.text(_LEFT / WIDTH, 1 - 0.3 / total_height, chart.title, **text_style)
         if has_shared_legend:
@@ -274,20 +289,6 @@ def _compute_panel_extent(chart: Chart, panel_number: int, right_margin: float) 
     return (_LEFT + width_before * (total_width - gap) + 0.75 * panel_number) / WIDTH, chart.widths[panel_number] * (
         total_width - gap
     ) / WIDTH
-
-
-def _make_axis_label(chart: Chart, panel: Panel, axes: Any) -> str:
-    """Return the label of the horizontal axis.
-
-    If the chart is scaled, the label states how much larger heights are drawn than distances.
-    """
-    label = f"{chart.along} ({chart.unit})" if chart.along else panel.along
-    if not chart.scaled:
-        return label
-    frame = axes.get_window_extent()
-    metres_per_pixel = np.ptp(axes.get_xlim()) * 1000.0 / frame.width
-    height_scale = metres_per_pixel / (np.ptp(axes.get_ylim()) / frame.height)
-    return f"{label}; heights are drawn {height_scale:.2g} times larger than distances"
 
 
 def can_share_legend(panels: Sequence[Panel]) -> bool:
@@ -638,22 +639,6 @@ def _choose_legend_columns(entries: Sequence[LegendEntry]) -> int:
         if sum(0.45 + 0.062 * width for width in column_widths) < WIDTH - 1.0:
             return columns
     return 1
-
-
-def _compute_legend_height(entries: Sequence[LegendEntry], columns: int) -> float:
-    """Return the height of a legend, inches; 0 without entries."""
-    if not entries:
-        return 0.0
-    rows = -(-len(entries) // columns)
-    lines = sum(max(len(textwrap.wrap(entry.text, 36)) for entry in entries[row::rows]) for row in range(rows))
-    return 0.1 + _LEGEND_LINE * lines
-
-
-def _add_legend_beside(axes: Any) -> None:
-    """Draw a panel's legend to its right."""
-    handles, labels = axes.get_legend_handles_labels()
-    options: dict[str, Any] = {"loc": "center left", "bbox_to_anchor": (1.01, 0.5), "handlelength": 1.6}
-    axes.legend(handles, [textwrap.fill(str(label), 23) for label in labels], borderaxespad=0.2, **options)
 
 
 def _add_legend_above(figure: Figure, top: float) -> None:

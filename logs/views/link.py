@@ -145,8 +145,22 @@ def link_map(setup: FlightSetup, drawn: DrawnLink) -> MapChart:
         """Describe the link margin at point k."""
         return f"{along.time[k]:.0f} s: {points.margin[k]:.1f} dB above the fade margin"
 
+    # Areas in which the link is weak, lost or in the ground, at the flight's height.
+    coverage = drawn.coverage
+    is_weak = (coverage.margin >= 0.0) & (coverage.margin < WEAK_MARGIN_DB)
+    height_text = coverage.height.text
+    areas = (
+        (f"at {height_text}: less than {WEAK_MARGIN_DB:.0f} dB above the fade margin", "coverage-weak", is_weak),
+        (f"at {height_text}: below the fade margin", "coverage-lost", coverage.margin < 0.0),
+        (f"ground above {height_text}", "coverage-ground", coverage.is_in_ground),
+    )
+    coverage_layers = [
+        make_area_layer(name, role, parts)
+        for name, role, is_chosen in areas
+        if (parts := cell_outlines(coverage.west, coverage.south, coverage.side, is_chosen))
+    ]
     layers = [
-        *_make_coverage_layers(drawn.coverage),
+        *coverage_layers,
         *path_layers(segments, _ROLES_AND_NAMES, find_position, describe_point),
     ]
     layers.append(Layer("dots", "station", "waypoint", antenna[:1], antenna[1:2], hover_texts=("station",)))
@@ -160,19 +174,3 @@ def link_map(setup: FlightSetup, drawn: DrawnLink) -> MapChart:
         route=route,
         winds=(NamedWind(scenario.wind),),
     )
-
-
-def _make_coverage_layers(coverage: LinkCoverage) -> list[Layer]:
-    """Return layers of the areas in which the link is weak, lost or in the ground, at the flight's height."""
-    is_weak = (coverage.margin >= 0.0) & (coverage.margin < WEAK_MARGIN_DB)
-    height_text = coverage.height.text
-    areas = (
-        (f"at {height_text}: less than {WEAK_MARGIN_DB:.0f} dB above the fade margin", "coverage-weak", is_weak),
-        (f"at {height_text}: below the fade margin", "coverage-lost", coverage.margin < 0.0),
-        (f"ground above {height_text}", "coverage-ground", coverage.is_in_ground),
-    )
-    return [
-        make_area_layer(name, role, parts)
-        for name, role, is_chosen in areas
-        if (parts := cell_outlines(coverage.west, coverage.south, coverage.side, is_chosen))
-    ]

@@ -134,10 +134,23 @@ def map_chart(
     layers: list[Layer] = []
     labels: list[Label] = []
     if route is not None:
-        layers += _make_path_layers(route, plan_waypoints, failed)
+        has_different_plan = plan_waypoints is not None and paths_differ(plan_waypoints, route, 1.0)
+        legs = [route[k : k + 2] for k in failed.legs]
+        path_layers = [
+            Layer("line", "leg that fails a rule", "failing-leg", leg[:, 0], leg[:, 1], quiet=True) for leg in legs
+        ]
+        if has_different_plan and plan_waypoints is not None:
+            path_layers.append(
+                Layer("line", "plan as searched", "searched", plan_waypoints[:, 0], plan_waypoints[:, 1], quiet=True)
+            )
+        name = "route of the mission" if plan_waypoints is None or has_different_plan else "planned path"
+        layers += [*path_layers, Layer("line", name, "planned", route[:, 0], route[:, 1], quiet=True)]
     layers += [_make_track_layer(drawn_track) for drawn_track in tracks]
     for drawn_track in tracks if failed.threats else ():
-        layers += _make_inside_threat_layers(scenario, drawn_track.track, failed)
+        is_inside = find_rows_inside_threats(failed, scenario.threats, drawn_track.track)
+        if is_inside.any():
+            east, north = np.where(is_inside, drawn_track.track.position[:, :2].T, np.nan)
+            layers += [Layer("line", "flown inside a threat's reach", "inside", east, north, quiet=True)]
     if route is not None:
         layers += _make_waypoint_layers(route, stops, failed, waypoint_texts)
         centres = {k: (float(east), float(north)) for k, (east, north, _) in enumerate(scenario.threats.position)}
@@ -179,12 +192,16 @@ def scenario_map(
     names = [*threat_labels(scenario.threats, failing_threats), *zone_labels(scenario.zones)]
     names = [name for name in names if east[0] < name.x < east[1] and north[0] < name.y < north[1]]
     origin = scenario.origin
+    end_markers = [
+        Layer("dots", name, name, point[:1], point[1:2], hover_texts=(name,))
+        for name, point in _name_ends(scenario, route)
+    ]
     return MapChart(
         f"{shorten(scenario.name, 60)}: {subject}",
         Panel(
             "north",
             "km",
-            (*area_layers, *layers, *_make_end_markers(scenario, route)),
+            (*area_layers, *layers, *end_markers),
             span=north,
             labels=(*labels, *names),
         ),
@@ -246,32 +263,12 @@ def _make_area_edge_layers(scenario: Scenario) -> list[Layer]:
     return [Layer("line", "edge of the area", "area", x, y, quiet=True)]
 
 
-def _make_path_layers(route: Floats, plan: Floats | None, failed: Failures) -> list[Layer]:
-    """Return the layers of the failing legs, of the plan if it differs from the route, and of the route."""
-    has_different_plan = plan is not None and paths_differ(plan, route, 1.0)
-    legs = [route[k : k + 2] for k in failed.legs]
-    layers = [Layer("line", "leg that fails a rule", "failing-leg", leg[:, 0], leg[:, 1], quiet=True) for leg in legs]
-    if has_different_plan and plan is not None:
-        layers.append(Layer("line", "plan as searched", "searched", plan[:, 0], plan[:, 1], quiet=True))
-    name = "route of the mission" if plan is None or has_different_plan else "planned path"
-    return [*layers, Layer("line", name, "planned", route[:, 0], route[:, 1], quiet=True)]
-
-
 def _make_track_layer(drawn_track: DrawnTrack) -> Layer:
     """Make the layer of a flown track, thinned to what a map can show."""
     count = len(drawn_track.track)
     rows = np.union1d(np.arange(0, count, max(1, count // _MAX_POINTS)), [count - 1])
     east, north, _ = drawn_track.track.position[rows].T
     return Layer("line", drawn_track.label, drawn_track.role, east, north, flight=drawn_track.flight)
-
-
-def _make_inside_threat_layers(scenario: Scenario, track: Track, failed: Failures) -> list[Layer]:
-    """Return the layer of the part of a track inside a threat whose rule fails, if any."""
-    is_inside = find_rows_inside_threats(failed, scenario.threats, track)
-    if not is_inside.any():
-        return []
-    east, north = np.where(is_inside, track.position[:, :2].T, np.nan)
-    return [Layer("line", "flown inside a threat's reach", "inside", east, north, quiet=True)]
 
 
 def _make_waypoint_layers(
@@ -296,14 +293,6 @@ def _name_ends(scenario: Scenario, route: Floats | None) -> tuple[tuple[str, Flo
     return ("start", first), ("destination", last)
 
 
-def _make_end_markers(scenario: Scenario, route: Floats | None) -> list[Layer]:
-    """Make the markers of start and destination."""
-    return [
-        Layer("dots", name, name, point[:1], point[1:2], hover_texts=(name,))
-        for name, point in _name_ends(scenario, route)
-    ]
-
-
 def end_labels(scenario: Scenario, route: Floats | None, stops: Sequence[int]) -> list[Label]:
     """Return the labels of start and destination, with the numbers of their waypoints; one label if they coincide.
 
@@ -315,14 +304,11 @@ def end_labels(scenario: Scenario, route: Floats | None, stops: Sequence[int]) -
         Label(f"{stop} {name}".strip(), float(point[0]), float(point[1]), "end")
         for (name, point), stop in zip(ends, numbers_of_ends, strict=True)
     )
-    if not _are_close(ends[0][1], ends[1][1]):
+    # One marker is enough for both ends if they lie within 50 m horizontally.
+    are_close = float(np.hypot(*(ends[0][1][:2] - ends[1][1][:2]))) < 50.0
+    if not are_close:
         return [start, destination]
     return [replace(start, text=f"{start.text}, {destination.text}")]
-
-
-def _are_close(first: Floats, second: Floats) -> bool:
-    """Return True if two points lie within 50 m horizontally, so that one marker is enough for both."""
-    return float(np.hypot(*(first[:2] - second[:2]))) < 50.0
 
 
 def _make_waypoint_labels(route: Floats, stops: Sequence[int], failed: Failures) -> list[Label]:

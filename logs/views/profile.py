@@ -108,6 +108,8 @@ def _make_chart(
     """
     path = "the straight line from start to destination" if is_straight else "the planned path"
     title = f"{shorten(scenario.name, 60)}: heights along the path"
+    # Each displayed leg begins at the end of the stop before it.
+    leg_starts = [0, *(k - 1 for k in stop_starts[2:])] if len(waypoint_distances) > 1 else []
     return Chart(
         title if scenario.terrain is not None else f"{title} (no terrain was given)",
         f"distance along {path}",
@@ -115,20 +117,12 @@ def _make_chart(
         (panel,),
         axis_range=(0.0, max(float(waypoint_distances[-1]), 1.0) / 1000.0),
         # The leg to a loiter includes the loiter.
-        marks=tuple(
-            (float(waypoint_distances[end]) / 1000.0, f"leg {n}")
-            for n, end in enumerate(_find_leg_start_waypoints(stop_starts, len(waypoint_distances)))
-        ),
+        marks=tuple((float(waypoint_distances[end]) / 1000.0, f"leg {n}") for n, end in enumerate(leg_starts)),
         page_height=420,
         print_height=4.05,
         legend="below",
         scaled=True,
     )
-
-
-def _find_leg_start_waypoints(stop_starts: list[int], count: int) -> list[int]:
-    """Return the waypoint at which each displayed leg begins, which is the end of the stop before it."""
-    return [0, *(k - 1 for k in stop_starts[2:])] if count > 1 else []
 
 
 def _compute_planned_altitudes(

@@ -130,7 +130,9 @@ def returns_map(setup: FlightSetup, drawn_returns: DrawnReturns, track: Track | 
         texts = tuple(describe_return(worst.simulated) for worst in unsafe)
         layers.append(Layer("rings", "where it fails", "fail", positions[:, 0], positions[:, 1], hover_texts=texts))
     targets = {ret.target.name: ret.target.position for ret in drawn_returns.returns.each}
-    layers += _make_target_layers(targets)
+    if targets:
+        east, north, _ = np.array(list(targets.values())).T
+        layers += [Layer("dots", "return targets", "waypoint", east, north, hover_texts=tuple(targets))]
     labels = [
         Label(str(number), float(worst.marked_position[0]), float(worst.marked_position[1]), "number", "fail")
         for number, worst in enumerate(drawn_returns.worst, 1)
@@ -174,14 +176,6 @@ def split_path_by_reach(
     flown_track = track if drawn_returns.returns.flown else None
     glides = drawn_returns.glides.each
     return split_judged_path(setup, flown_track, glides, lambda glide: glide.time, lambda glide: glide.reach)
-
-
-def _make_target_layers(targets: dict[str, tuple[float, float, float]]) -> list[Layer]:
-    """Return the layer that marks the targets of returns, if any."""
-    if not targets:
-        return []
-    east, north, _ = np.array(list(targets.values())).T
-    return [Layer("dots", "return targets", "waypoint", east, north, hover_texts=tuple(targets))]
 
 
 # ----------------------------------------------------------------------

@@ -76,10 +76,16 @@ def _make_survey_panel(
         unknown_spans = () if measure is None else measure.unknown_spans
         # A line that was not flown is lost as a whole.
         lost_spans = ((0.0, np.inf),) if measure is None else measure.lost_spans
+        usable_spans = []
+        if measure is not None:
+            gaps = sorted((*measure.lost_spans, *measure.unknown_spans))
+            starts = [0.0, *(gap_end for _, gap_end in gaps)]
+            ends = [*(gap_start for gap_start, _ in gaps), measure.length]
+            usable_spans = [(start, end) for start, end in zip(starts, ends, strict=True) if end > start]
         for parts, spans in (
             (lost_parts, lost_spans),
             (unknown_parts, unknown_spans),
-            (usable_parts, _find_usable_spans(measure)),
+            (usable_parts, usable_spans),
         ):
             for span_start, span_end in spans:
                 parts.append(_cut_line(corners, span_start, span_end))
@@ -95,16 +101,6 @@ def _make_survey_panel(
         layers = (*layers, Layer("line", "outside the terrain data, not judged", "return-unknown", *unknown_line))
     layers = (*layers, Layer("line", "flown track", "flown", track_points[:, 0], track_points[:, 1], quiet=True))
     return Panel(f"{name}: to the left of its first line", "m", layers, labels=tuple(labels))
-
-
-def _find_usable_spans(measure: LineMeasure | None) -> list[tuple[float, float]]:
-    """Return the start and end of each usable part of a photo line, m; [] for an unmeasured line."""
-    if measure is None:
-        return []
-    gaps = sorted((*measure.lost_spans, *measure.unknown_spans))
-    starts = [0.0, *(gap_end for _, gap_end in gaps)]
-    ends = [*(gap_start for gap_start, _ in gaps), measure.length]
-    return [(start, end) for start, end in zip(starts, ends, strict=True) if end > start]
 
 
 def _cut_line(corners: Floats, start: float, end: float) -> Floats:

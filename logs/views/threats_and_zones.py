@@ -44,7 +44,14 @@ def threat_circles(threats: Threats, route: Floats | None, failing_threats: froz
         kill_radius = float(threats.kill_radius[k])
         detection_radius = float(threats.detection_radius[k])
         center = threats.position[k, :2]
-        texts = (_describe_threat(name, kill_radius, detection_radius),)
+        hover_text = "\n".join(
+            [
+                name,
+                *([f"missile: {kill_radius:.0f} m"] if kill_radius > 0.0 else []),
+                *([f"radar: {detection_radius:.0f} m"] if detection_radius else []),
+            ]
+        )
+        texts = (hover_text,)
         if detection_radius > 0.0:
             x, y = make_circle_points(center, detection_radius)
             radars.append(
@@ -68,17 +75,6 @@ def threat_circles(threats: Threats, route: Floats | None, failing_threats: froz
             missiles.append(Layer("line", name, "fail" if is_entered else "missile", x, y, quiet=True, legend=legend))
         units.append(Layer("dots", "", "unit", center[:1], center[1:], hover_texts=texts))
     return (*radars, *sections, *missiles, *units)
-
-
-def _describe_threat(name: str, kill_radius: float, detection_radius: float) -> str:
-    """Return the hover text of a threat: its name and the radii of its spheres."""
-    return "\n".join(
-        [
-            name,
-            *([f"missile: {kill_radius:.0f} m"] if kill_radius > 0.0 else []),
-            *([f"radar: {detection_radius:.0f} m"] if detection_radius else []),
-        ]
-    )
 
 
 def make_circle_points(center: Floats, radius: float) -> tuple[Floats, Floats]:

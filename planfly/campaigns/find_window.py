@@ -252,19 +252,18 @@ def fly_departure(
 def _open_departure(base: CampaignBase, time: datetime) -> Departure:
     """Return a departure that is not yet flown; it has scenarios only if the forecast covers its flight."""
     try:
-        scenarios = _member_scenarios(with_flight_time(base.scenario, time.isoformat()))
+        # The scenario once for each member of its forecast, with the wind of that member.
+        scenario = with_flight_time(base.scenario, time.isoformat())
+        forecast = forecast_of_scenario(scenario)
+        scenarios = (
+            (scenario,)
+            if forecast.members == 1
+            else tuple(in_forecast_member(scenario, forecast, member) for member in range(forecast.members))
+        )
         replace(base, scenario=scenarios[0]).nominal_setup()
     except ForecastError as error:
         return Departure(time, not_judged=str(error))
     return Departure(time, scenarios)
-
-
-def _member_scenarios(scenario: Scenario) -> tuple[Scenario, ...]:
-    """Return the scenario once for each member of its forecast, with the wind of that member."""
-    forecast = forecast_of_scenario(scenario)
-    if forecast.members == 1:
-        return (scenario,)
-    return tuple(in_forecast_member(scenario, forecast, member) for member in range(forecast.members))
 
 
 def last_departure(base: CampaignBase, first: datetime) -> datetime:

@@ -58,27 +58,19 @@ def find_marginal_passes(findings: Iterable[Finding], scenario: Scenario, track:
         fraction = max(0.0, finding.margin + (finding.tolerance or 0.0)) / scale
         if fraction < 1.0:
             fractions[key] = min(fraction, fractions.get(key, fraction))
-    for place, distance in _distances_outside_spheres(scenario, track):
+    threats = scenario.threats
+    distances_outside = []
+    if not scenario.external and len(track) >= 2:
+        visits = path_spheres(track.position, track.time, threats.position, threats.kill_radius, threats.kill_scale)
+        distances_outside = [
+            (Place("missile", index, name=table.name or ""), float(visits.closest[index] - threats.kill_radius[index]))
+            for index, table in enumerate(scenario.spec.threats)
+            if threats.kill_radius[index] > 0.0
+        ]
+    for place, distance in distances_outside:
         if ("threat", place) not in failed_keys and distance < SPHERE_SCALE_M:
             fractions["threat", place] = max(0.0, distance) / SPHERE_SCALE_M
     return tuple((rule, place, fraction) for (rule, place), fraction in fractions.items())
-
-
-def _distances_outside_spheres(scenario: Scenario, track: Track) -> list[tuple[Place, float]]:
-    """Return the place of each missile, and the minimum distance of the track from its sphere, m.
-
-    The sphere has the missile's kill radius; distances inside are negative.  Radars have no entry.
-    Return [] for an external mission, or for a track of fewer than two rows.
-    """
-    threats = scenario.threats
-    if scenario.external or len(track) < 2:
-        return []
-    visits = path_spheres(track.position, track.time, threats.position, threats.kill_radius, threats.kill_scale)
-    return [
-        (Place("missile", index, name=table.name or ""), float(visits.closest[index] - threats.kill_radius[index]))
-        for index, table in enumerate(scenario.spec.threats)
-        if threats.kill_radius[index] > 0.0
-    ]
 
 
 # ----------------------------------------------------------------------
@@ -300,6 +292,10 @@ def fly_one(base: CampaignBase, index: int, wind: GivenWind | None = None, log: 
     unjudged = find_unjudged_rules(verdict, varied_flight.setup)
     open_rules = {rule for rule, _ in failed} if verdict.undecided and not verdict.flies else set()
     undecided_text = "; ".join(text for rule, text in unjudged if rule in open_rules)
+    # Smallest distances outside the spheres of the missiles' kill radii, m.
+    distances = (
+        finding.nearest for finding in verdict.findings if finding.rule == "threat" and finding.nearest is not None
+    )
     return FlightRow(
         draw=draw,
         outcome="flyable" if verdict.flies else "undecided" if undecided_text else "not flyable",
@@ -307,7 +303,7 @@ def fly_one(base: CampaignBase, index: int, wind: GivenWind | None = None, log: 
         failed=failed,
         undecided_text=undecided_text,
         margins=find_minimum_margins(verdict.findings),
-        missile_distance=_missile_distance(verdict.findings),
+        missile_distance=min(distances, default=None),
         energy_left=max(0.0, varied_flight.setup.battery - float(track.energy[-1])) if has_rows else None,
         duration=float(track.time[-1]) if has_rows else 0.0,
         clearance=clearance_profile(route, track).tobytes() if has_rows else b"",
@@ -365,12 +361,6 @@ def find_minimum_margins(findings: tuple[Finding, ...]) -> tuple[tuple[str, Mini
         for finding in closest_findings
         if finding and finding.margin is not None
     )
-
-
-def _missile_distance(findings: Iterable[Finding]) -> float | None:
-    """Return the smallest distance of a flight outside the sphere of a missile's kill radius, m; None if unknown."""
-    distances = (finding.nearest for finding in findings if finding.rule == "threat" and finding.nearest is not None)
-    return min(distances, default=None)
 
 
 def make_lost_row(base: CampaignBase, index: int, reason: str) -> FlightRow:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.flight_requests import FlightRequest, FlyOne, code_hash
-from planfly.campaigns.flight_row import OUTCOMES, FlightRow, fly_one
+from planfly.campaigns.flight_row import OUTCOMES, fly_one
 from planfly.campaigns.statistics.decision import Estimate, Estimator, Goal, Tally
 from planfly.campaigns.tables import CAMPAIGN_DATABASE, Store, StoreError, read_stored_settings
 from planfly.campaigns.worker_pool import FlightRate, WorkerPool, Workers, worker_pool
@@ -39,7 +39,9 @@ class _FlightTally:
         """
         self.later_outcomes[index] = outcome
         while not self.is_decided and (next_outcome := self.later_outcomes.pop(self.tally.flown, None)) is not None:
-            self.tally = _add_outcome(self.tally, next_outcome)
+            self.tally = Tally(
+                *(count + (next_outcome == name) for count, name in zip(self.tally, OUTCOMES, strict=True))
+            )
             self.is_decided = self.goal.stops and self.estimator.decides(self.tally)
 
     def next_request(self) -> FlightRequest | None:
@@ -54,11 +56,6 @@ class _FlightTally:
             return None
         self.next_index += 1
         return FlightRequest(self.next_index - 1)
-
-
-def _add_outcome(tally: Tally, outcome: str) -> Tally:
-    """Return a tally with one more flight of an outcome."""
-    return Tally(*(count + (outcome == name) for count, name in zip(tally, OUTCOMES, strict=True)))
 
 
 def resumed_goal(
@@ -140,17 +137,12 @@ def _fly_remaining(pool: WorkerPool, flight_tally: _FlightTally, store: Store, p
     """Fly the missing flights until the goal is decided, and write each to the table."""
     progress.start_timing(flight_tally.tally)
     for _, row in pool.fly(flight_tally.next_request):
-        _store_flight(row, flight_tally, store)
+        store.add(row)
+        flight_tally.add(row.draw.index, row.outcome)
         progress.report(flight_tally.tally)
         if flight_tally.is_decided:
             break
     progress.report(flight_tally.tally, is_last=True)
-
-
-def _store_flight(row: FlightRow, flight_tally: _FlightTally, store: Store) -> None:
-    """Write a flight to the table, and count its outcome."""
-    store.add(row)
-    flight_tally.add(row.draw.index, row.outcome)
 
 
 class _ProgressReport:

@@ -55,6 +55,11 @@ def _unknown_reason(result: GroundRiskResult) -> str:
 def risk_lines(result: GroundRiskResult) -> list[str]:
     """Return the lines below the answer: volumes, population, zones, flights, and limits of the result."""
     flown, formula = result.flown, result.formula
+    glide_text = (
+        ""
+        if result.glide_buffer is None or result.glide_ratio is None
+        else f"; a glide of {result.glide_ratio:.1f} : 1 requires {result.glide_buffer:.0f} m"
+    )
     lines = [
         f"flight geography: {result.half_width:.0f} m to either side of the path, up to {flown.height:.0f} m above"
         f" ground ({_share_text(result)} stay inside)",
@@ -64,7 +69,7 @@ def risk_lines(result: GroundRiskResult) -> list[str]:
         f" {flown.return_distance:.0f} m beyond the flight geography",
         f"ground risk buffer: falls{' and glides' if result.goal.glide else ''} reach {flown.buffer_width:.0f} m"
         f" beyond flights and returns. The 1:1 rule requires a width of {result.one_to_one_buffer:.0f}"
-        f" m{_glide_text(result)}",
+        f" m{glide_text}",
         f"areas: operational volume {result.volume.area / 1e6:.2f} km², operational volume and ground risk buffer"
         f" {result.footprint.area / 1e6:.2f} km²",
     ]
@@ -79,13 +84,6 @@ def risk_lines(result: GroundRiskResult) -> list[str]:
 def _share_text(result: GroundRiskResult) -> str:
     """Return a text on the fraction of the flights that stay in the flight geography."""
     return f"{result.goal.probability:.0%} of {count_text(len(result.rows), 'flight')}"
-
-
-def _glide_text(result: GroundRiskResult) -> str:
-    """Return a text on the buffer by a glide, if it was requested."""
-    if result.glide_buffer is None or result.glide_ratio is None:
-        return ""
-    return f"; a glide of {result.glide_ratio:.1f} : 1 requires {result.glide_buffer:.0f} m"
 
 
 def _population_line(population: Population) -> str:
@@ -242,11 +240,6 @@ def _class_rows(result: GroundRiskResult) -> list[tuple[str, str, str]]:
     if not result.is_judged:
         return [*rows, ("class", "not judged", _unknown_reason(result))]
     class_text = "not part of SORA" if result.ground_class is None else str(result.ground_class)
-    return [*rows, ("**class**", f"**{class_text}**", _row_and_column_text(result))]
-
-
-def _row_and_column_text(result: GroundRiskResult) -> str:
-    """Return the row and the column of the class in SORA's table."""
     row = "controlled ground area"
     if not result.goal.controlled and result.population is not None:
         limits = [*(f"below {limit:,.0f}" for limit in DENSITY_LIMITS_PER_KM2), "from 50,000"]
@@ -259,4 +252,4 @@ def _row_and_column_text(result: GroundRiskResult) -> str:
         ),
         "beyond the last column",
     )
-    return f"{row}; {column}"
+    return [*rows, ("**class**", f"**{class_text}**", f"{row}; {column}")]

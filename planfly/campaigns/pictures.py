@@ -348,7 +348,9 @@ def draw_crossings(crossings: Floats, has_failed: NDArray[np.bool_]) -> Figure:
                 *points[is_reached & ~has_failed].T, ".", color=PLANNED, markersize=2.6, alpha=0.8, rasterized=True
             )
             axes.plot(*points[is_reached & has_failed].T, "x", color=FAIL, markersize=3.5)
-            half_size = _panel_half_size(points)
+            # The panel contains 99.5 % of the distances.
+            distances = np.abs(points[np.isfinite(points)])
+            half_size = max(5.0, 1.1 * float(np.quantile(distances, 0.995))) if distances.size else 10.0
             if is_reached.sum() > 2:
                 ellipse = covariance_ellipse(points[is_reached])
                 # The ellipse's extents are in metres until it is added to axes.
@@ -380,12 +382,6 @@ def covariance_ellipse(points: Floats) -> Ellipse:
     return Ellipse(
         (right, height), major_axis, minor_axis, angle=angle, fill=False, edgecolor=INK_COLOUR, linewidth=0.9
     )
-
-
-def _panel_half_size(crossings: Floats) -> float:
-    """Return the half size of a panel, m, that contains 99.5 % of the distances; 10 without crossings."""
-    distances = np.abs(crossings[np.isfinite(crossings)])
-    return max(5.0, 1.1 * float(np.quantile(distances, 0.995))) if distances.size else 10.0
 
 
 # ----------------------------------------------------------------------

@@ -561,36 +561,6 @@ def _lines_without_failures(winds: WindsResult) -> list[str]:
     ]
 
 
-def _calm_lines(winds: WindsResult) -> list[str]:
-    """Return lines about the rules that fail in calm air, or in the weakest wind flown.
-
-    Return [] if no flight fails there.
-    """
-    calm = winds.calm
-    if calm is None or not calm.failed_count:
-        return []
-    wind = "calm air" if calm.speed < CALM_MPS else f"{calm.speed:.1f} m/s, the weakest wind flown"
-    return [
-        f"in {wind}, {calm.failed_count} of {count_text(calm.flights, 'flight')} fail",
-        *failure_lines(calm.by_rule),
-    ]
-
-
-def _failing_lines(winds: WindsResult) -> list[str]:
-    """Return a line for each direction in which every flight fails and the boundary is not judged."""
-    lines = []
-    for direction, undecided_count in zip(chart_directions(winds), winds.undecided_counts(), strict=True):
-        has_passed = any(flyable for _, _, flyable in direction.flights)
-        if direction.is_judged or undecided_count or has_passed or not direction.flights:
-            continue
-        speed, count, _ = direction.flights[0]
-        lines.append(
-            f"wind from {direction.from_deg:g}°: all {count_text(count, 'flight')} in {speed:.1f} m/s, the weakest wind"
-            f" flown, fail; the boundary is below {speed:.1f} m/s and is not judged"
-        )
-    return lines
-
-
 def _boundary_lines(winds: WindsResult) -> list[str]:
     """Return one line with the lowest and the highest boundary of a search for winds; [] if none is stated."""
     directions = [
@@ -633,10 +603,29 @@ def wind_lines(winds: WindsResult) -> list[str]:
         flights_text += " in calm air only, because none of them is flyable"
     elif any(winds.estimated):
         flights_text += f"; intervals at {percent}, from the flights in each direction"
+    # A line for each direction in which every flight fails and whose boundary is not judged.
+    failing_lines = []
+    for direction, undecided_count in zip(chart_directions(winds), winds.undecided_counts(), strict=True):
+        has_passed = any(flyable for _, _, flyable in direction.flights)
+        if direction.is_judged or undecided_count or has_passed or not direction.flights:
+            continue
+        speed, count, _ = direction.flights[0]
+        failing_lines.append(
+            f"wind from {direction.from_deg:g}°: all {count_text(count, 'flight')} in {speed:.1f} m/s, the weakest wind"
+            f" flown, fail; the boundary is below {speed:.1f} m/s and is not judged"
+        )
+    calm = winds.calm
+    calm_lines = []
+    if calm is not None and calm.failed_count:
+        wind = "calm air" if calm.speed < CALM_MPS else f"{calm.speed:.1f} m/s, the weakest wind flown"
+        calm_lines = [
+            f"in {wind}, {calm.failed_count} of {count_text(calm.flights, 'flight')} fail",
+            *failure_lines(calm.by_rule),
+        ]
     return [
         *answer_lines,
-        *_calm_lines(winds),
-        *_failing_lines(winds),
+        *calm_lines,
+        *failing_lines,
         *(() if winds.conditions is None else flown_lines(winds.conditions)),
         *_deciding_lines(winds),
         *_lines_without_failures(winds),

@@ -174,7 +174,14 @@ def summarise_campaign(base: CampaignBase, goal: Goal, estimate: Estimate, store
     """Summarise a campaign in one pass through its table."""
     by_rule = count_failures(store.failures())
     worst_rows = tuple(store.worst_flights(WORST_FLIGHT_COUNT))
-    margins = _read_margins(store)
+    # Margin of each flight by rule: NaN if the rule was not judged, -inf if the flight failed the rule by an
+    # unknown margin.
+    failed_rules = [{rule for rule, _ in failures} for failures in store.failures()]
+    margins = {}
+    for rule, words in RULE_WORDS.items():
+        has_failed = np.array([rule in failed for failed in failed_rules], dtype=bool)
+        known_margins = store.column(words.margin_column)
+        margins[rule] = np.where(has_failed & ~(known_margins < 0.0), -np.inf, known_margins)
     is_undecided = estimate.answer == "undecided" and estimate.tally.flown > 0
     return CampaignSummary(
         name=base.name,
@@ -208,20 +215,6 @@ def _mission_fault(base: CampaignBase) -> str:
     """Return the reason why a mission fails as a whole in nominal conditions; "" if it does not."""
     findings = mission_findings(base.nominal_setup())
     return next((finding.reason for finding in findings if finding.ok is False and finding.place.item is None), "")
-
-
-def _read_margins(store: Store) -> dict[str, Floats]:
-    """Return the minimum margin of each rule in each flight, (n,), keyed by rule.
-
-    NaN if the rule was not judged, -inf if the flight failed the rule by an unknown margin.
-    """
-    failed_rules = [{rule for rule, _ in failures} for failures in store.failures()]
-    margins = {}
-    for rule, words in RULE_WORDS.items():
-        has_failed = np.array([rule in failed for failed in failed_rules], dtype=bool)
-        known_margins = store.column(words.margin_column)
-        margins[rule] = np.where(has_failed & ~(known_margins < 0.0), -np.inf, known_margins)
-    return margins
 
 
 def _margin_quantile(margins: Floats) -> float | None:
@@ -297,7 +290,7 @@ def _rule_sensitivities(base: CampaignBase, store: Store, margins: Floats) -> tu
     A failed flight with an unknown margin gets the smallest known margin, but at most zero.  The result is empty for
     fewer than `MIN_FLIGHTS_FOR_INDEX` flights with a margin.
 
-    margins: margin of each flight, (n,), see `_read_margins`.
+    margins: margin of each flight, (n,): NaN if not judged, -inf if the flight failed by an unknown margin.
     """
     is_judged = ~np.isnan(margins)
     if np.count_nonzero(is_judged) < MIN_FLIGHTS_FOR_INDEX:
@@ -449,8 +442,16 @@ def campaign_lines(summary: CampaignSummary) -> list[str]:
     """Return the lines of the summary for a terminal."""
     estimate, goal = summary.estimate, summary.goal
     tally, confidence_text = estimate.tally, f"{100.0 * goal.confidence:g} %"
+    share_text = (
+        f"P = {tally.share:.4f}"
+        if not tally.undecided
+        else f"P from {tally.share:.4f} to {(tally.flyable + tally.undecided) / tally.flown:.4f}"
+    )
+    target = summary.goal.target
+    texts = {"reached": f"P >= {target}", "missed": f"P < {target}", "undecided": f"P >= {target} is undecided"}
+    answer_text = texts.get(summary.estimate.answer, "no target is set (--prove P or --at-least P)")
     lines = [
-        f"{_answer_text(summary)}: {_flyable_text(tally)}, {_share_text(tally)}"
+        f"{answer_text}: {_flyable_text(tally)}, {share_text}"
         + ("; return not judged" if summary.unjudged_return else ""),
         f"  P at least {estimate.lower:.4f}, at most {estimate.upper:.4f} (each at {confidence_text}; {goal.method})",
         f"  two-sided interval of P at {confidence_text}: {estimate.interval.low:.4f} to {estimate.interval.high:.4f}",
@@ -531,20 +532,6 @@ def _flyable_text(tally: Tally) -> str:
     """Return the number of flyable flights as text, such as "1 of 4 flights is flyable"."""
     text = f"{tally.flyable} of {count_text(tally.flown, 'flight')} {'is' if tally.flyable == 1 else 'are'} flyable"
     return f"{text}, {tally.undecided} not judged in full" if tally.undecided else text
-
-
-def _share_text(tally: Tally) -> str:
-    """Return the fraction of flyable flights as text; with undecided flights, its minimum and maximum."""
-    if not tally.undecided:
-        return f"P = {tally.share:.4f}"
-    return f"P from {tally.share:.4f} to {(tally.flyable + tally.undecided) / tally.flown:.4f}"
-
-
-def _answer_text(summary: CampaignSummary) -> str:
-    """Return the answer to the goal as text, such as "P >= 0.99 is undecided"."""
-    target = summary.goal.target
-    texts = {"reached": f"P >= {target}", "missed": f"P < {target}", "undecided": f"P >= {target} is undecided"}
-    return texts.get(summary.estimate.answer, "no target is set (--prove P or --at-least P)")
 
 
 def _drivers_text(entry: DecidingRule) -> str:

@@ -103,10 +103,12 @@ def examine_table(
     undamaged, damaged = _check_rows(rows)[:2]
     # In a broken file, a missing row may have been lost with its page.  A number without a valid checksum is accepted
     # if it is in the range of requested flights, which are numbered from 0.
+    readable_numbers: list[Any] = []
+    with contextlib.suppress(sqlite3.Error):
+        for (number,) in connection.execute("SELECT flight FROM flights"):
+            readable_numbers.append(number)
     numbers = (
-        number
-        for number in (*damaged, *_readable_numbers(connection))
-        if isinstance(number, int) and number < requested_count
+        number for number in (*damaged, *readable_numbers) if isinstance(number, int) and number < requested_count
     )
     last_number = max([-1, *undamaged, *numbers])
     missing = set(range(last_number + 1)) - set(undamaged)
@@ -116,15 +118,6 @@ def examine_table(
         is_sound=False,
         last_known=last_number if last_number + 1 < requested_count else None,
     )
-
-
-def _readable_numbers(connection: sqlite3.Connection) -> list[Any]:
-    """Return the flight numbers that can be read up to the damaged part of the file; some may be corrupt."""
-    numbers: list[Any] = []
-    with contextlib.suppress(sqlite3.Error):
-        for (number,) in connection.execute("SELECT flight FROM flights"):
-            numbers.append(number)
-    return numbers
 
 
 def _check_rows(rows: Iterable[tuple[Any, ...]]) -> Examination:

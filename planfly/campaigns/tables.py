@@ -250,8 +250,18 @@ class LockedTable:
         """Rewrite the file with the undamaged flights, and report the damaged flights."""
         # A search may have been resumed with fewer flights than the table contains; all of them are kept.
         requested_count = json.loads(stored_settings["settings"]).get("flights", _MAX_FLIGHTS)
+        # Largest flight number that can be read from either end of a damaged table; -1 without any.
+        last_number = -1
+        for order in ("", " DESC"):
+            with suppress(sqlite3.Error, UnicodeDecodeError):
+                for (number,) in self._connection.execute(f"SELECT flight FROM flights ORDER BY flight{order}"):
+                    # A damaged page may contain any number.
+                    if isinstance(number, int) and number < _MAX_FLIGHTS:
+                        last_number = max(last_number, number)
+                        if order:
+                            break
         examination = examine_table(
-            self._connection, tuple(self._kind.columns), requested_count, max(requested_count, self._last_number() + 1)
+            self._connection, tuple(self._kind.columns), requested_count, max(requested_count, last_number + 1)
         )
         if examination.is_sound and not examination.damaged:
             return
@@ -266,19 +276,6 @@ class LockedTable:
         self._connection = sqlite3.connect(self.path, timeout=1.0, isolation_level=None)
         self._lock_file()
         report_line(f"{self.path}: {examination.describe()}")
-
-    def _last_number(self) -> int:
-        """Return the largest flight number that can be read from either end of a damaged table; -1 without any."""
-        last_number = -1
-        for order in ("", " DESC"):
-            with suppress(sqlite3.Error, UnicodeDecodeError):
-                for (number,) in self._connection.execute(f"SELECT flight FROM flights ORDER BY flight{order}"):
-                    # A damaged page may contain any number.
-                    if isinstance(number, int) and number < _MAX_FLIGHTS:
-                        last_number = max(last_number, number)
-                        if order:
-                            break
-        return last_number
 
     def _check_flight_count(self, settings: Mapping[str, Any]) -> None:
         """Raise StoreError if the table contains more flights than requested.

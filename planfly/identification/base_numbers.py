@@ -55,8 +55,13 @@ def base_model(aircraft: Aircraft) -> BaseModel:
     (5.61, -0.99, 0.043)
     """
     probe, motor = _Probe(aircraft), read_motor(aircraft)
+    # Models of flying wings leave out the reaction to propeller torque. It is assumed for a model that cannot be
+    # parsed.
+    root = _parse_model(aircraft)
+    reactions = None if root is None else root.find("external_reactions")
     return probe.base_model(
-        probe.motor_table() if motor is None else motor, has_torque_reaction=_has_torque_reaction(aircraft)
+        probe.motor_table() if motor is None else motor,
+        has_torque_reaction=reactions is None or reactions.find("moment") is not None,
     )
 
 
@@ -229,16 +234,6 @@ def is_flying_wing(aircraft: Aircraft) -> bool:
     """Return True if a model has elevons, which it mixes from elevator and aileron."""
     root = _parse_model(aircraft)
     return root is not None and any(actuator.get("name") == "elevon/left-rad" for actuator in root.iter("actuator"))
-
-
-def _has_torque_reaction(aircraft: Aircraft) -> bool:
-    """Return True if a model includes the reaction to propeller torque, or cannot be parsed.
-
-    Models of flying wings leave out this reaction.
-    """
-    root = _parse_model(aircraft)
-    reactions = None if root is None else root.find("external_reactions")
-    return reactions is None or reactions.find("moment") is not None
 
 
 def _parse_model(aircraft: Aircraft) -> ElementTree.Element | None:

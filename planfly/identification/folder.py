@@ -340,7 +340,9 @@ def format_posterior(identified: Identified) -> str:
         "]",
     ]
     for log in identified.logs:
-        lines += ["", "[[log]]", f'file = "{_make_toml_safe(Path(log.source).name)}"', f'sha256 = "{log.sha256}"']
+        # Without backslashes and double quotes, the name needs no escapes in a TOML string.
+        file_name = Path(log.source).name.replace("\\", "/").replace('"', "'")
+        lines += ["", "[[log]]", f'file = "{file_name}"', f'sha256 = "{log.sha256}"']
         end = log.span[1] if identified.until is None else min(identified.until, log.span[1])
         lines += [f"from_s = {log.span[0]:.9g}  # earlier rows were not used"] if math.isfinite(log.span[0]) else []
         lines += [f"until_s = {end:.9g}  # later rows were not used"] if math.isfinite(end) else []
@@ -379,8 +381,3 @@ def _format_quantity(name: str, unit: str, numbers: tuple[float, float, float, f
         f"of_log = {log_share:.3f}  # fraction of the prior variance that the logs removed",
         f'reason = "{reason}"',
     ]
-
-
-def _make_toml_safe(text: str) -> str:
-    """Replace backslashes and double quotes, so that the text needs no escapes in a TOML string."""
-    return text.replace("\\", "/").replace('"', "'")

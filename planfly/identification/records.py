@@ -260,7 +260,9 @@ def _check_usable(log: MotionLog) -> None:
         raise LogError(message, file=log.source, field="airspeed")
     for number, function in _read_servo_functions(log).items():
         if function in _FLAPS:
-            min_pulse, max_pulse = _find_pulse_range(log, number)
+            pulses = log.outputs.values[:, number - 1]
+            pulses = pulses[pulses > 0.0]
+            min_pulse, max_pulse = (float(pulses.min()), float(pulses.max())) if len(pulses) else (0.0, 0.0)
             # A flap moves if its pulses differ by more than 20 us.
             if max_pulse - min_pulse > 20.0:
                 message = f"output {number} (SERVO{number}_FUNCTION {function}, {_FLAPS[function]}) moves in flight"
@@ -289,13 +291,6 @@ def _describe_recording(log: MotionLog) -> str:
         return f"{describe_recording_setting(log)}, the default set at a high rate, records them (PX4 1.14 or later)"
     mask = log.parameters.get("LOG_BITMASK")
     return f"{describe_recording_setting(log)} records them{'' if mask is None else f' (the log has {mask:.0f})'}"
-
-
-def _find_pulse_range(log: MotionLog, number: int) -> tuple[float, float]:
-    """Return the shortest and the longest pulse of an output in the log, us, or zeros without pulses."""
-    pulses = log.outputs.values[:, number - 1]
-    pulses = pulses[pulses > 0.0]
-    return (float(pulses.min()), float(pulses.max())) if len(pulses) else (0.0, 0.0)
 
 
 def _read_servo_functions(log: MotionLog) -> dict[int, int]:

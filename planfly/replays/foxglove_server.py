@@ -60,7 +60,11 @@ def play_to_foxglove(
         exit_stack.callback(server.stop)
         on_message(f"foxglove  ws://{HOST}:{gate.port} (Open connection, Foxglove WebSocket; {SUBPROTOCOL})")
         messages = broadcast.record_scenes_until(log_messages(file), round(start * 1e9) + EPOCH_NS)
-        _wait_for_listener(broadcast, wait, should_stop)
+        clock = RunningClock()
+        while not broadcast.listeners and not should_stop():
+            if wait is not None and clock() > wait:
+                raise FlightError.of_argument("foxglove", wait, f"no viewer has subscribed within {wait:g} s", shown="")
+            time.sleep(_POLL_INTERVAL_S)
         _play_messages(broadcast, server, messages, round(end * 1e9) + EPOCH_NS, speed, should_stop)
 
 
@@ -85,20 +89,6 @@ def _start_server(foxglove: Any, name: str, broadcast: "_Broadcast", gate: Origi
         raise OSError(0, str(error), HOST) from error
     gate.start_forwarding(server.port, certificate)
     return server
-
-
-def _wait_for_listener(broadcast: "_Broadcast", timeout: float | None, should_stop: ShouldStop) -> None:
-    """Wait for the first subscriber, or until `should_stop` returns True.
-
-    Raises FlightError after `timeout` seconds; None waits without limit.
-    """
-    clock = RunningClock()
-    while not broadcast.listeners and not should_stop():
-        if timeout is not None and clock() > timeout:
-            raise FlightError.of_argument(
-                "foxglove", timeout, f"no viewer has subscribed within {timeout:g} s", shown=""
-            )
-        time.sleep(_POLL_INTERVAL_S)
 
 
 def _play_messages(

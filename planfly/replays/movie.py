@@ -57,7 +57,16 @@ def write_movie(
         allowed = f"{len(film):,} frames: at most {_MAX_FRAMES:,} are allowed; raise `speed`"
         raise PlanflyError.of_argument("movie", len(film), allowed, shown="", file=target)
     if not kind:
-        return _write_frame_files(target, film)
+        target.mkdir(parents=True, exist_ok=True)
+        for old_file in target.glob("frame-[0-9][0-9][0-9][0-9].png"):
+            old_file.unlink()
+        files = []
+        for number, image in enumerate(_yield_frames(film)):
+            data = io.BytesIO()
+            image.save(data, "PNG")
+            files.append(target / f"frame-{number:04d}.png")
+            write_atomically(files[-1], data.getvalue())
+        return files
     write_atomically(target, _encode_gif(film) if kind == ".gif" else _encode_mp4(film, program))
     return [target]
 
@@ -68,20 +77,6 @@ def _yield_frames(film: MovieFrames) -> Iterator[Image.Image]:
         for number, frame in enumerate(film.frames(), 1):
             yield Image.fromarray(frame)
             advance(number, len(film), f"frame {number} of {len(film)}")
-
-
-def _write_frame_files(folder: Path, film: MovieFrames) -> list[Path]:
-    """Write each frame to a file, after removing old frames, and return the files."""
-    folder.mkdir(parents=True, exist_ok=True)
-    for old_file in folder.glob("frame-[0-9][0-9][0-9][0-9].png"):
-        old_file.unlink()
-    files = []
-    for number, image in enumerate(_yield_frames(film)):
-        data = io.BytesIO()
-        image.save(data, "PNG")
-        files.append(folder / f"frame-{number:04d}.png")
-        write_atomically(files[-1], data.getvalue())
-    return files
 
 
 def _make_palette(frame: Image.Image) -> Image.Image:

@@ -43,7 +43,20 @@ def geopackage_features(path: Path, source: str) -> Iterator[tuple[str, dict[str
                     location = f"{table} row {number}"
                     columns = dict(zip(names, row, strict=True))
                     shape = _read_shape(columns.pop(column, None), code, f"{source}: {location}")
-                    yield location, {"type": "Feature", "properties": _plain_columns(columns), "geometry": shape}
+                    # Only text and numbers; a column "identifier" or "title" is also added under the key
+                    # "name".
+                    plain = {key: value for key, value in columns.items() if isinstance(value, str | int | float)}
+                    name = next(
+                        (value for key, value in plain.items() if key.lower() in ("name", "identifier", "title")), None
+                    )
+                    yield (
+                        location,
+                        {
+                            "type": "Feature",
+                            "properties": plain if name is None else plain | {"name": str(name)},
+                            "geometry": shape,
+                        },
+                    )
     except sqlite3.Error as error:
         raise ScenarioError(f"{source}: cannot be read as a GeoPackage: {error}", file=source) from error
 
@@ -59,16 +72,6 @@ def _crs_definition(database: sqlite3.Connection, system: int) -> str:
     if str(organization).upper() == "EPSG":
         return "" if number == _WGS84_CODE else f"EPSG:{number}"
     return str(definition)
-
-
-def _plain_columns(columns: dict[str, Any]) -> dict[str, Any]:
-    """Return the columns whose values are text or numbers.
-
-    The value of a column "name", "identifier" or "title" is also added under the key "name".
-    """
-    plain = {key: value for key, value in columns.items() if isinstance(value, str | int | float)}
-    name = next((value for key, value in plain.items() if key.lower() in ("name", "identifier", "title")), None)
-    return plain if name is None else plain | {"name": str(name)}
 
 
 def _read_shape(blob: Any, code: str, source: str) -> dict[str, Any]:
@@ -94,11 +97,6 @@ def _read_shape(blob: Any, code: str, source: str) -> dict[str, Any]:
         to_degrees = partial(transformer.transform, direction="INVERSE")
         shape = shapely.transform(shape, lambda xy: np.column_stack(transform_points(to_degrees, xy[:, 0], xy[:, 1])))
     geometry: dict[str, Any] = shapely.geometry.mapping(shape)
-    return _tuples_to_lists(geometry)
-
-
-def _tuples_to_lists(geometry: dict[str, Any]) -> dict[str, Any]:
-    """Convert the tuples in a geometry of shapely to lists, as JSON has them."""
 
     def to_lists(value: Any) -> Any:
         """Return a value in which all tuples, at any depth, are lists."""

@@ -51,7 +51,14 @@ def geojson_zones(text: str, source: str) -> Iterator[Found]:
     if is_ed269(data):
         yield from ed269_zones(data, source)
         return
-    _check_crs(data, source)
+    crs = data.get("crs")
+    if crs is not None:
+        properties = crs.get("properties") if isinstance(crs, dict) else None
+        name = properties.get("name") if isinstance(properties, dict) else None
+        if not (isinstance(name, str) and name.endswith(_WGS84_CRS_SUFFIXES)):
+            raise ScenarioError(
+                f"{source}: crs: coordinates are longitude and latitude on WGS84 (RFC 7946)", file=source, field="crs"
+            )
     geojson_type = data.get("type")
     if geojson_type == "FeatureCollection":
         features = data.get("features")
@@ -75,19 +82,6 @@ def geojson_zones(text: str, source: str) -> Iterator[Found]:
 def _reject_constant(name: str) -> float:
     """Raise ValueError for NaN or Infinity, which Python's JSON reader accepts."""
     raise ValueError(f"{name} is not a JSON number")
-
-
-def _check_crs(data: dict[str, Any], source: str) -> None:
-    """Raise ScenarioError unless the coordinates are longitude and latitude."""
-    crs = data.get("crs")
-    if crs is None:
-        return
-    properties = crs.get("properties") if isinstance(crs, dict) else None
-    name = properties.get("name") if isinstance(properties, dict) else None
-    if not (isinstance(name, str) and name.endswith(_WGS84_CRS_SUFFIXES)):
-        raise ScenarioError(
-            f"{source}: crs: coordinates are longitude and latitude on WGS84 (RFC 7946)", file=source, field="crs"
-        )
 
 
 def _geojson_zone(feature: Any, location: str, index: int, source: str) -> tuple[str, dict[str, Any]]:
@@ -120,7 +114,7 @@ def _geojson_zone(feature: Any, location: str, index: int, source: str) -> tuple
         if geometry_type == "Polygon":
             coordinates, geometry_type = [coordinates], "MultiPolygon"
         if geometry_type == "MultiPolygon":
-            parts = [_parse_rings(part) for part in coordinates]
+            parts = [[[_parse_corner(corner) for corner in ring] for ring in part] for part in coordinates]
             _check_holes(parts, f"{source}: {label}")
             rings = [[list(corner) for corner in ring] for part in parts for ring in part]
             return label, entries | {"rings_deg": rings}
@@ -145,11 +139,6 @@ def _check_holes(parts: list[list[list[tuple[float, float]]]], source: str) -> N
     if not is_inside:
         message = f"{source}: coordinates: a hole lies outside its outline"
         raise ScenarioError(message, file=source, field="coordinates")
-
-
-def _parse_rings(coordinates: Any) -> list[list[tuple[float, float]]]:
-    """Convert a polygon's coordinates to rings of (latitude, longitude)."""
-    return [[_parse_corner(corner) for corner in ring] for ring in coordinates]
 
 
 def _parse_corner(coordinates: Any) -> tuple[float, float]:

@@ -74,26 +74,7 @@ def zone_records(zones: Sequence[Zone]) -> ZoneRecords:
             rings += shape.rings
             edge_count += sum(map(len, shape.rings))
         record.last_edge = edge_count
-    edges = _make_edges(rings)
-    _set_boxes(records, edges)
-    for array in (records, edges):
-        array.setflags(write=False)
-    return ZoneRecords(records, edges)
-
-
-def _set_boxes(zones: Records, edges: Records) -> None:
-    """Set the bounding boxes of all polygons, from their edges; the boxes of cylinders are unchanged."""
-    polygons = np.flatnonzero(~zones["round"])
-    if polygons.size:
-        # Every polygon has edges, and the edges of a polygon are consecutive.
-        starts = zones["first_edge"][polygons]
-        for min_name, max_name, coordinate in (("west", "east", "east"), ("south", "north", "north")):
-            zones[min_name][polygons] = np.minimum.reduceat(edges[coordinate], starts)
-            zones[max_name][polygons] = np.maximum.reduceat(edges[coordinate], starts)
-
-
-def _make_edges(rings: list[Ring]) -> Records:
-    """Make (e,) of `EDGE` from every corner of the rings to the next corner of its ring."""
+    # Edges from every corner to the next corner of its ring.
     corners = np.array([corner for ring in rings for corner in ring], dtype=np.float64).reshape(-1, 2)
     next_corners = np.roll(corners, -1, axis=0)
     sizes = np.array([len(ring) for ring in rings], dtype=np.int64)
@@ -102,7 +83,17 @@ def _make_edges(rings: list[Ring]) -> Records:
     edges: Records = np.zeros(len(corners), EDGE)
     edges["east"], edges["north"] = corners.T
     edges["to_east"], edges["to_north"] = next_corners.T
-    return edges
+    # Bounding boxes of the polygons; the boxes of cylinders are set above.
+    polygons = np.flatnonzero(~records["round"])
+    if polygons.size:
+        # Every polygon has edges, and the edges of a polygon are consecutive.
+        starts = records["first_edge"][polygons]
+        for min_name, max_name, coordinate in (("west", "east", "east"), ("south", "north", "north")):
+            records[min_name][polygons] = np.minimum.reduceat(edges[coordinate], starts)
+            records[max_name][polygons] = np.maximum.reduceat(edges[coordinate], starts)
+    for array in (records, edges):
+        array.setflags(write=False)
+    return ZoneRecords(records, edges)
 
 
 def _level_record(level: ZoneLevel | None, default_height: float) -> tuple[float, bool]:

@@ -101,7 +101,11 @@ def make_polygon(rings: Sequence[Sequence[tuple[float, float]]]) -> Polygon:
     shapes = [shapely.Polygon(ring) for ring in clean_rings]
     for shape in shapes:
         if not shape.is_valid:
-            raise ValueError(f"crosses or touches itself ({_fault_text(shape)})")
+            # Shapely's reason, and its position on the map, m.
+            reason, _, position = shapely.is_valid_reason(shape).rstrip("]").partition("[")
+            coordinates = [f"{float(value):.1f} m" for value in position.split()]
+            fault = f"{reason} at east {coordinates[0]}, north {coordinates[1]}" if len(coordinates) >= 2 else reason
+            raise ValueError(f"crosses or touches itself ({fault})")
     if len(shapes) == 1:
         _check_area(shapes[0].area)
         return Polygon((clean_rings[0] if shapes[0].exterior.is_ccw else clean_rings[0][::-1],))
@@ -113,13 +117,6 @@ def make_polygon(rings: Sequence[Sequence[tuple[float, float]]]) -> Polygon:
     depths = [len(tree.query(shape, predicate="within")) - 1 for shape in shapes]
     _check_area(sum(shape.area * (1 if depth % 2 == 0 else -1) for shape, depth in zip(shapes, depths, strict=True)))
     return Polygon(tuple(_orient_ring(ring, depth) for ring, depth in zip(clean_rings, depths, strict=True)))
-
-
-def _fault_text(shape: shapely.Polygon) -> str:
-    """Describe the fault of an invalid polygon: shapely's reason, and its position on the map, m."""
-    reason, _, position = shapely.is_valid_reason(shape).rstrip("]").partition("[")
-    coordinates = [f"{float(value):.1f} m" for value in position.split()]
-    return f"{reason} at east {coordinates[0]}, north {coordinates[1]}" if len(coordinates) >= 2 else reason
 
 
 def _check_area(area: float) -> None:

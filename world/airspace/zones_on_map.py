@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from world.airspace.zone_kernels import ZoneRecords, edge_distance, height_outside_band, zone_records
-from world.airspace.zones import Cylinder, Polygon, Ring, Zone, ZoneLevel, is_hole, make_cylinder, make_polygon
+from world.airspace.zones import Cylinder, Polygon, Zone, ZoneLevel, is_hole, make_cylinder, make_polygon
 from world.arrays import Floats
 from world.errors import ScenarioError
 from world.frames import GeoOrigin, to_map
@@ -127,26 +127,19 @@ def select_near_zones(tables: Sequence[ZoneTable], source: str, origin: GeoOrigi
             zones_nearby.append(table)
             continue
         try:
-            _check_rings(table)
+            # For speed, degrees are multiplied by a constant length instead of projected on the map.
+            rings = table.rings_deg if table.polygon_deg is None else [table.polygon_deg]
+            if rings and rings[0]:
+                centre_longitude = rings[0][0][1]
+                centred_rings = [
+                    [(lat, (lon - centre_longitude + 180.0) % 360.0 - 180.0) for lat, lon in ring] for ring in rings
+                ]
+                make_polygon(
+                    [[(lon * _DEGREE_LENGTH_M, lat * _DEGREE_LENGTH_M) for lat, lon in ring] for ring in centred_rings]
+                )
         except ValueError as error:
             raise ScenarioError(f"{source}: zones[{k}] ({table.name}): {error}", file=source, field="zones") from error
     return zones_nearby
-
-
-def _check_rings(table: ZoneTable) -> None:
-    """Raise ValueError if a zone that is stated in degrees is not a valid polygon.
-
-    For speed, degrees are multiplied by a constant length instead of projected on the map.
-    """
-    rings = table.rings_deg if table.polygon_deg is None else [table.polygon_deg]
-    if rings and rings[0]:
-        centre_longitude = rings[0][0][1]
-        centred_rings = [
-            [(lat, (lon - centre_longitude + 180.0) % 360.0 - 180.0) for lat, lon in ring] for ring in rings
-        ]
-        make_polygon(
-            [[(lon * _DEGREE_LENGTH_M, lat * _DEGREE_LENGTH_M) for lat, lon in ring] for ring in centred_rings]
-        )
 
 
 def _is_near_area(table: ZoneTable, origin: GeoOrigin, bounds: Floats) -> bool:
@@ -273,18 +266,19 @@ def zone_parts(zone: Zone) -> list[tuple[Floats, ...]]:
     rings = list(zip(zone_rings(zone), map(is_hole, zone.shape.rings), strict=True))
     # Smallest first: a hole belongs to the smallest outline around it.
     outlines = sorted((ring for ring, is_ring_hole in rings if not is_ring_hole), key=_doubled_ring_area)
-    shapes = zone_records([Zone("", "exclusion", Polygon((_open_ring(ring),))) for ring in outlines])
+    # The last corner of a closed ring repeats the first.
+    shapes = zone_records(
+        [
+            Zone("", "exclusion", Polygon((tuple((east, north) for east, north in ring[:-1].tolist()),)))
+            for ring in outlines
+        ]
+    )
     parts: list[list[Floats]] = [[ring] for ring in outlines]
     for ring, is_ring_hole in rings:
         if is_ring_hole:
             enclosing_outlines = (k for k in range(len(outlines)) if edge_distance(shapes, k, *ring[0]) <= 0.0)
             parts[next(enclosing_outlines)].append(ring)
     return [tuple(part) for part in parts]
-
-
-def _open_ring(ring: Floats) -> Ring:
-    """Return a closed ring without its last corner, which repeats the first."""
-    return tuple((east, north) for east, north in ring[:-1].tolist())
 
 
 def _doubled_ring_area(ring: Floats) -> float:

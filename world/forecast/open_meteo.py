@@ -2,7 +2,7 @@
 
 import json
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from datetime import datetime, timedelta, timezone
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -111,14 +111,34 @@ def _read_place(path: Path, entry: dict[str, Any], ground_amsl: float) -> _Place
     latitude = _number(path, entry, "latitude", -90.0, 90.0)
     longitude = _number(path, entry, "longitude", -180.0, 360.0)
     ground = _number(path, entry, "elevation", -500.0, 9000.0) if "elevation" in entry else ground_amsl
-    times = _read_times(path, hourly, units, entry)
+    # Times of the hourly variables, s since 1970 in UTC.
+    values = hourly.get("time")
+    if not isinstance(values, list) or not values:
+        raise _fault(path, "hourly.time", "missing: a list of times is needed")
+    try:
+        if units.get("time") == "unixtime":
+            times = np.array([float(value) for value in values])
+        else:
+            zone = timezone(timedelta(seconds=_number(path, entry, "utc_offset_seconds", -86_399.0, 86_399.0, 0.0)))
+            read_times = [datetime.fromisoformat(value) for value in values]
+            times = np.array([(time if time.tzinfo else time.replace(tzinfo=zone)).timestamp() for time in read_times])
+    except (TypeError, ValueError, OverflowError, AttributeError):
+        raise _fault(path, "hourly.time", "allowed ISO 8601 times, or unixtime") from None
+    if not np.isfinite(times).all() or (np.diff(times) <= 0.0).any():
+        raise _fault(path, "hourly.time", "the times are not in ascending order")
     all_levels = [_find_level(path, hourly, match) for name in hourly if (match := _SPEED_NAME.match(name)) is not None]
     # The values of a level that a model does not have are null at all times.
     levels = [level for level in all_levels if not any(_is_null(hourly[name]) for name in level if name)]
     if not levels:
         allowed = "no wind: wind_speed_10m and wind_direction_10m, or speed and direction of other levels, are needed"
         raise _fault(path, "hourly", allowed)
-    count = _count_complete_times([hourly[name] for level in levels for name in level if name], len(times))
+    # Times up to the last one at which all columns have a value. A model that ends before the requested days has
+    # null at all later times.
+    columns = [hourly[name] for level in levels for name in level if name]
+    count = len(times)
+    lists = [values for values in columns if isinstance(values, list) and len(values) == count]
+    while count > 0 and any(values[count - 1] is None for values in lists):
+        count -= 1
     groups = []
     for speed_name, direction_name, height_name in levels:
         speeds = _column(path, hourly, units, speed_name, count, SPEED_UNITS)
@@ -160,17 +180,6 @@ def _is_null(values: Any) -> bool:
     return isinstance(values, list) and bool(values) and all(value is None for value in values)
 
 
-def _count_complete_times(columns: Sequence[Any], count: int) -> int:
-    """Return the number of times up to the last time at which all columns have a value.
-
-    count: number of times in each column. A model that ends before the requested days has null at all later times.
-    """
-    lists = [values for values in columns if isinstance(values, list) and len(values) == count]
-    while count > 0 and any(values[count - 1] is None for values in lists):
-        count -= 1
-    return count
-
-
 def _number(
     path: Path, entry: dict[str, Any], name: str, low: float, high: float, default: float | None = None
 ) -> float:
@@ -179,25 +188,6 @@ def _number(
     if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
         raise _fault(path, name, f"{str(value)[:40]}: allowed {low:g}..{high:g}")
     return float(value)
-
-
-def _read_times(path: Path, hourly: dict[str, Any], units: dict[str, Any], entry: dict[str, Any]) -> Floats:
-    """Return the times of the hourly variables, (t,) s since 1970 in UTC."""
-    values = hourly.get("time")
-    if not isinstance(values, list) or not values:
-        raise _fault(path, "hourly.time", "missing: a list of times is needed")
-    try:
-        if units.get("time") == "unixtime":
-            times = np.array([float(value) for value in values])
-        else:
-            zone = timezone(timedelta(seconds=_number(path, entry, "utc_offset_seconds", -86_399.0, 86_399.0, 0.0)))
-            read_times = [datetime.fromisoformat(value) for value in values]
-            times = np.array([(time if time.tzinfo else time.replace(tzinfo=zone)).timestamp() for time in read_times])
-    except (TypeError, ValueError, OverflowError, AttributeError):
-        raise _fault(path, "hourly.time", "allowed ISO 8601 times, or unixtime") from None
-    if not np.isfinite(times).all() or (np.diff(times) <= 0.0).any():
-        raise _fault(path, "hourly.time", "the times are not in ascending order")
-    return times
 
 
 def _column(

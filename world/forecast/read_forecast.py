@@ -158,7 +158,14 @@ class _ForecastReader:
         pairs = [pair for dataset in decoded for pair in self._wind_pairs(dataset)]
         if not pairs:
             raise self._error("wind", "missing: no pair of an eastward and a northward wind was found")
-        self._set_axes([pair[0] for pair in pairs])
+        # Axes of the result: the grid of the first variable, and the times common to all variables.
+        arrays = [pair[0] for pair in pairs]
+        times = [self._valid_times(array)[1] for array in arrays]
+        common = functools.reduce(np.intersect1d, times)
+        if not len(common):
+            raise self._error("time", "the levels have no time in common")
+        self.times = common
+        self.latitudes, self.longitudes = self._axes(arrays[0])
         self.ground = self._read_ground(decoded)
         groups = [self._group(decoded, *pair) for pair in pairs]
         members = {len(group.velocities) for group in groups} - {1}
@@ -234,15 +241,6 @@ class _ForecastReader:
     # ------------------------------------------------------------------
     # Axes.
 
-    def _set_axes(self, arrays: Sequence[Any]) -> None:
-        """Set the axes of the result: the grid of the first variable, and the times common to all variables."""
-        times = [self._valid_times(array)[1] for array in arrays]
-        common = functools.reduce(np.intersect1d, times)
-        if not len(common):
-            raise self._error("time", "the levels have no time in common")
-        self.times = common
-        self.latitudes, self.longitudes = self._axes(arrays[0])
-
     def _horizontal(self, array: Any) -> tuple[Any, Any]:
         """Return the latitude and longitude coordinates of a variable."""
         coordinates = []
@@ -259,18 +257,15 @@ class _ForecastReader:
         """Return the latitudes and longitudes of the nodes around the box, in ascending order, deg."""
         latitude, longitude = self._horizontal(array)
         if latitude.ndim == 2:
-            return self._regular_axes(latitude.values, longitude.values)
+            # Grids with two-dimensional coordinates are interpolated to a regular grid.
+            axes = regular_axes(latitude.values, longitude.values, self.box)
+            if axes is None:
+                raise self._error("latitude, longitude", "the mission is outside the forecast's grid")
+            return axes
         rows, columns = self._node_indices(latitude, longitude)
         center = 0.5 * (self.box.west + self.box.east)
         wrapped_longitudes = center + (longitude.values.reshape(-1) - center + 180.0) % 360.0 - 180.0
         return latitude.values.reshape(-1)[rows].astype(np.float64), wrapped_longitudes[columns].astype(np.float64)
-
-    def _regular_axes(self, latitudes: Floats, longitudes: Floats) -> tuple[Floats, Floats]:
-        """Return the axes of the regular grid to which a grid with two-dimensional coordinates is interpolated."""
-        axes = regular_axes(latitudes, longitudes, self.box)
-        if axes is None:
-            raise self._error("latitude, longitude", "the mission is outside the forecast's grid")
-        return axes
 
     def _node_indices(self, latitude: Any, longitude: Any) -> tuple[Any, Any]:
         """Return the indices of the rows and columns of nodes around the box, by ascending latitude and longitude.

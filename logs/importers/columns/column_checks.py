@@ -110,7 +110,15 @@ def check_signs_and_units(log: ColumnLog) -> None:
     for pair in _list_pairs(log, grid):
         _check_pair(log, pair, grid)
     if log.has("acceleration_down"):
-        _check_force(log, float(np.median(_average_on_grid(log.series("acceleration_down"), grid))))
+        force = float(np.median(_average_on_grid(log.series("acceleration_down"), grid)))
+        low, high = _FORCE_RANGE_MPS2
+        if not low <= force <= high:
+            entry = log.table.columns["acceleration_down"][0]
+            hint = "check sign and frame" if -high <= force <= -low else f"check unit ({entry.unit}) and scale"
+            allowed = f"expected {low:g} to {high:g} m/s2 (specific force down, -9.8 at rest): {hint}"
+            raise LogError.at(
+                log.table_path, "columns.acceleration_down", f"{entry.column} is {force:.3g} m/s2 in flight", allowed
+            )
     if log.has("yaw"):
         _check_heading(log, grid)
     if log.has("throttle", "current"):
@@ -380,21 +388,6 @@ def _check_delay(log: ColumnLog, pair: _Pair, grid: Floats) -> None:
     if best > _SHIFTED_CORRELATION and is_better and abs(shift) >= _LATE_S:
         message = f"{'lags' if shift > 0.0 else 'leads'} {pair.partner} by {abs(shift):g} s"
         raise _make_contradiction_error(log, pair.quantity, message, "check its clock (offset_s)")
-
-
-def _check_force(log: ColumnLog, force: float) -> None:
-    """Raise LogError for an implausible specific force down.
-
-    force: median of the specific force down in flight, m/s².
-    """
-    low, high = _FORCE_RANGE_MPS2
-    if not low <= force <= high:
-        entry = log.table.columns["acceleration_down"][0]
-        hint = "check sign and frame" if -high <= force <= -low else f"check unit ({entry.unit}) and scale"
-        allowed = f"expected {low:g} to {high:g} m/s2 (specific force down, -9.8 at rest): {hint}"
-        raise LogError.at(
-            log.table_path, "columns.acceleration_down", f"{entry.column} is {force:.3g} m/s2 in flight", allowed
-        )
 
 
 def _check_airspeed(log: ColumnLog, grid: Floats) -> None:

@@ -87,7 +87,11 @@ class ColumnLog:
         self._clocks: dict[str, _Clock] = {}
         self._shifts: dict[str, float] = {}
         self.utc_start = math.nan
-        self._check_names()
+        for quantity, entries in self.table.columns.items():
+            for entry in entries:
+                if entry.column is not None:
+                    data = self._open_data_file(self.table.clocks[entry.clock])
+                    self._find_column(data, entry.column, f"columns.{quantity}.column")
 
     @property
     def sha256(self) -> str:
@@ -245,7 +249,13 @@ class ColumnLog:
         """
         data, field = self._open_data_file(clock), f"clocks.{name}"
         if clock.column is None:
-            lengths = [len(self._find_column(data, column)) for column in self._list_columns_of_clock(name)]
+            column_names = [
+                entry.column
+                for entries in self.table.columns.values()
+                for entry in entries
+                if entry.column is not None and entry.clock == name
+            ]
+            lengths = [len(self._find_column(data, column)) for column in column_names]
             rate = clock.rate or 1.0
             return _Clock(data, np.arange(max(lengths, default=0)) / rate + clock.offset_s, rate)
         values = self._find_column(data, clock.column, f"{field}.column")
@@ -292,16 +302,12 @@ class ColumnLog:
 
     def _align_times(self, name: str) -> Floats:
         """Return the times of a clock, converted to the main clock, s."""
-        self._check_overlap(name)
-        return self._get_unaligned_times(name) + self._align_clock(name)
-
-    def _check_overlap(self, name: str) -> None:
-        """Raise LogError for a clock that is not aligned and has no time in common with the main clock."""
         time, main = self._get_unaligned_times(name), self._get_unaligned_times(self._main_clock)
         if self.table.clocks[name].align is None and (time[0] > main[-1] or time[-1] < main[0]):
             spans = f"{time[0]:.6g} to {time[-1]:.6g} s, {self._main_clock} from {main[0]:.6g} to {main[-1]:.6g} s"
             allowed = f"runs from {spans}, without overlap: use one clock, or set `offset_s` or `align`"
             raise self._make_error(f"clocks.{name}", self.table.clocks[name].column or "rows", allowed)
+        return self._get_unaligned_times(name) + self._align_clock(name)
 
     def _get_unaligned_times(self, name: str) -> Floats:
         """Return the times of a clock before its alignment, s.
@@ -358,23 +364,6 @@ class ColumnLog:
     # ------------------------------------------------------------------
     # Columns.
 
-    def _list_columns_of_clock(self, clock: str) -> list[str]:
-        """Return the names of the columns that use a clock."""
-        return [
-            entry.column
-            for entries in self.table.columns.values()
-            for entry in entries
-            if entry.column is not None and entry.clock == clock
-        ]
-
-    def _check_names(self) -> None:
-        """Raise LogError for the first column of the table that its data file does not have."""
-        for quantity, entries in self.table.columns.items():
-            for entry in entries:
-                if entry.column is not None:
-                    data = self._open_data_file(self.table.clocks[entry.clock])
-                    self._find_column(data, entry.column, f"columns.{quantity}.column")
-
     def _find_column(self, data: DataFile, name: str, field: str = "") -> Column:
         """Return a column of a data file by name.
 
@@ -417,7 +406,13 @@ class ColumnLog:
         values = self._convert(quantity, entry, raw)
         if entry.when is not None:
             partner = self._find_column_on_clock(clock, entry.when.column, f"{field}.when.column", entry.clock)
-            values = np.where(_find_equal_values(partner, entry.when.value), values, np.nan)
+            wanted = entry.when.value
+            is_equal = (
+                np.asarray([decode_cell(value) == wanted for value in partner], np.bool_)
+                if isinstance(wanted, str)
+                else np.asarray(partner == wanted, np.bool_)
+            )
+            values = np.where(is_equal, values, np.nan)
         self._check_plausible(quantity, entry, values)
         time = self._align_times(entry.clock)
         if entry.rate is not None:
@@ -475,13 +470,6 @@ class ColumnLog:
             allowed = f"the value changes {rate:.3g} times a second"
             raise self._make_error(f"columns.{quantity}.rate", f"{stated_rate:g} Hz", allowed)
         return time[is_changed], values[is_changed]
-
-
-def _find_equal_values(values: Column, wanted: float | str) -> Flags:
-    """Return a mask (n,): True where a value equals a number or a text."""
-    if isinstance(wanted, str):
-        return np.asarray([decode_cell(value) == wanted for value in values], np.bool_)
-    return np.asarray(values == wanted, np.bool_)
 
 
 def decode_cell(value: Any) -> str:

@@ -176,24 +176,23 @@ def read_air(log: ColumnLog) -> AirData:
             airspeed = Samples(airspeed.time, airspeed.values / factor)
         else:
             true_airspeed = Samples(airspeed.time, airspeed.values * factor)
-    wind, source = _read_logged_wind(log), "wind of the table"
+    if log.has("wind_north", "wind_east"):
+        logged_wind = join_series([log.series("wind_north"), log.series("wind_east")])
+    elif log.has("wind_speed", "wind_direction"):
+        speed, direction = log.series("wind_speed"), log.series("wind_direction")
+        origin = _interpolate_at(direction, speed.time, wraps=True)
+        logged_wind = join_series(
+            [Series(speed.time, -speed.values * function(origin)) for function in (np.cos, np.sin)]
+        )
+    else:
+        logged_wind = NO_SAMPLES
+    wind, source = logged_wind, "wind of the table"
     if not len(wind.time):
         wind, source = (
             estimate_wind(read_velocity(log), _read_attitude(log), true_airspeed),
             "the triangle of velocities",
         )
     return AirData(airspeed, true_airspeed, ratio, wind, source)
-
-
-def _read_logged_wind(log: ColumnLog) -> Samples:
-    """Return the logged wind velocity to north and east, m/s, (n, 2); no rows if it is not logged."""
-    if log.has("wind_north", "wind_east"):
-        return join_series([log.series("wind_north"), log.series("wind_east")])
-    if log.has("wind_speed", "wind_direction"):
-        speed, direction = log.series("wind_speed"), log.series("wind_direction")
-        origin = _interpolate_at(direction, speed.time, wraps=True)
-        return join_series([Series(speed.time, -speed.values * function(origin)) for function in (np.cos, np.sin)])
-    return NO_SAMPLES
 
 
 def _find_airspeed_ratio(ratio: Samples, height: Samples, time: Floats) -> Floats:

@@ -32,7 +32,15 @@ def read_columns(path: Path) -> RawLog:
         if not log.has(quantity):
             raise LogError.at(log.table_path, f"columns.{quantity}", "missing", _POSITIONS_NEEDED)
     check_signs_and_units(log)
-    position = _read_position(log)
+    # Latitude and longitude (deg) and altitude (m); the altitude is NaN if it is not logged.
+    latitude, longitude = log.series("latitude"), log.series("longitude")
+    parts = join_series([latitude, longitude])
+    up = np.full(len(parts.time), math.nan)
+    if log.has("altitude"):
+        altitude = join_series([log.series("altitude")])
+        up = np.interp(parts.time, altitude.time, altitude.values[:, 0])
+    values = np.column_stack([np.degrees(parts.values), up])
+    position = LogSeries(log.column("altitude" if log.has("altitude") else "latitude"), parts.time, values)
     return RawLog(
         source=str(path),
         format=FORMAT,
@@ -48,18 +56,6 @@ def read_columns(path: Path) -> RawLog:
         utc_start=log.utc_start,
         sha256=log.sha256,
     )
-
-
-def _read_position(log: ColumnLog) -> LogSeries:
-    """Return latitude (deg), longitude (deg) and altitude (m), (n, 3); the altitude is NaN if not logged."""
-    latitude, longitude = log.series("latitude"), log.series("longitude")
-    parts = join_series([latitude, longitude])
-    up = np.full(len(parts.time), math.nan)
-    if log.has("altitude"):
-        altitude = join_series([log.series("altitude")])
-        up = np.interp(parts.time, altitude.time, altitude.values[:, 0])
-    values = np.column_stack([np.degrees(parts.values), up])
-    return LogSeries(log.column("altitude" if log.has("altitude") else "latitude"), parts.time, values)
 
 
 def _read_series(log: ColumnLog) -> Iterator[tuple[str, LogSeries]]:

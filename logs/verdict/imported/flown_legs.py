@@ -19,7 +19,6 @@ from logs.verdict.tolerances import (
     PARTIAL_LEG_MIN_S,
     PLAN_MISMATCH_DISTANCE_M,
 )
-from world.arrays import Floats
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,7 +188,14 @@ def plan_mismatch(setup: FlightSetup, track: Track) -> PlanMismatch | None:
     points = setup.route.positions
     if not stretch_tracks:
         return None
-    min_distances, times = _closest_distances(points, stretch_tracks)
+    # Each waypoint's minimum horizontal distance from the flight, m, and its time, s.
+    min_distances, times = np.full(len(points), np.inf), np.zeros(len(points))
+    for stretch_track in stretch_tracks:
+        for k, point in enumerate(points):
+            distance, _ = closest_approaches(stretch_track.position, point)
+            row = int(np.argmin(distance))
+            if distance[row] < min_distances[k]:
+                min_distances[k], times[k] = float(distance[row]), float(stretch_track.time[row])
     if min_distances.min() > PLAN_MISMATCH_DISTANCE_M:
         return PlanMismatch("place", distance=float(min_distances.min()))
     near_distance = min(MAX_NEAR_WAYPOINT_M, max(MIN_NEAR_WAYPOINT_M, setup.corridor))
@@ -210,19 +216,3 @@ def plan_mismatch(setup: FlightSetup, track: Track) -> PlanMismatch | None:
         return None
     order = [int(k) for k in np.argsort(times, kind="stable") if is_passed[k]]
     return PlanMismatch("order", order=tuple(int(setup.route.items[k]) for k in order[:_MAX_NAMED]))
-
-
-def _closest_distances(points: Floats, tracks: list[Track]) -> tuple[Floats, Floats]:
-    """Return each waypoint's minimum horizontal distance from the flight (m) and its time (s), (w,) each.
-
-    points: waypoints, m, (w, 3).
-    tracks: parts of the flight.
-    """
-    min_distances, times = np.full(len(points), np.inf), np.zeros(len(points))
-    for rows in tracks:
-        for k, point in enumerate(points):
-            distance, _ = closest_approaches(rows.position, point)
-            row = int(np.argmin(distance))
-            if distance[row] < min_distances[k]:
-                min_distances[k], times[k] = float(distance[row]), float(rows.time[row])
-    return min_distances, times

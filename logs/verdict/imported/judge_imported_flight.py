@@ -64,7 +64,13 @@ def imported_lines(
     if imported_log is None:
         return (own_answer.headline,)
     lines = [own_answer.headline, *condition_lines(conditions)]
-    log_text = f"{imported_log.format} {imported_log.file}{_start_time_text(imported_log)}"
+    # A date before 1970 or after 2099 (4.1e9 s) shows that the log's clock was not set.
+    start_time_text = (
+        ""
+        if not isfinite(imported_log.utc_start) or not 0.0 <= imported_log.utc_start < 4.1e9
+        else f", time 0 s is {datetime.fromtimestamp(imported_log.utc_start, UTC):%Y-%m-%d %H:%M:%S} UTC"
+    )
+    log_text = f"{imported_log.format} {imported_log.file}{start_time_text}"
     lines.append(f"{autopilot_line(conditions, is_flown=True)} ({log_text})")
     lines += [
         *_judged_lines(imported_log, flown_stretches, setup.route.leg_numbers.tolist()),
@@ -224,14 +230,6 @@ def damage_text(damage: Damage) -> str:
     return "; ".join(texts) or "nothing"
 
 
-def _start_time_text(imported_log: ImportedLog) -> str:
-    """Return a clause on the date and time at the log's time 0; "" without a plausible date."""
-    # A date before 1970 or after 2099 (4.1e9 s) shows that the log's clock was not set.
-    if not isfinite(imported_log.utc_start) or not 0.0 <= imported_log.utc_start < 4.1e9:
-        return ""
-    return f", time 0 s is {datetime.fromtimestamp(imported_log.utc_start, UTC):%Y-%m-%d %H:%M:%S} UTC"
-
-
 # Name of each quantity in a message about a log without it.
 _QUANTITY_LABELS: dict[DataKind, str] = {
     "heights": "height",
@@ -270,13 +268,14 @@ def judge_imported_flight(setup: FlightSetup, track: Track, *, log_complete: boo
     end_judges = [rule.judge_imported_end for rule in RULES.values() if rule.judge_imported_end is not None]
     findings = (*findings, *(judge(setup, flown_stretches, log_complete) for judge in end_judges))
     has_failed = any(finding.ok is False for finding in findings)
+    undecided = undecided_text(findings)
     unjudged_text = "; ".join(
         filter(
             None,
             [
                 _missing_part_text(findings, imported_log.missing),
                 _pauses_text(flown_stretches),
-                _undecided_part_text(findings),
+                f"not judged in full: {undecided}" if undecided else "",
             ],
         )
     )
@@ -336,12 +335,6 @@ def _stretch_times(legs: FlownLegs) -> tuple[float, float]:
     return float(time[0]), float(time[-1])
 
 
-def _undecided_part_text(findings: Sequence[Finding]) -> str:
-    """Describe the findings that leave the verdict undecided; return "" if there are none."""
-    text = undecided_text(findings)
-    return f"not judged in full: {text}" if text else ""
-
-
 def _stretch_findings(setup: FlightSetup, legs: FlownLegs) -> list[Finding]:
     """Judge one stretch; its findings number legs and waypoints as in the whole route."""
     findings = []
@@ -349,7 +342,12 @@ def _stretch_findings(setup: FlightSetup, legs: FlownLegs) -> list[Finding]:
         checked_finding = _unjudge_with_gaps(_unjudge_without_data(setup, legs, finding), legs)
         if legs.partial:
             checked_finding = _unjudge_if_unreached(checked_finding, legs)
-        findings.append(_renumber_place(checked_finding, legs.first))
+        place = checked_finding.place
+        renumbered = checked_finding
+        if legs.first and place.index is not None and place.kind in ("leg", "waypoint"):
+            index = place.index + legs.first
+            renumbered = replace(checked_finding, place=replace(place, index=index))
+        findings.append(renumbered)
     return [*findings, *_findings_without_data(setup, {finding.rule for finding in findings})]
 
 
@@ -459,18 +457,6 @@ def _unjudge_if_unreached(finding: Finding, legs: FlownLegs) -> Finding:
             else finding
         )
     return finding
-
-
-def _renumber_place(finding: Finding, first: int) -> Finding:
-    """Return a finding of a stretch with its place numbered in the whole route.
-
-    first: number of the stretch's first waypoint in the route.
-    """
-    place = finding.place
-    if not first or place.index is None or place.kind not in ("leg", "waypoint"):
-        return finding
-    index = place.index + first
-    return replace(finding, place=replace(place, index=index))
 
 
 def _merge_findings(findings_by_stretch: Sequence[Sequence[Finding]]) -> tuple[Finding, ...]:

@@ -5,11 +5,9 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.path_limits import turn_radius_between
 from flight.guidance.navigation_error import ERRORS
-from flight.mission.route import Route
 from flight.simulation.setup import FlightSetup
 from logs.verdict.measures.route_requirements import (
     RouteRequirements,
@@ -211,7 +209,12 @@ def _gap_has_room(requirements: RouteRequirements, first: int, last: int) -> boo
         return False
     # Include the next turns on both sides, because they use part of the legs.
     start, end = max(0, first - 3), min(len(requirements.points), last + 4)
-    nearby_route = _reduced_route(requirements.setup.route, np.r_[start:first, next_corner:end])
+    # Each new leg has the airspeed of the original leg that begins at the same waypoint.
+    route = requirements.setup.route
+    waypoints = np.r_[start:first, next_corner:end]
+    points = route.points[waypoints]
+    points["airspeed"][1:] = route.leg_airspeeds[waypoints[:-1]]
+    nearby_route = replace(route, points=points)
     turns = turn_requirements(nearby_route, leg_performance(requirements.limits))
     for new_corner, old_corner in ((previous_corner - start, previous_corner), (first - start, next_corner)):
         if not 0 < old_corner < requirements.legs:
@@ -250,16 +253,6 @@ def _turn_fits_alone(requirements: RouteRequirements, before: int, corner: int, 
         aircraft_limit = 2.0 * math.atan(min(run_in, run_out) / radius)
     limit, _ = tighter_turn_limit(requirements, corner, aircraft_limit)
     return abs(math.remainder(course_out - course_in, 2.0 * math.pi)) <= limit + PLAN_TOLERANCE_RAD
-
-
-def _reduced_route(route: Route, waypoints: NDArray[np.int64]) -> Route:
-    """Return the route reduced to some waypoints.
-
-    Each new leg has the airspeed of the original leg that begins at the same waypoint.
-    """
-    points = route.points[waypoints]
-    points["airspeed"][1:] = route.leg_airspeeds[waypoints[:-1]]
-    return replace(route, points=points)
 
 
 def step_height(requirements: RouteRequirements, leg: int) -> float | None:

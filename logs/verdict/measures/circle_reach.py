@@ -40,11 +40,19 @@ def find_hazards(
     min_altitude, max_altitude: minimum and maximum altitude of the flight, m AMSL.
     reach: maximum horizontal distance of the aircraft from the center, m.
     """
+    scenario = requirements.setup.scenario
+    edge_hazards = []
+    if not scenario.external:
+        edge_distance = min(
+            float(min(coordinate - min_edge, max_edge - coordinate))
+            for coordinate, (min_edge, max_edge) in zip(center, scenario.bounds, strict=True)
+        )
+        edge_hazards = ["the area's edge is in reach"] if edge_distance < reach - ROUNDING_M else []
     return [
         *_ground_hazards(requirements, center, min_altitude, max_altitude, reach),
         *_missile_hazards(requirements, center, min_altitude, max_altitude, reach),
         *_zone_hazards(requirements, center, min_altitude, max_altitude, reach),
-        *_area_hazards(requirements, center, reach),
+        *edge_hazards,
     ]
 
 
@@ -143,7 +151,18 @@ def _zone_hazards(
         else min(_MAX_LEVELS, 2 + int((max_altitude - min_altitude) / _STEP_M))
     )
     for altitude in np.linspace(min_altitude, max_altitude, level_count):
-        visits = path_zones(_straight_moves(_points_at_altitude(rings, float(altitude))), airspace.records, terrain)
+        # Straight moves between the points; each lasts one second.
+        points = _points_at_altitude(rings, float(altitude))
+        steps = np.diff(points, axis=0)
+        lengths = np.hypot(steps[:, 0], steps[:, 1])
+        moves: Records = np.zeros(len(steps), MOVE)
+        for axis, name in enumerate(("east", "north", "up")):
+            moves[name] = points[:-1, axis]
+        for axis, name in enumerate(("course_east", "course_north")):
+            moves[name] = np.divide(steps[:, axis], lengths, out=np.zeros_like(lengths), where=lengths > 0.0)
+        moves["length"], moves["climb"] = lengths, steps[:, 2]
+        moves["time"], moves["lasts"] = np.arange(len(steps)), 1.0
+        visits = path_zones(moves, airspace.records, terrain)
         zone_numbers |= {
             number
             for number in range(len(airspace.zones))
@@ -153,18 +172,6 @@ def _zone_hazards(
         f"{airspace.zones[number].kind} zone {airspace.zones[number].name or number} may be violated"
         for number in sorted(zone_numbers)
     ]
-
-
-def _area_hazards(requirements: RouteRequirements, center: Floats, reach: float) -> list[str]:
-    """Return a text if the edge of the scenario's area lies within reach, otherwise []."""
-    scenario = requirements.setup.scenario
-    if scenario.external:
-        return []
-    edge_distance = min(
-        float(min(coordinate - min_edge, max_edge - coordinate))
-        for coordinate, (min_edge, max_edge) in zip(center, scenario.bounds, strict=True)
-    )
-    return ["the area's edge is in reach"] if edge_distance < reach - ROUNDING_M else []
 
 
 def _ring_points(center: Floats, reach: float, spacing: float) -> Floats:
@@ -182,17 +189,3 @@ def _ring_points(center: Floats, reach: float, spacing: float) -> Floats:
 def _points_at_altitude(positions: Floats, altitude: float) -> Floats:
     """Return positions (n, 2) as points (n, 3) at one altitude, m."""
     return np.column_stack([positions, np.full(len(positions), altitude)])
-
-
-def _straight_moves(points: Floats) -> Records:
-    """Return the n - 1 straight moves (dtype `MOVE`) between n points; each move lasts one second."""
-    steps = np.diff(points, axis=0)
-    lengths = np.hypot(steps[:, 0], steps[:, 1])
-    moves: Records = np.zeros(len(steps), MOVE)
-    for axis, name in enumerate(("east", "north", "up")):
-        moves[name] = points[:-1, axis]
-    for axis, name in enumerate(("course_east", "course_north")):
-        moves[name] = np.divide(steps[:, axis], lengths, out=np.zeros_like(lengths), where=lengths > 0.0)
-    moves["length"], moves["climb"] = lengths, steps[:, 2]
-    moves["time"], moves["lasts"] = np.arange(len(steps)), 1.0
-    return moves

@@ -103,10 +103,6 @@ def missing_ends_text(mission: Mission, limits: FeasibilityLimits) -> str:
     if limits.requires == PX4_DEFAULT_LIMITS.requires and not limits.stated:
         return "PX4's fixed-wing default refuses a mission without a landing: add one, or set MIS_TKO_LAND_REQ 0"
     requirement = f"MIS_TKO_LAND_REQ {limits.requires} requires {_REQUIRED[limits.requires]}"
-    return f"{requirement}, but this mission has {_present_ends(has_takeoff, has_landing)}"
-
-
-def _present_ends(has_takeoff: bool, has_landing: bool) -> str:
-    """Describe whether a mission has a take-off and a landing, such as "a takeoff and a landing"."""
     present = [name for name, is_present in (("a takeoff", has_takeoff), ("a landing", has_landing)) if is_present]
-    return " and ".join(present) or "neither a takeoff nor a landing"
+    present_ends = " and ".join(present) or "neither a takeoff nor a landing"
+    return f"{requirement}, but this mission has {present_ends}"

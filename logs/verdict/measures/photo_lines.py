@@ -119,14 +119,19 @@ def _line_rows(
 ) -> _LineRows | None:
     """Return the rows on which a photo line may have been flown; None for fewer than two rows."""
     axis = LineAxis(requirements.points[line.first : line.last + 1])
-    window = _row_window(requirements, aligned, line)
+    # From the waypoint before the line and its leads to the waypoint after them.
+    first, last = max(0, line.begins - 1), min(requirements.legs, line.ends + 1)
+    window = slice(int(aligned.rows[first]), int(aligned.rows[last]) + 1)
     if window.stop - window.start < 2 or not aligned.passed[line.begins]:
         return None
     position = aligned.track.position[window]
     along, across, course = axis.project(position)
     course_error = np.abs(np.angle(np.exp(1j * (aligned.course[window] - course))))
     is_ahead = course_error <= MAX_PHOTO_COURSE_ERROR_RAD
-    height_error, height_tolerance = _height_errors(requirements, axis, position, along)
+    # Error from the planned height above ground, and its tolerance, m.
+    planned_height = heights_over_ground(requirements, axis.points_at(along))
+    height_error = heights_over_ground(requirements, position) - planned_height
+    height_tolerance = np.maximum(MIN_PHOTO_HEIGHT_ERROR_M, PHOTO_HEIGHT_FRACTION * planned_height)
     conditions = {
         "off_line": np.abs(across) <= lateral_tolerance(requirements, survey),
         "banked": np.abs(aligned.track.attitude[window, ROLL]) <= MAX_PHOTO_BANK_RAD,
@@ -170,6 +175,10 @@ def measure_line(
         np.interp(step_middles, along[is_ahead][order], speeds) if speeds.size else np.zeros(len(step_middles)),
     )
     photos, missed_photos = _count_photos(line, is_taken, length, spacing)
+    # Photos taken on the line, up to `PHOTO_STEP_M` beyond its ends.
+    photo_rows = _photo_rows(requirements, aligned, range(line.first, line.last)) - rows.track_rows.start
+    photo_rows = photo_rows[(photo_rows >= 0) & (photo_rows < len(rows.along))]
+    is_between_ends = (rows.along >= -PHOTO_STEP_M) & (rows.along <= rows.axis.length + PHOTO_STEP_M)
     return LineMeasure(
         length=length,
         usable=float(is_good.mean()),
@@ -184,7 +193,7 @@ def measure_line(
         min_height_tolerance=float(np.fmin.reduce(rows.height_tolerance, initial=math.inf)),
         lost_spans=_runs_of_set_steps(~is_kept, step),
         unknown_spans=_runs_of_set_steps(is_kept & ~is_good, step),
-        taken_photos=_count_taken_photos(requirements, aligned, line, rows),
+        taken_photos=int(np.count_nonzero((rows.is_ahead & rows.conditions["off_line"] & is_between_ends)[photo_rows])),
     )
 
 
@@ -192,25 +201,6 @@ def _runs_of_set_steps(is_set: Flags, step_length: float) -> tuple[tuple[float, 
     """Return the start and end (m) of each run of consecutive steps for which `is_set` is True."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], is_set.astype(int), [0]]))) * step_length
     return tuple((float(start), float(end)) for start, end in zip(edges[::2], edges[1::2], strict=True))
-
-
-def _row_window(requirements: RouteRequirements, aligned: AlignedTrack, line: PhotoLine) -> slice:
-    """Return the rows from the waypoint before a photo line and its leads to the waypoint after them."""
-    first, last = max(0, line.begins - 1), min(requirements.legs, line.ends + 1)
-    return slice(int(aligned.rows[first]), int(aligned.rows[last]) + 1)
-
-
-def _height_errors(
-    requirements: RouteRequirements, axis: LineAxis, position: Floats, along: Floats
-) -> tuple[Floats, Floats]:
-    """Return each row's error from the planned height above ground, and its tolerance, m, (n,) each.
-
-    position: m, (n, 3).
-    along: distance of each row along the line, m, (n,).
-    """
-    planned_height = heights_over_ground(requirements, axis.points_at(along))
-    tolerance = np.maximum(MIN_PHOTO_HEIGHT_ERROR_M, PHOTO_HEIGHT_FRACTION * planned_height)
-    return heights_over_ground(requirements, position) - planned_height, tolerance
 
 
 def heights_over_ground(requirements: RouteRequirements, positions: Floats) -> Floats:
@@ -351,16 +341,6 @@ def _switch_row(requirements: RouteRequirements, aligned: AlignedTrack, waypoint
 def count_flight_photos(requirements: RouteRequirements, aligned: AlignedTrack) -> int:
     """Return the number of photos that the camera takes on a whole flight, on and between the photo lines."""
     return len(_photo_rows(requirements, aligned, range(requirements.legs)))
-
-
-def _count_taken_photos(
-    requirements: RouteRequirements, aligned: AlignedTrack, line: PhotoLine, rows: _LineRows
-) -> int:
-    """Return the number of photos taken on a photo line, up to `PHOTO_STEP_M` beyond its ends."""
-    photo_rows = _photo_rows(requirements, aligned, range(line.first, line.last)) - rows.track_rows.start
-    photo_rows = photo_rows[(photo_rows >= 0) & (photo_rows < len(rows.along))]
-    is_between_ends = (rows.along >= -PHOTO_STEP_M) & (rows.along <= rows.axis.length + PHOTO_STEP_M)
-    return int(np.count_nonzero((rows.is_ahead & rows.conditions["off_line"] & is_between_ends)[photo_rows]))
 
 
 def _photo_rows(requirements: RouteRequirements, aligned: AlignedTrack, legs: range) -> NDArray[np.int64]:

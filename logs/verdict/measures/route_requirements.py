@@ -209,7 +209,18 @@ def turn_requirements(route: Route, performance: LegPerformance) -> TurnRequirem
         length_before[waypoint], length_after[waypoint] = turn_lengths(
             abs(float(turns[waypoint])), float(radius[waypoint]), bool(route.fly_over[waypoint])
         )
-    reversal = _reversal_lengths(route, performance, courses, turns, radius, points[:, 2])
+    # Length that the roll between turns to opposite sides uses on each leg, m.
+    up = points[:, 2]
+    reversal = np.zeros(len(courses))
+    for leg in range(1, len(courses) - 1):
+        are_fly_bys = not route.fly_over[leg : leg + 2].any() and np.isfinite(radius[leg : leg + 2]).all()
+        if turns[leg] * turns[leg + 1] < 0.0 and are_fly_bys:
+            table = performance(leg, float(route.leg_airspeeds[leg]))
+            course_east, course_north = math.sin(courses[leg]), math.cos(courses[leg])
+            min_altitude = float(min(up[leg], up[leg + 1]))
+            reversal[leg] = roll_reversal_length(
+                table, course_east, course_north, min_altitude, radius[leg], radius[leg + 1], *downwind_vector(table)
+            )
     limit = _sharpest_turns(route, runs, min_radius, length_before, length_after, reversal)
     return TurnRequirements(turns, min_radius, radius, length_before, length_after, reversal, limit)
 
@@ -231,27 +242,6 @@ def turn_lengths(turn: float, radius: float, fly_over: bool) -> tuple[float, flo
         return math.inf, math.inf
     tangent = tangent_length(turn, radius)
     return tangent, tangent
-
-
-def _reversal_lengths(
-    route: Route, performance: LegPerformance, courses: Floats, turns: Floats, radius: Floats, up: Floats
-) -> Floats:
-    """Return the length that the roll between turns to opposite sides uses on each leg, m, (w - 1,).
-
-    The length is 0 between turns to the same side.
-    radius, up: radius of the turn at each waypoint and altitude of the waypoint, m, (w,).
-    """
-    lengths = np.zeros(len(courses))
-    for leg in range(1, len(courses) - 1):
-        are_fly_bys = not route.fly_over[leg : leg + 2].any() and np.isfinite(radius[leg : leg + 2]).all()
-        if turns[leg] * turns[leg + 1] < 0.0 and are_fly_bys:
-            table = performance(leg, float(route.leg_airspeeds[leg]))
-            course_east, course_north = math.sin(courses[leg]), math.cos(courses[leg])
-            min_altitude = float(min(up[leg], up[leg + 1]))
-            lengths[leg] = roll_reversal_length(
-                table, course_east, course_north, min_altitude, radius[leg], radius[leg + 1], *downwind_vector(table)
-            )
-    return lengths
 
 
 def available_lengths(

@@ -232,6 +232,12 @@ def measure_slope(requirements: RouteRequirements, aligned: AlignedTrack, leg: i
     rows = aligned.leg_rows(leg)
     height_error, is_short = _height_error(requirements, leg, aligned.track.position[rows])
     full_time, idle_time, speed_loss, speed_gain = _saturation_times(requirements, aligned, leg)
+    # Time with the pitch at the autopilot's upper limit, s; an imported flight has no such limit.
+    pitch_limit_time = 0.0
+    if requirements.setup.imported_log is None:
+        pitch = aligned.track.attitude[aligned.leg_rows(leg), PITCH]
+        min_pitch = requirements.setup.autopilot.speeds.max_pitch - PITCH_LIMIT_TOLERANCE_RAD
+        pitch_limit_time = float((pitch >= min_pitch).sum() * aligned.tick)
     return SlopeMeasure(
         slope=leg_slope(requirements, aligned, leg),
         height_error=height_error,
@@ -240,7 +246,7 @@ def measure_slope(requirements: RouteRequirements, aligned: AlignedTrack, leg: i
         idle_throttle_time=idle_time,
         speed_loss=speed_loss,
         speed_gain=speed_gain,
-        pitch_limit_time=_pitch_limit_time(requirements, aligned, leg),
+        pitch_limit_time=pitch_limit_time,
         ability=measure_ability(requirements, aligned, leg),
         is_finished=bool(aligned.passed[leg + 1]),
     )
@@ -320,15 +326,6 @@ def _saturation_times(
     return float(is_at_full.sum() * tick), float(is_at_idle.sum() * tick), speed_loss, speed_gain
 
 
-def _pitch_limit_time(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> float:
-    """Return the time with the pitch at the autopilot's upper limit on a leg, s; 0 for an imported flight."""
-    if requirements.setup.imported_log is not None:
-        return 0.0
-    pitch = aligned.track.attitude[aligned.leg_rows(leg), PITCH]
-    min_pitch = requirements.setup.autopilot.speeds.max_pitch - PITCH_LIMIT_TOLERANCE_RAD
-    return float((pitch >= min_pitch).sum() * aligned.tick)
-
-
 def _rows_at_limits(requirements: RouteRequirements, aligned: AlignedTrack, rows: slice) -> tuple[Flags, Flags]:
     """Return masks of the rows with full throttle and of the rows with idle throttle, (n,) each.
 
@@ -363,7 +360,13 @@ def measure_ability(requirements: RouteRequirements, aligned: AlignedTrack, leg:
     is_at_full &= track.controls[rows, THROTTLE] >= SATURATED_THROTTLE_FRACTION * max_throttle
     distance_along, _ = project_onto_leg(requirements, leg, track.position[rows])
     span_start, span_end = straight_span(requirements, leg, 0.0)
-    is_measured = _rows_after_run(is_at_full if sign > 0.0 else is_at_idle, round(ABILITY_SETTLING_S / aligned.tick))
+    # Rows that are saturated, as are all rows of the settling time before them.
+    is_saturated = is_at_full if sign > 0.0 else is_at_idle
+    row_numbers = np.arange(is_saturated.size)
+    is_measured = np.asarray(
+        row_numbers - np.maximum.accumulate(np.where(is_saturated, -1, row_numbers))
+        > round(ABILITY_SETTLING_S / aligned.tick)
+    )
     is_measured &= (distance_along >= span_start) & (distance_along <= span_end)
     velocity = track.velocity[rows].astype(np.float64)
     air_velocity = velocity - track.wind[rows]
@@ -393,12 +396,6 @@ def measure_ability(requirements: RouteRequirements, aligned: AlignedTrack, leg:
     error = abs(slopes[1] - slopes[0])
     # The comparison with a NaN error is False, so the result is then None.
     return Ability(sign * slopes[0], error, duration) if error <= MAX_ABILITY_STD_ERROR_RAD else None
-
-
-def _rows_after_run(mask: Flags, count: int) -> Flags:
-    """Return a mask (n,): True if `mask` is True in the row and in the `count` rows before it."""
-    rows = np.arange(mask.size)
-    return np.asarray(rows - np.maximum.accumulate(np.where(mask, -1, rows)) > count)
 
 
 def _fit_plane_at_origin(value: Floats, x: Floats, y: Floats, sample_count: float) -> tuple[float, float] | None:

@@ -6,14 +6,12 @@ Findings name only the object.
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from logs.verdict.findings import Finding
 from logs.verdict.measures.path_sweeps import path_spheres
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.tolerances import ROUNDING_M
 from world.arrays import Floats
-from world.threats import Threats
 
 
 def violated_legs(requirements: RouteRequirements, finding: Finding) -> tuple[int, ...]:
@@ -24,7 +22,10 @@ def violated_legs(requirements: RouteRequirements, finding: Finding) -> tuple[in
     path, place = requirements.path, finding.place
     scenario = requirements.setup.scenario
     if place.kind in ("missile", "radar") and place.index is not None:
-        is_inside = _sphere_segments(path.points, scenario.threats, place.index, is_missile=place.kind == "missile")
+        # Segments that enter the sphere of the threat.
+        threats = scenario.threats
+        radius = float((threats.kill_radius if place.kind == "missile" else threats.detection_radius)[place.index])
+        is_inside = np.asarray(_segment_distances(path.points, threats.position[place.index]) <= radius)
         return tuple(np.unique(path.legs[is_inside]).tolist())
     facts = {fact.what: fact.value for fact in finding.facts}
     if "entry leg" in facts and "exit leg" in facts:
@@ -55,16 +56,6 @@ def legs_near_missiles(requirements: RouteRequirements, max_distance: float) -> 
             leg = int(path.legs[segment])
             nearest[leg] = min(nearest.get(leg, (math.inf, 0)), (float(distances[segment]), number))
     return nearest
-
-
-def _sphere_segments(points: Floats, threats: Threats, number: int, *, is_missile: bool) -> NDArray[np.bool_]:
-    """Return a mask (n - 1,): True for each path segment that enters the sphere of a threat.
-
-    points: points of the path, m, (n, 3).
-    number: index of the threat.
-    """
-    radius = float((threats.kill_radius if is_missile else threats.detection_radius)[number])
-    return np.asarray(_segment_distances(points, threats.position[number]) <= radius)
 
 
 def _segment_distances(points: Floats, centre: Floats) -> Floats:

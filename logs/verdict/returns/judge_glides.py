@@ -288,9 +288,15 @@ def judge_glides(world: ReturnWorld, starts: ReturnStarts) -> Glides:
 
 def _no_glides(world: ReturnWorld) -> Glides:
     """Return a `Glides` without any glide, but with sites, airspeed and autopilot."""
+    # Home, the rally points and the mission's landing places.
+    mission, origin = world.setup.mission, world.scenario.origin
     return Glides(
         (),
-        _glide_sites(world),
+        (
+            GlideSite("home", 0, world.home.east, world.home.north),
+            *(GlideSite("rally", point.number or k, point.east, point.north) for k, point in enumerate(world.rally, 1)),
+            *(GlideSite("landing", item, east, north) for item, east, north in landing_positions(mission, origin)),
+        ),
         world.min_airspeed,
         fuel=world.setup.envelope.volts <= 0.0,
         autopilot=world.autopilot.title,
@@ -306,16 +312,6 @@ def _best_reach(home_altitude_left: float, site_altitude_left: float, flat_altit
     if site_altitude_left >= 0.0:
         return "site"
     return "flat" if flat_altitude_left >= 0.0 else "nothing"
-
-
-def _glide_sites(world: ReturnWorld) -> tuple[GlideSite, ...]:
-    """Return home, the rally points and the mission's landing places, in this order."""
-    mission, origin = world.setup.mission, world.scenario.origin
-    return (
-        GlideSite("home", 0, world.home.east, world.home.north),
-        *(GlideSite("rally", point.number or k, point.east, point.north) for k, point in enumerate(world.rally, 1)),
-        *(GlideSite("landing", item, east, north) for item, east, north in landing_positions(mission, origin)),
-    )
 
 
 def _flat_ground(world: ReturnWorld, grid: GlideMap) -> Flags:

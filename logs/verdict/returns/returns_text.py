@@ -306,17 +306,15 @@ def range_text(return_range: ReturnRange, returns: Returns, scenario: Scenario) 
     worst_text, start_text = (
         ("", "") if return_range.count == 1 else ("worst ", f", started at {worst_return.time:.0f} s,")
     )
+    judgement = (
+        "not judged"
+        if worst_return.kind in UNJUDGED
+        else ("safe" if worst_return.safe else "unsafe" if worst_return.kind in UNSAFE else "too low")
+    )
     return (
-        f"started at {time_text}: {_judgement_text(worst_return)}; the {worst_text}return to {worst_return.target.name}"
+        f"started at {time_text}: {judgement}; the {worst_text}return to {worst_return.target.name}"
         f"{reason}{start_text} {_range_outcome_text(worst_return, returns, scenario)}"
     )
-
-
-def _judgement_text(ret: SimulatedReturn) -> str:
-    """Return the judgement of a return: "safe", "unsafe", "too low" or "not judged"."""
-    if ret.kind in UNJUDGED:
-        return "not judged"
-    return "safe" if ret.safe else "unsafe" if ret.kind in UNSAFE else "too low"
 
 
 def _height_text(ret: SimulatedReturn, limit: float) -> str:

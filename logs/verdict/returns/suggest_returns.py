@@ -214,7 +214,14 @@ def suggest_parameters(world: ReturnWorld, starts: ReturnStarts) -> list[Remedy]
             remedies.append(Remedy(search.values(safe_altitude)))
         if safe_altitude is not None:
             return remedies
-    return [*remedies, *_suggest_other_parameters(world, trial, lowest_values)]
+    # Other parameters with which all returns are safe.
+    candidates = [dict(values) for values in world.autopilot.returns.trials.others]
+    if lowest_values:
+        candidates += [candidate | lowest_values for candidate in candidates]
+    passing_candidate = first_that_passes(
+        candidates, lambda candidate: trial.passes(world.with_parameters(**candidate), _meets_all_limits)
+    )
+    return [*remedies, *([] if passing_candidate is None else [Remedy(passing_candidate)])]
 
 
 class _AltitudeSearch:
@@ -251,20 +258,6 @@ class _AltitudeSearch:
             (altitude for altitude in self._candidates if altitude >= min_altitude),
             lambda altitude: trial.passes(self._world.with_parameters(**self.values(altitude)), criterion),
         )
-
-
-def _suggest_other_parameters(world: ReturnWorld, trial: _ReturnTrial, altitudes: dict[str, float]) -> list[Remedy]:
-    """Suggest a change of other parameters with which all returns are safe; return [] without one.
-
-    altitudes: parameters of a return height (m) by name, which are also tried together with each change; may be empty.
-    """
-    candidates = [dict(values) for values in world.autopilot.returns.trials.others]
-    if altitudes:
-        candidates += [candidate | altitudes for candidate in candidates]
-    passing_candidate = first_that_passes(
-        candidates, lambda candidate: trial.passes(world.with_parameters(**candidate), _meets_all_limits)
-    )
-    return [] if passing_candidate is None else [Remedy(passing_candidate)]
 
 
 # ----------------------------------------------------------------------
@@ -394,16 +387,14 @@ def _rally_candidates(
             ):
                 point_altitude = altitude
                 if end_height > 0.0:
-                    point_altitude = max(_ground_altitude(world, grid_east, grid_north), altitude - end_height)
+                    terrain = world.scenario.terrain
+                    point_altitude = max(
+                        world.home.up if terrain is None else float(terrain.height(grid_east, grid_north)),
+                        altitude - end_height,
+                    )
                 height = math.ceil(point_altitude - world.home.up)
                 candidates.append(ReturnPoint(grid_east, grid_north, world.home.up + height, world.home.up))
     return [place._replace(number=k) for k, place in enumerate(candidates, 1)]
-
-
-def _ground_altitude(world: ReturnWorld, east: float, north: float) -> float:
-    """Return the altitude of the ground at a point, or home's altitude without terrain, m AMSL."""
-    terrain = world.scenario.terrain
-    return world.home.up if terrain is None else float(terrain.height(east, north))
 
 
 def _highest_ground(world: ReturnWorld, east: float, north: float) -> float:
@@ -478,7 +469,12 @@ class _RallySearch:
             if self._count_good(searched_starts, extended_set) <= self._count_good(searched_starts, point_set):
                 break
             point_set = self._with_swaps(searched_starts, extended_set)
-        return self._without_superfluous_points(searched_starts, point_set)
+        # Remove the points that do not increase the number of good returns.
+        for candidate in list(point_set):
+            smaller_set = [other for other in point_set if other != candidate]
+            if self._count_good(searched_starts, smaller_set) >= self._count_good(searched_starts, point_set):
+                point_set = smaller_set
+        return point_set
 
     def _with_best_addition(self, searched_starts: NDArray[np.intp], point_set: list[int]) -> list[int]:
         """Return a set extended by the best point, or by the best pair if no single point is an improvement."""
@@ -551,12 +547,4 @@ class _RallySearch:
                     count = self._count_good(searched_starts, swapped_set)
                     if count > best_count:
                         best_count, point_set, has_improved = count, swapped_set, True
-        return point_set
-
-    def _without_superfluous_points(self, searched_starts: NDArray[np.intp], point_set: list[int]) -> list[int]:
-        """Remove the points of a set that do not increase the number of good returns."""
-        for candidate in list(point_set):
-            smaller_set = [other for other in point_set if other != candidate]
-            if self._count_good(searched_starts, smaller_set) >= self._count_good(searched_starts, point_set):
-                point_set = smaller_set
         return point_set

@@ -69,7 +69,17 @@ def clearance_findings(
     landing = _find_landing(requirements)
     fields_by_leg = _fields_by_leg(requirements, landing)
     legs, points = requirements.path.legs, requirements.path.points
-    heights, off_terrain = _known_heights(terrain, points)
+    # Each segment's lowest known height above ground, and its first place over unknown ground.
+    heights, fractions = path_clearance(terrain.heights, terrain.to_pixel.record, points)
+    off_terrain = np.full((len(heights), 3), np.nan)
+    for k in np.flatnonzero(np.isnan(heights)):
+        start, step = points[k], points[k + 1] - points[k]
+        off_terrain[k] = start + fractions[k] * step
+        sample_count = 2 + int(np.hypot(step[0], step[1]) / terrain.spacing)
+        samples = start + np.linspace(0.0, 1.0, sample_count)[:, None] * step
+        sampled_heights = samples[:, 2] - terrain.height(samples[:, 0], samples[:, 1])
+        if np.isfinite(sampled_heights).any():
+            heights[k] = np.nanmin(sampled_heights)
     findings = []
     for leg in range(requirements.legs):
         if landing is not None and leg == landing.leg and not landing.is_judged_here:
@@ -86,27 +96,6 @@ def clearance_findings(
                 _flown_finding(requirements, aligned, leg, planned_height, requirement, is_planned_short=is_short)
             )
     return [*_home_above_ground_findings(requirements, findings), *findings]
-
-
-def _known_heights(terrain: Terrain, points: Floats) -> tuple[Floats, Floats]:
-    """Return each segment's lowest known height above ground, and its first place over unknown ground.
-
-    points: corners of the path (east, north, up), m, (n, 3).
-
-    The heights are in m, (n - 1,).  A height is NaN if the ground is unknown along the whole segment.  If only a part
-    is known, samples of that part give the height.  The places are in m, (n - 1, 3), NaN where all ground is known.
-    """
-    heights, fractions = path_clearance(terrain.heights, terrain.to_pixel.record, points)
-    off_terrain = np.full((len(heights), 3), np.nan)
-    for k in np.flatnonzero(np.isnan(heights)):
-        start, step = points[k], points[k + 1] - points[k]
-        off_terrain[k] = start + fractions[k] * step
-        sample_count = 2 + int(np.hypot(step[0], step[1]) / terrain.spacing)
-        samples = start + np.linspace(0.0, 1.0, sample_count)[:, None] * step
-        sampled_heights = samples[:, 2] - terrain.height(samples[:, 0], samples[:, 1])
-        if np.isfinite(sampled_heights).any():
-            heights[k] = np.nanmin(sampled_heights)
-    return heights, off_terrain
 
 
 def _off_terrain_text(requirements: RouteRequirements, terrain: Terrain, places: Floats) -> str:
@@ -268,7 +257,16 @@ def _fields_by_leg(
         fields_by_leg = dict.fromkeys(range(takeoff_item(requirements.setup)[0] + 1), (home,))
     if landing is not None:
         first_leg = first_landing_leg(setup, landing.item, landing.leg)
-        for leg in range(max(first_leg, _last_clear_waypoint(requirements, landing.leg)), landing.leg + 1):
+        # Last waypoint before the final approach that keeps the required height; if there is none, the start of the
+        # approach.
+        final_leg = landing.leg
+        terrain, waypoints = requirements.setup.scenario.terrain, requirements.setup.route.positions[: final_leg + 1]
+        last_clear_waypoint = final_leg
+        if terrain is not None:
+            heights = waypoints[:, 2] - terrain.height(waypoints[:, 0], waypoints[:, 1])
+            clear_waypoints = np.flatnonzero(heights >= requirements.limits.min_clearance - CLEARANCE_TOLERANCE_M)
+            last_clear_waypoint = int(clear_waypoints[-1]) if clear_waypoints.size else final_leg
+        for leg in range(max(first_leg, last_clear_waypoint), landing.leg + 1):
             fields_by_leg[leg] = (*fields_by_leg.get(leg, ()), landing.point)
     return fields_by_leg
 
@@ -297,19 +295,6 @@ def _first_airborne_segment(requirements: RouteRequirements, aligned: AlignedTra
     places = aligned.track.position[first : first + climb_rows, :2]
     is_near_home = np.hypot(places[:, 0] - home[0], places[:, 1] - home[1]) <= FIELD_RADIUS_M
     return first + climb_rows if is_near_home.all() else first
-
-
-def _last_clear_waypoint(requirements: RouteRequirements, final_leg: int) -> int:
-    """Return the last waypoint before the final approach that keeps the required height above ground.
-
-    Return the start of the final approach if no waypoint keeps this height, or if the terrain is unknown.
-    """
-    terrain, waypoints = requirements.setup.scenario.terrain, requirements.setup.route.positions[: final_leg + 1]
-    if terrain is None:
-        return final_leg
-    heights = waypoints[:, 2] - terrain.height(waypoints[:, 0], waypoints[:, 1])
-    clear_waypoints = np.flatnonzero(heights >= requirements.limits.min_clearance - CLEARANCE_TOLERANCE_M)
-    return int(clear_waypoints[-1]) if clear_waypoints.size else final_leg
 
 
 def _limit_source(requirements: RouteRequirements, limit: float) -> str:

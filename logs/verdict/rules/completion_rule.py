@@ -26,7 +26,11 @@ def completion_findings(
     if plan is not None and plan.failures:
         faults.append(message("the plan is not feasible", f": {plan.failures[0]}"))
     if end_reason != "completed":
-        faults.append(message(f"the flight ended early: {end_reason}", _ending_place_text(requirements, aligned)))
+        place_text = ""
+        if aligned is not None and not aligned.passed[-1]:
+            row = len(aligned.track) - 1
+            place_text = f" on {place_text_within(requirements.leg(aligned.leg_at(row)))} {aligned.position_text(row)}"
+        faults.append(message(f"the flight ended early: {end_reason}", place_text))
     if not log_complete:
         faults.append(message("the log is damaged or unfinished"))
     flown_count, leg_numbers = 0, requirements.setup.route.leg_numbers
@@ -59,14 +63,6 @@ def completion_findings(
             method="waypoints passed in order",
         )
     ]
-
-
-def _ending_place_text(requirements: RouteRequirements, aligned: AlignedTrack | None) -> str:
-    """Describe the leg and place where a flight ended early; return "" if it reached the last waypoint."""
-    if aligned is None or aligned.passed[-1]:
-        return ""
-    row = len(aligned.track) - 1
-    return f" on {place_text(requirements.leg(aligned.leg_at(row)))} {aligned.position_text(row)}"
 
 
 def _record_faults(aligned: AlignedTrack) -> list[Message]:

@@ -47,7 +47,9 @@ def _leg_finding(requirements: RouteRequirements, aligned: AlignedTrack | None, 
         nearby_legs = slice(max(0, leg - 1), min(requirements.legs, leg + 2) + 1)
         flown_distance, row = farthest_from_legs(aligned.track.position[rows], requirements.points[nearby_legs])
         ok = flown_distance <= limit
-        time_and_place = _time_and_place_text(aligned, rows.start + row)
+        farthest_row = rows.start + row
+        east, north, _ = aligned.track.position[farthest_row]
+        time_and_place = f"at {aligned.track.time[farthest_row]:.1f} s, east {east:.0f} m, north {north:.0f} m"
         facts.append(f"within {flown_distance:.1f} m of the legs, the farthest {time_and_place}")
         if not ok:
             faults.append(
@@ -83,12 +85,6 @@ def _rows_after_takeoff(requirements: RouteRequirements, aligned: AlignedTrack, 
     lateral_offset = project_onto_leg(requirements, leg, np.asarray(aligned.track.position[rows], dtype=np.float64))[1]
     has_joined = (course_error < math.sin(0.5 * RUNWAY_COURSE_TOLERANCE_RAD)) & (np.abs(lateral_offset) <= limit)
     return slice(rows.start + int(np.argmax(has_joined)), rows.stop) if has_joined.any() else rows
-
-
-def _time_and_place_text(aligned: AlignedTrack, row: int) -> str:
-    """Describe the time and the position of the aircraft in a row of the track."""
-    east, north, _ = aligned.track.position[row]
-    return f"at {aligned.track.time[row]:.1f} s, east {east:.0f} m, north {north:.0f} m"
 
 
 RULE = Rule(

@@ -172,6 +172,12 @@ def _zone_finding(
             f"the planned path is {planned_visit.depth:.1f} m {side_text}"
             f" at {_event_text(requirements, planned_visit, 'at')}"
         )
+    # Without a scenario, a zone given on the command line has the source "fence".
+    zone_source = (
+        "mission"
+        if zone_number >= requirements.airspace.scenario_zone_count
+        else ("fence" if requirements.setup.scenario.external else "scenario")
+    )
     return make_finding(
         "fence",
         airspace.place(zone_number),
@@ -181,7 +187,7 @@ def _zone_finding(
         planned=max(0.0, planned_visit.depth),
         flown=None if flown_visit is None else max(0.0, flown_visit.depth),
         limit=0.0,
-        source=_zone_source(requirements, zone_number),
+        source=zone_source,
         tolerance=ROUNDING_M,
         margin=-visit.depth,
         unit="m",
@@ -197,16 +203,6 @@ def _visit_facts(visit: Record) -> list[Fact]:
         for coordinate, unit in (("time", "s"), ("east", "m"), ("north", "m"), ("up", "m"), ("leg", "1")):
             facts.append(Fact(f"{event} {coordinate}", float(visit[f"{event}_{coordinate}"]), unit))
     return facts
-
-
-def _zone_source(requirements: RouteRequirements, zone_number: int) -> str:
-    """Return the name of the source of a zone: "mission", "scenario" or "fence".
-
-    Without a scenario, a zone given on the command line has the source "fence".
-    """
-    if zone_number >= requirements.airspace.scenario_zone_count:
-        return "mission"
-    return "fence" if requirements.setup.scenario.external else "scenario"
 
 
 def _event_text(requirements: RouteRequirements, visit: Record, event: str) -> str:

@@ -153,25 +153,23 @@ def _describe_take_off(
         method_text = "from a catapult" if method == "catapult" else "by hand"
         notes = [f"launched {method_text} on {course}° at {take_off.speed:.1f} m/s, {take_off.acceleration:.1f} m/s²"]
     if distances[-1] > 1.0:
-        notes.append(_describe_climb(track, distances, terrain))
+        position = track.position
+        altitude_gain, distance = float(position[-1, 2] - position[0, 2]), float(distances[-1])
+        course_text = (
+            f"finally on a course of {round(math.degrees(math.atan2(*track.velocity[-1, :2].tolist()))) % 360}°"
+        )
+        if altitude_gain >= 0.0:
+            climb_text = f"climbs {100.0 * altitude_gain / distance:.0f} m in 100 m, {course_text}"
+        else:
+            ground = (
+                math.nan if terrain is None else float(terrain.height(float(position[-1, 0]), float(position[-1, 1])))
+            )
+            end_text = course_text if math.isnan(ground) else f"down to {position[-1, 2] - ground:.1f} m above ground"
+            climb_text = f"sinks {-altitude_gain:.1f} m in the {distance:.0f} m flown, {end_text}"
+        notes.append(climb_text)
     if math.isfinite(clearance):
         notes.append(f"at least {clearance:.0f} m above ground more than {LAUNCH_RUN_M:.0f} m from the launch")
     return notes
-
-
-def _describe_climb(track: Track, distances: Floats, terrain: Terrain | None) -> str:
-    """Describe the climb after a launch: slope and final course, or the height lost.
-
-    distances: distance of each row along the track, m, (t,).
-    """
-    position = track.position
-    altitude_gain, distance = float(position[-1, 2] - position[0, 2]), float(distances[-1])
-    course_text = f"finally on a course of {round(math.degrees(math.atan2(*track.velocity[-1, :2].tolist()))) % 360}°"
-    if altitude_gain >= 0.0:
-        return f"climbs {100.0 * altitude_gain / distance:.0f} m in 100 m, {course_text}"
-    ground = math.nan if terrain is None else float(terrain.height(float(position[-1, 0]), float(position[-1, 1])))
-    end_text = course_text if math.isnan(ground) else f"down to {position[-1, 2] - ground:.1f} m above ground"
-    return f"sinks {-altitude_gain:.1f} m in the {distance:.0f} m flown, {end_text}"
 
 
 RULE = Rule(

@@ -19,7 +19,7 @@ from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT, Place
 from logs.verdict.returns.judge_returns import FlyAgain, Returns, judge_returns, make_return_world
-from logs.verdict.returns.return_starts import ReturnStarts, flown_starts, planned_starts
+from logs.verdict.returns.return_starts import flown_starts, planned_starts
 from logs.verdict.returns.returns_text import ACTION_TEXTS, headline
 from logs.verdict.rule import LogNeeds, Rule
 from logs.verdict.wording import place_text
@@ -96,7 +96,11 @@ def judge_link(
         judged_link = link_along_path(link, terrain, antenna, track.time, track.position)
     all_reactions = setup.autopilot.returns.after_link_loss(link.use)
     reactions = [reaction for reaction in all_reactions if reaction.action != "on"]
-    outages = _outages_until(judged_link.outages, _end_of_reactions(requirements, aligned if not geometric else None))
+    # Parts of the outages before the end of the reactions.
+    end_time = _end_of_reactions(requirements, aligned if not geometric else None)
+    outages = [
+        Outage(outage.start, min(outage.end, end_time)) for outage in judged_link.outages if outage.start < end_time
+    ]
     is_noticed = any(outage.duration > reaction.delay for outage in outages for reaction in reactions)
     returns, reaction_text = None, ""
     if is_noticed:
@@ -155,11 +159,6 @@ def _end_of_reactions(requirements: RouteRequirements, aligned: AlignedTrack | N
     return float(path.times[segment]) if segment < len(path.legs) else math.inf
 
 
-def _outages_until(outages: Sequence[Outage], end_time: float) -> list[Outage]:
-    """Return the parts of outages before a time, s."""
-    return [Outage(outage.start, min(outage.end, end_time)) for outage in outages if outage.start < end_time]
-
-
 def _judge_reaction_returns(
     requirements: RouteRequirements,
     track: Track | None,
@@ -182,22 +181,14 @@ def _judge_reaction_returns(
         return None
     interval = float(max(1, math.ceil(sum(outage.duration for outage in outages) / _MAX_RETURNS)))
     starts = planned_starts(setup, interval, requirements) if track is None else flown_starts(setup, track, interval)
-    return judge_returns(world, _starts_in_outages(starts, outages, reactions[0].delay, interval), interval, fly_again)
-
-
-def _starts_in_outages(starts: ReturnStarts, outages: Sequence[Outage], delay: float, interval: float) -> ReturnStarts:
-    """Select the starts of returns in outages, from the time when the autopilot notices them.
-
-    One start before and one start after each such period is included.
-
-    delay: time for which a link is lost before the autopilot notices it, s.
-    interval: time between starts, s.
-    """
+    # Starts in outages, from the time when the autopilot notices them; one start before and one after each such
+    # period is included.
+    delay = reactions[0].delay
     is_lost = np.zeros(len(starts), dtype=np.bool_)
     for outage in outages:
         if outage.duration > delay:
             is_lost |= (starts.time > outage.start + delay - interval) & (starts.time < outage.end + interval)
-    return replace(starts.subset(np.flatnonzero(is_lost)), grounded_count=0)
+    return judge_returns(world, replace(starts.subset(np.flatnonzero(is_lost)), grounded_count=0), interval, fly_again)
 
 
 # ----------------------------------------------------------------------

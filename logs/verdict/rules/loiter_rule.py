@@ -72,23 +72,19 @@ def loiter_circles(requirements: RouteRequirements) -> list[LoiterCircle]:
             last += 1
         if arc_radii[first] > 0.0:
             laps = float(np.abs(requirements.turns[first : last + 1]).sum()) / (2.0 * math.pi)
-            center = _circle_center(requirements, first)
+            # Center of the circle to which the arc of the corner belongs.
+            ux, uy = requirements.leg_unit(first - 1)
+            turn_sign = math.copysign(1.0, requirements.turns[first])
+            tangent = tangent_length(abs(float(requirements.turns[first])), float(requirements.radius[first]))
+            center = np.array(
+                requirements.points[first, :2]
+                - tangent * np.array([ux, uy])
+                + turn_sign * requirements.radius[first] * np.array([uy, -ux])
+            )
             loiters.append(LoiterCircle(first, last, center, float(arc_radii[first]), laps))
             first = last
         first += 1
     return loiters
-
-
-def _circle_center(requirements: RouteRequirements, corner: int) -> Floats:
-    """Return the center of the circle to which the arc of a corner belongs, (east, north), m."""
-    ux, uy = requirements.leg_unit(corner - 1)
-    turn_sign = math.copysign(1.0, requirements.turns[corner])
-    tangent = tangent_length(abs(float(requirements.turns[corner])), float(requirements.radius[corner]))
-    return np.array(
-        requirements.points[corner, :2]
-        - tangent * np.array([ux, uy])
-        + turn_sign * requirements.radius[corner] * np.array([uy, -ux])
-    )
 
 
 def merge_loiter_findings(
@@ -261,8 +257,19 @@ def _corner_faults(
     if not failed_corners or (aligned is None and has_faults):
         return []
     if aligned is not None:
-        return [_unheld_corners_message(circle, failed_corners)]
-    return [_failed_corner_message(requirements, circle, failed_corners[0])]
+        # Number of corners that failed in flight, and the worst of them.
+        worst_corner = min(failed_corners, key=worst_first_key)
+        corner_count = len({finding.place for finding in failed_corners})
+        count_text = f"{corner_count} of {circle.last - circle.first + 1} corners not held; the worst is "
+        return [
+            Message(
+                f"{count_text}{place_text(worst_corner.place)}: {worst_corner.reason}",
+                f"{count_text}{_corner_text(worst_corner.place)}",
+            )
+        ]
+    finding = failed_corners[0]
+    reason_text = f"{place_text(finding.place)}: {finding.reason}"
+    return [Message(reason_text, _corner_text(finding.place), finding.place == requirements.waypoint(circle.first))]
 
 
 def _min_radius(requirements: RouteRequirements, circle: LoiterCircle, *, possible: bool = False) -> float:
@@ -412,23 +419,6 @@ def _small_radius_faults(requirements: RouteRequirements, circle: LoiterCircle, 
     if not math.isfinite(min_radius):
         need_text = f"at {speed:.0f} m/s the circle cannot be flown"
     return [message(f"radius {circle.radius:.0f} m; {need_text} in this wind")]
-
-
-def _failed_corner_message(requirements: RouteRequirements, circle: LoiterCircle, finding: Finding) -> Message:
-    """Make a message on a planned corner that fails, with the reason of its finding."""
-    reason_text = f"{place_text(finding.place)}: {finding.reason}"
-    return Message(reason_text, _corner_text(finding.place), finding.place == requirements.waypoint(circle.first))
-
-
-def _unheld_corners_message(circle: LoiterCircle, failed_corners: list[Finding]) -> Message:
-    """Make a message with the number of corners that failed in flight, and the worst of them."""
-    worst_corner = min(failed_corners, key=worst_first_key)
-    corner_count = len({finding.place for finding in failed_corners})
-    count_text = f"{corner_count} of {circle.last - circle.first + 1} corners not held; the worst is "
-    return Message(
-        f"{count_text}{place_text(worst_corner.place)}: {worst_corner.reason}",
-        f"{count_text}{_corner_text(worst_corner.place)}",
-    )
 
 
 def _corner_text(place: Place) -> str:

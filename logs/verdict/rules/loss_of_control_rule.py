@@ -37,11 +37,9 @@ def departure_findings(
     max_bank, airspeed_faults = _max_finite(bank), _low_airspeed_faults(requirements, aligned)
     faults = []
     if aligned.bad_rows:
+        time_text = f"at {aligned.first_bad:.1f} s" if math.isfinite(aligned.first_bad) else "without a time"
         faults.append(
-            message(
-                f"no usable numbers in {count_text(aligned.bad_rows, 'row')} of the log, the first"
-                f" {_time_text(aligned.first_bad)}"
-            )
+            message(f"no usable numbers in {count_text(aligned.bad_rows, 'row')} of the log, the first {time_text}")
         )
     if (bank > MAX_CONTROLLED_BANK_RAD).any():
         row = int(np.argmax(bank > MAX_CONTROLLED_BANK_RAD))
@@ -97,7 +95,16 @@ def _low_airspeed_faults(requirements: RouteRequirements, aligned: AlignedTrack)
     if imported_log is not None and not imported_log.aircraft_known:
         return []
     track = aligned.track
-    min_airspeeds = _min_flying_airspeeds(requirements, track.position[:, 2])
+    # The minimum airspeed of the Aerosonde is a constant; that of other aircraft is a multiple of the minimum
+    # level speed.
+    altitude = track.position[:, 2]
+    if requirements.setup.aircraft == "aerosonde":
+        min_airspeeds = np.full(altitude.shape, MIN_CONTROLLED_AIRSPEED_MPS)
+    else:
+        envelope = requirements.setup.envelope
+        min_airspeeds = np.asarray(
+            MIN_CONTROLLED_STALL_RATIO * np.interp(altitude, envelope.amsl, envelope.level_speed_min)
+        )
     slow_rows = np.flatnonzero(track.airspeed < min_airspeeds)
     if not slow_rows.size:
         return []
@@ -107,22 +114,6 @@ def _low_airspeed_faults(requirements: RouteRequirements, aligned: AlignedTrack)
             f"airspeed {track.airspeed[row]:.1f} m/s at {track.time[row]:.1f} s, below {min_airspeeds[row]:.1f} m/s"
         )
     ]
-
-
-def _time_text(time: float) -> str:
-    """Describe a time (s), or return "without a time" if it is not finite."""
-    return f"at {time:.1f} s" if math.isfinite(time) else "without a time"
-
-
-def _min_flying_airspeeds(requirements: RouteRequirements, altitude: Floats) -> Floats:
-    """Return the minimum airspeed of controlled flight at each altitude (m AMSL, (n,)), m/s, (n,).
-
-    For the Aerosonde it is a constant; for other aircraft, it is a multiple of the minimum level speed.
-    """
-    if requirements.setup.aircraft == "aerosonde":
-        return np.full(altitude.shape, MIN_CONTROLLED_AIRSPEED_MPS)
-    envelope = requirements.setup.envelope
-    return np.asarray(MIN_CONTROLLED_STALL_RATIO * np.interp(altitude, envelope.amsl, envelope.level_speed_min))
 
 
 RULE = Rule(

@@ -312,6 +312,17 @@ def _mission_parts(setup: FlightSetup) -> MissionParts:
     # The aircraft of a log may not be on this machine.
     with suppress(FlightError):
         aircraft = find_logged_aircraft(setup.aircraft, setup.scenario.flight.aircraft)
+    # The voltage is unknown if the aircraft has no battery, or a guessed one.
+    cells = 0 if setup.envelope.battery_guessed else round(setup.envelope.volts / NOMINAL_CELL_VOLTAGE_V)
+    mission = setup.mission
+    if mission.home is None:
+        rally_distance = math.nan if mission.rally else math.inf
+    else:
+        origin = GeoOrigin(mission.home.lat_deg, mission.home.lon_deg)
+        rally_distance = min(
+            (math.hypot(*map(float, to_map(origin, point.lat_deg, point.lon_deg))) for point in mission.rally),
+            default=math.inf,
+        )
     return MissionParts(
         returns=C.NAV_RETURN_TO_LAUNCH in commands or judges_return_after_last_item(setup),
         has_return_path=C.DO_RETURN_PATH_START in commands,
@@ -326,7 +337,7 @@ def _mission_parts(setup: FlightSetup) -> MissionParts:
             (item.params[0] for item in setup.mission.fences if item.command == C.NAV_FENCE_CIRCLE_INCLUSION),
             default=math.inf,
         ),
-        rally_distance=_rally_distance(setup.mission),
+        rally_distance=rally_distance,
         enables_fence=any(item.command == C.DO_FENCE_ENABLE and item.params[0] == 1.0 for item in items),
         throttled_airspeeds=tuple(
             item.params[1]
@@ -336,20 +347,9 @@ def _mission_parts(setup: FlightSetup) -> MissionParts:
         follows_terrain=any(item.frame in OVER_TERRAIN and item.has_position for item in items),
         moves_payload=not commands.isdisjoint((C.DO_GRIPPER, C.DO_WINCH, C.DO_GIMBAL_MANAGER_PITCHYAW)),
         wind=setup.scenario.wind.max_speed_at(setup.route.positions[:, 2]),
-        full_voltage=_full_voltage(setup),
+        full_voltage=cells * FULL_CELL_VOLTAGE_V if cells else math.inf,
         commands=frozenset(commands),
         aircraft=aircraft,
-    )
-
-
-def _rally_distance(mission: Mission) -> float:
-    """Return the distance of the nearest rally point from home, m; inf without one, NaN without a home."""
-    if mission.home is None:
-        return math.nan if mission.rally else math.inf
-    origin = GeoOrigin(mission.home.lat_deg, mission.home.lon_deg)
-    return min(
-        (math.hypot(*map(float, to_map(origin, point.lat_deg, point.lon_deg))) for point in mission.rally),
-        default=math.inf,
     )
 
 
@@ -361,12 +361,6 @@ def _home_fence_violation(setup: FlightSetup) -> str:
     origin = GeoOrigin(mission.home.lat_deg, mission.home.lon_deg)
     problem = fence_problem(mission.fences, origin, 0.0, 0.0, any_inclusion_suffices=checks.any_inclusion_suffices)
     return "" if problem is None else problem[0]
-
-
-def _full_voltage(setup: FlightSetup) -> float:
-    """Return the voltage of the full battery, V; inf if the aircraft has no battery or a guessed one."""
-    cells = 0 if setup.envelope.battery_guessed else round(setup.envelope.volts / NOMINAL_CELL_VOLTAGE_V)
-    return cells * FULL_CELL_VOLTAGE_V if cells else math.inf
 
 
 def _flown_items(mission: Mission) -> list[MissionItem]:

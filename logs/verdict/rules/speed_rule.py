@@ -53,19 +53,17 @@ def speed_findings(
         _speed_finding(requirements, aligned, leg, float(demanded_speeds[leg]), geometric=geometric)
         for leg in range(requirements.legs)
     ]
-    return [*_parameter_findings(requirements), *findings] if geometric else findings
-
-
-def _parameter_findings(requirements: RouteRequirements) -> list[Finding]:
-    """Report contradictory speed parameters as undecided: only a flight shows which airspeed is held."""
     parameters = requirements.setup.autopilot.parameters
-    if parameters is None or not parameters.contradictions or requirements.setup.imported_log is not None:
-        return []
-    more_text = f", and {len(parameters.contradictions) - 1} more" if len(parameters.contradictions) > 1 else ""
-    fault = message(
-        f"{parameters.contradictions[0]}{more_text}", "; only a simulated flight shows which airspeed is held"
-    )
-    return [make_finding("speed", FLIGHT, ok=None, reason=fault.text, faults=[fault], check=NOT_FLOWN)]
+    parameter_findings = []
+    if parameters is not None and parameters.contradictions and requirements.setup.imported_log is None:
+        more_text = f", and {len(parameters.contradictions) - 1} more" if len(parameters.contradictions) > 1 else ""
+        fault = message(
+            f"{parameters.contradictions[0]}{more_text}", "; only a simulated flight shows which airspeed is held"
+        )
+        parameter_findings = [
+            make_finding("speed", FLIGHT, ok=None, reason=fault.text, faults=[fault], check=NOT_FLOWN)
+        ]
+    return [*parameter_findings, *findings] if geometric else findings
 
 
 def _speed_finding(

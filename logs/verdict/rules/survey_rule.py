@@ -239,7 +239,12 @@ def _planned_finding(
     cut_in = max(turn_in, off_altitude)
     cut_out = _clip_to_length(_turn_lead(requirements, line) - lead_out, length)
     straight_fraction = max(0.0, length - cut_in - cut_out) / length
-    unknown_fraction = min(_unknown_ground_fraction(requirements, line), straight_fraction)
+    # Fraction of the line whose height above ground is unknown.
+    axis = LineAxis(requirements.points[line.first : line.last + 1])
+    along = np.linspace(0.0, axis.length, max(2, math.ceil(axis.length / PHOTO_STEP_M) + 1))
+    unknown_fraction = min(
+        float(np.isnan(heights_over_ground(requirements, axis.points_at(along))).mean()), straight_fraction
+    )
     ok = is_covered(straight_fraction - unknown_fraction, unknown_fraction)
     name = _line_text(requirements, survey, line, number)
     faults, facts = [], [f"{name}: its turns leave {100.0 * straight_fraction:.0f} % of its {length:.0f} m straight"]
@@ -256,13 +261,6 @@ def _planned_finding(
             )
         )
     return _line_finding(requirements, line, ok, faults, facts, straight_fraction, geometric=True)
-
-
-def _unknown_ground_fraction(requirements: RouteRequirements, line: PhotoLine) -> float:
-    """Return the fraction of a planned photo line whose height above ground is unknown."""
-    axis = LineAxis(requirements.points[line.first : line.last + 1])
-    along = np.linspace(0.0, axis.length, max(2, math.ceil(axis.length / PHOTO_STEP_M) + 1))
-    return float(np.isnan(heights_over_ground(requirements, axis.points_at(along))).mean())
 
 
 def _unknown_ground_message(requirements: RouteRequirements, fraction: float, length: float, name: str) -> Message:
@@ -323,7 +321,14 @@ def _flown_finding(
         faults.append(_unknown_ground_message(requirements, measure.unknown, measure.length, name))
         facts = [unusable_parts_text(measure)] if unusable_parts_text(measure) else []
     elif not ok:
-        faults, facts = [_coverage_fault(measure, name)], []
+        ends_text = f"; its first {measure.lost_at_start:.0f} m and last {measure.lost_at_end:.0f} m are lost"
+        if max(measure.lost_at_start, measure.lost_at_end) < 1.0:
+            ends_text = ""
+        fault = message(
+            f"{name}: {100.0 * measure.usable:.0f} % of its {measure.length:.0f} m can be used",
+            f": {unusable_parts_text(measure)}{ends_text}",
+        )
+        faults, facts = [fault], []
     if measure.missed_photos:
         facts.append(f"{measure.missed_photos} of {count_text(measure.photos, 'photo')} missed")
     return _line_finding(requirements, line, ok, faults, facts, measure.usable, geometric=False, measure=measure)
@@ -343,17 +348,6 @@ def unusable_parts_text(measure: LineMeasure) -> str:
     }
     parts = sorted(((fraction, defect) for defect, fraction in fractions.items() if fraction >= 0.005), reverse=True)
     return ", ".join(f"{100.0 * fraction:.0f} % {defect}" for fraction, defect in parts)
-
-
-def _coverage_fault(measure: LineMeasure, name: str) -> Message:
-    """Describe the usable fraction of a photo line, the causes of the loss, and the lost ends."""
-    ends_text = f"; its first {measure.lost_at_start:.0f} m and last {measure.lost_at_end:.0f} m are lost"
-    if max(measure.lost_at_start, measure.lost_at_end) < 1.0:
-        ends_text = ""
-    return message(
-        f"{name}: {100.0 * measure.usable:.0f} % of its {measure.length:.0f} m can be used",
-        f": {unusable_parts_text(measure)}{ends_text}",
-    )
 
 
 def _line_finding(

@@ -124,6 +124,17 @@ def _measure_landing(
     distance_beyond_point, lateral_offset = _as_floats(approach.distances_from_landing_point(position[touchdown_row]))
     touchdown, stop = (_as_floats(approach.distances_from_strip_center(position[row])) for row in (touchdown_row, -1))
     sink, ground_sink = _sink_rates(track, terrain, approach, touchdown_row)
+    point_altitude = float(approach.point[2])
+    glide = requirements.setup.autopilot.ground.glide(
+        approach.start_altitude - point_altitude, approach.length, approach.tail_wind, point_altitude
+    )
+    flare_distance = glide.flare_distance + max(0.0, FLARE_HEIGHT_MARGIN_M - glide.flare_height) / glide.slope
+    is_near = approach.distances_from_landing_point(position)[0] > -max(EARLY_TOUCHDOWN_DISTANCE_M, flare_distance)
+    end_row = int(np.argmax(is_near)) if is_near.any() else len(position)
+    final_clearance = math.inf
+    if end_row >= 2:
+        heights, _ = path_clearance(terrain.heights, terrain.to_pixel.record, np.ascontiguousarray(position[:end_row]))
+        final_clearance = float(heights.min())
     return _Landing(
         distance_beyond_point=distance_beyond_point,
         lateral_offset=lateral_offset,
@@ -132,7 +143,7 @@ def _measure_landing(
         strip_left=0.5 * approach.strip.length - stop[0],
         sink=sink,
         ground_sink=ground_sink,
-        final_clearance=_final_clearance(requirements, position, terrain, approach),
+        final_clearance=final_clearance,
     )
 
 
@@ -213,24 +224,6 @@ def _sink_rates(track: Track, terrain: Terrain, approach: Approach, row: int) ->
     )
     course_speed = east * math.sin(approach.course) + north * math.cos(approach.course)
     return -vertical_speed, -vertical_speed + ground_slope * course_speed
-
-
-def _final_clearance(requirements: RouteRequirements, position: Floats, terrain: Terrain, approach: Approach) -> float:
-    """Return the minimum height of the final approach above ground, up to the flare or the touchdown, m.
-
-    The height is inf if the track has no final approach, and NaN if the terrain is unknown.
-    """
-    point_altitude = float(approach.point[2])
-    glide = requirements.setup.autopilot.ground.glide(
-        approach.start_altitude - point_altitude, approach.length, approach.tail_wind, point_altitude
-    )
-    flare_distance = glide.flare_distance + max(0.0, FLARE_HEIGHT_MARGIN_M - glide.flare_height) / glide.slope
-    is_near = approach.distances_from_landing_point(position)[0] > -max(EARLY_TOUCHDOWN_DISTANCE_M, flare_distance)
-    end_row = int(np.argmax(is_near)) if is_near.any() else len(position)
-    if end_row < 2:
-        return math.inf
-    heights, _ = path_clearance(terrain.heights, terrain.to_pixel.record, np.ascontiguousarray(position[:end_row]))
-    return float(heights.min())
 
 
 def _detect_faults(approach: Approach, landing: _Landing) -> list[Message]:

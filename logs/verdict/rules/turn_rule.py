@@ -81,6 +81,10 @@ def _turn_finding(
     if measure is not None and not measure.is_complete:
         facts.append(_unflown_turn_text(requirements, waypoint, measure, aligned))
         ok = None if ok is not False else False
+    method = "route"
+    if measure is not None:
+        fit_text = "least-squares courses of both legs" if measure.is_fitted else "course change over the turn"
+        method = "not flown" if measure.angle is None else fit_text
     return make_finding(
         "turn",
         requirements.waypoint(waypoint),
@@ -94,7 +98,7 @@ def _turn_finding(
         tolerance=math.degrees(tolerance),
         margin=None if judged_turn is None else math.degrees(limit - judged_turn),
         unit="deg",
-        method=_method_text(measure),
+        method=method,
         check=check if ok is None else "",
         facts=_measured_facts(measure),
     )
@@ -123,17 +127,6 @@ def _judge_planned_turn(
     if source == "aircraft" and turn <= float(requirements.possible_turn_limit[waypoint]) + PLAN_TOLERANCE_RAD:
         return [], [sharp_turn.text], UNKNOWN_AIRCRAFT, turn
     return [sharp_turn], [], "", turn
-
-
-def _method_text(measure: TurnMeasure | None) -> str:
-    """Describe how the course change of a turn was obtained.
-
-    measure: measurements of the flown turn; None before a flight.
-    """
-    if measure is None:
-        return "route"
-    fit_text = "least-squares courses of both legs" if measure.is_fitted else "course change over the turn"
-    return "not flown" if measure.angle is None else fit_text
 
 
 def _unflown_turn_text(

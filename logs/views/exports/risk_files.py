@@ -41,7 +41,11 @@ def risk_geojson(setup: FlightSetup, volumes: Sequence[RiskVolume], properties: 
     features = [
         {
             "type": "Feature",
-            "properties": {"name": volume.name, "height_above_ground_m": _round_height(volume.height), **properties},
+            "properties": {
+                "name": volume.name,
+                "height_above_ground_m": None if volume.height is None else round(volume.height, 1),
+                **properties,
+            },
             "geometry": {
                 "type": "MultiPolygon",
                 "coordinates": [
@@ -52,11 +56,6 @@ def risk_geojson(setup: FlightSetup, volumes: Sequence[RiskVolume], properties: 
         for volume in volumes
     ]
     return json.dumps({"type": "FeatureCollection", "features": features}, indent=1) + "\n"
-
-
-def _round_height(height: float | None) -> float | None:
-    """Round a height (m) to 0.1 m; None stays None."""
-    return None if height is None else round(height, 1)
 
 
 def _to_degrees(setup: FlightSetup, ring: Floats) -> Floats:

@@ -68,11 +68,26 @@ class Instruments:
         lines += [
             f"{left_line}  {right_line}" for left_line, right_line in zip(horizon_lines, readout_lines, strict=True)
         ]
+        threats, position = self.log.setup.scenario.threats, self.log.track.position[k]
+        distances = np.sqrt(((threats.position - position) ** 2).sum(axis=1))
+        threats_in_reach = [
+            f"{unit} {threats.names[m]} at {_format_metres(float(distances[m]))}"
+            for unit, radii in (("MISSILE", threats.kill_radius), ("radar", threats.detection_radius))
+            for m in np.flatnonzero((radii > 0.0) & (distances <= radii)).tolist()
+        ]
+        threats_text = _replace_control_characters(
+            "within reach of: " + "; ".join(threats_in_reach) if threats_in_reach else "outside the reach of all units"
+        )
+        entry_count = bisect.bisect_right([entry.time for entry in self.entries], float(log.track.time[k]) + 1e-9)
+        latest_lines = [
+            f"{entry.time:8.1f} s  {entry.text}"
+            for entry in self.entries[max(0, entry_count - _LATEST_ENTRIES) : entry_count]
+        ]
         lines += [
             "",
             *self._format_control_lines(k, size.bar),
-            self._describe_threats(k),
-            *self._format_latest_entries(float(log.track.time[k])),
+            threats_text,
+            *latest_lines,
         ]
         return [shorten(line, columns).rstrip() for line in lines]
 
@@ -171,27 +186,6 @@ class Instruments:
             limit_text = "  AT ITS LIMIT" if (command >= 1.0 if is_throttle else abs(command) >= max_value) else ""
             lines.append(f"{name:<9} [{''.join(cells)}] {state_text}{limit_text}")
         return lines
-
-    def _describe_threats(self, row: int) -> str:
-        """Return the names and distances of the missiles and radars whose range contains the aircraft."""
-        threats, position = self.log.setup.scenario.threats, self.log.track.position[row]
-        distances = np.sqrt(((threats.position - position) ** 2).sum(axis=1))
-        threats_in_reach = [
-            f"{unit} {threats.names[m]} at {_format_metres(float(distances[m]))}"
-            for unit, radii in (("MISSILE", threats.kill_radius), ("radar", threats.detection_radius))
-            for m in np.flatnonzero((radii > 0.0) & (distances <= radii)).tolist()
-        ]
-        return _replace_control_characters(
-            "within reach of: " + "; ".join(threats_in_reach) if threats_in_reach else "outside the reach of all units"
-        )
-
-    def _format_latest_entries(self, time: float) -> list[str]:
-        """Return the latest entries of the timeline up to a time, s."""
-        entry_count = bisect.bisect_right([entry.time for entry in self.entries], time + 1e-9)
-        return [
-            f"{entry.time:8.1f} s  {entry.text}"
-            for entry in self.entries[max(0, entry_count - _LATEST_ENTRIES) : entry_count]
-        ]
 
 
 def make_instruments(log: FlightLog) -> Instruments:

@@ -67,7 +67,13 @@ def log_with_legs(log: FlightLog) -> FlightLog:
 
 def timeline_of_legs(log: FlightLog) -> list[TimelineEntry]:
     """List the entries as `timeline` does, for a log whose legs `log_with_legs` has computed."""
-    parts = _split_by_leg(log.track, log.setup.route)
+    # The rows are split where the leg changes; rows outside the legs of the route are left out.
+    track = log.track
+    edges = np.flatnonzero(np.diff(track.leg)) + 1
+    starts = [0, *edges.tolist()]
+    stops = [*edges.tolist(), len(track)]
+    all_parts = [_LegRows(int(track.leg[start]), start, stop - 1) for start, stop in zip(starts, stops, strict=True)]
+    parts = [part for part in all_parts if 0 <= part.leg < log.setup.route.legs]
     entries = [_make_start_entry(log)]
     entries += _list_leg_entries(log, parts)
     entries += _list_turn_entries(log, parts)
@@ -79,8 +85,10 @@ def timeline_of_legs(log: FlightLog) -> list[TimelineEntry]:
         for event in log.events
     ]
     entries += _list_end_entries(log)
+    # Unprintable characters could control the terminal.
     clean_entries = [
-        TimelineEntry(entry.time, entry.kind, _replace_control_characters(entry.text)) for entry in entries
+        TimelineEntry(entry.time, entry.kind, "".join(letter if letter.isprintable() else " " for letter in entry.text))
+        for entry in entries
     ]
     return sorted(clean_entries, key=lambda entry: (entry.time, _ORDER.index(entry.kind)))
 
@@ -95,20 +103,6 @@ def entry_lines(entry: TimelineEntry) -> list[str]:
     return textwrap.wrap(
         head + entry.text, WIDTH, subsequent_indent=" " * len(head), drop_whitespace=True, break_on_hyphens=False
     )
-
-
-def _replace_control_characters(text: str) -> str:
-    """Replace unprintable characters with spaces, so that they cannot control the terminal."""
-    return "".join(letter if letter.isprintable() else " " for letter in text)
-
-
-def _split_by_leg(track: Track, route: Route) -> list[_LegRows]:
-    """Split the rows of a track where the leg changes; rows outside the legs of the route are left out."""
-    edges = np.flatnonzero(np.diff(track.leg)) + 1
-    starts = [0, *edges.tolist()]
-    stops = [*edges.tolist(), len(track)]
-    parts = [_LegRows(int(track.leg[start]), start, stop - 1) for start, stop in zip(starts, stops, strict=True)]
-    return [part for part in parts if 0 <= part.leg < route.legs]
 
 
 def _group_by_loiter(parts: list[_LegRows], route: Route) -> list[list[_LegRows]]:

@@ -1,6 +1,5 @@
 """Write the page of an identification: fits of equations, parameters, and uncertain quantities."""
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -10,7 +9,6 @@ from markupsafe import Markup
 from aircraft.identification.estimate import Estimate
 from aircraft.identification.parameters import PARAMETERS
 from aircraft.identification.prediction import HORIZONS_S, QUANTITIES, UNITS, PredictedLog
-from logs.views.charts import Chart
 from logs.views.figures import draw_pictures, view_json
 from logs.views.identification import equation_chart, prediction_chart
 from logs.views.report.page import (
@@ -116,10 +114,15 @@ def identification_page(facts: IdentificationFacts) -> str:
     charts["predicted"] = prediction_chart(facts.predicted)
     pictures = draw_pictures(charts)
     script = script_text(CHART_SCRIPTS)
+    chart_rows = []
+    for k, equation in enumerate(facts.estimate.equations):
+        name = f"fit-{k}"
+        fit_text = f"R² {equation.explained:.3f}; its residuals are autocorrelated over {equation.correlation:.2g} s"
+        chart_rows.append((name, charts[name].title, picture_data_url(pictures[f"{name}.png"]), fit_text))
     return page_template("identification.html").render(
         facts=facts,
         minutes=f"{facts.estimate.seconds / 60.0:.1f}",
-        fits=_list_fit_charts(facts.estimate, charts, pictures),
+        fits=chart_rows,
         parameters=parameter_rows(facts.estimate),
         silent=facts.estimate.uninformed_lines(),
         shifts=shift_rows(facts.estimate),
@@ -134,15 +137,3 @@ def identification_page(facts: IdentificationFacts) -> str:
         script=Markup(script),
         script_digest=script_digest(script),
     )
-
-
-def _list_fit_charts(
-    estimate: Estimate, charts: Mapping[str, Chart], pictures: Mapping[str, bytes]
-) -> Sequence[tuple[str, str, str, str]]:
-    """Return name, title, picture (data URL) and quality of fit of each equation's chart."""
-    chart_rows = []
-    for k, equation in enumerate(estimate.equations):
-        name = f"fit-{k}"
-        fit_text = f"R² {equation.explained:.3f}; its residuals are autocorrelated over {equation.correlation:.2g} s"
-        chart_rows.append((name, charts[name].title, picture_data_url(pictures[f"{name}.png"]), fit_text))
-    return chart_rows

@@ -366,16 +366,11 @@ class Estimator:
             interval = Interval(
                 interval_low, clopper_pearson(tally.flyable + tally.unknown, tally.flown, confidence).high
             )
-        return Estimate(tally, lower, upper, interval, self._goal_status(lower, upper))
-
-    def _goal_status(self, lower: float, upper: float) -> Answer:
-        """Return the answer to the goal, which follows from the bounds of the probability."""
         target = self._goal.target
-        if target is None:
-            return "no target"
-        if lower >= target:
-            return "reached"
-        return "missed" if upper < target else "undecided"
+        answer: Answer = "no target"
+        if target is not None:
+            answer = "reached" if lower >= target else ("missed" if upper < target else "undecided")
+        return Estimate(tally, lower, upper, interval, answer)
 
 
 # ----------------------------------------------------------------------

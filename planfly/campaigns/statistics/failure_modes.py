@@ -95,7 +95,12 @@ class FailureWindDistributions:
         probabilities: probabilities of the quantiles, 0 to 1, (k,).
         """
         log_weights = np.zeros(self.location.size)
-        for speed, counts in _count_by_wind(speeds, flyable).items():
+        # Numbers of failed and of flyable flights at each wind speed.
+        counts_by_speed = {
+            float(speed): (int((~flyable[speeds == speed]).sum()), int(flyable[speeds == speed].sum()))
+            for speed in np.unique(speeds)
+        }
+        for speed, counts in counts_by_speed.items():
             log_failure, log_success = self.log_probabilities(speed)
             log_weights += counts[0] * log_failure + counts[1] * log_success
         weights = np.exp(log_weights - log_weights.max())
@@ -103,14 +108,6 @@ class FailureWindDistributions:
         order = np.argsort(values, kind="stable")
         cumulative = np.cumsum(weights[order] / weights.sum())
         return values[order][np.minimum(np.searchsorted(cumulative, probabilities), values.size - 1)]
-
-
-def _count_by_wind(speeds: Floats, flyable: NDArray[np.bool_]) -> dict[float, tuple[int, int]]:
-    """Return the numbers of failed and of flyable flights at each wind speed, keyed by speed, m/s."""
-    return {
-        float(speed): (int((~flyable[speeds == speed]).sum()), int(flyable[speeds == speed].sum()))
-        for speed in np.unique(speeds)
-    }
 
 
 # ----------------------------------------------------------------------
