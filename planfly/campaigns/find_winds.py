@@ -156,6 +156,25 @@ class WindsResult:
         return [counts[direction] for direction in range(len(self.boundaries))]
 
     @property
+    def flown_bounds(self) -> tuple[tuple[float | None, float | None], ...]:
+        """Strongest wind without a failure up to it, and weakest wind with a failure, of each direction, m/s.
+
+        None if there is no such wind.  Flights that are lost or not judged in full are left out.
+        """
+        left_out = {*self.lost, *(number for number, _ in self.undecided)}
+        bounds = []
+        for index in range(len(self.boundaries)):
+            outcomes = [
+                (speed, is_flyable)
+                for number, (direction, speed, is_flyable) in enumerate(self.flights)
+                if direction == index and number not in left_out
+            ]
+            failed = min((speed for speed, is_flyable in outcomes if not is_flyable), default=None)
+            flyable = [speed for speed, is_flyable in outcomes if is_flyable and (failed is None or speed < failed)]
+            bounds.append((max(flyable, default=None), failed))
+        return tuple(bounds)
+
+    @property
     def is_only_calm(self) -> bool:
         """True if all flights were in calm air and none was flyable, so that no wind was searched."""
         return self.calm is not None and self.calm.flights == len(self.flights)
