@@ -85,7 +85,9 @@ def test_the_boundary_is_found_in_each_direction(wind_base: CampaignBase, tmp_pa
     lines = wind_lines(found)
     start = next(number for number, line in enumerate(lines) if line.startswith("Aircraft: aerosonde, 11 kg, 25 m/s"))
     world, pilot = lines[start + 1 : start + 3]
-    assert world.startswith("Conditions: wind from every direction in turn, light turbulence; ")
+    assert world.startswith(
+        "Conditions: wind from every direction in turn, light turbulence (vertical gusts: 0.77 m/s RMS); "
+    )
     assert pilot.startswith("Flown by: ")
     # No draw is flown twice in a direction, and those of least index are among them.
     rows = table(tmp_path / WINDS_DATABASE)
