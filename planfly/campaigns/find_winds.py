@@ -2,7 +2,7 @@
 
 import math
 from collections import Counter
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass, replace
 from functools import partial
@@ -256,22 +256,21 @@ class WindsResult:
         return f"<WindsResult {subject}; {count_text(len(self.flights), 'flight')}>"
 
 
-def open_winds_store(base: CampaignBase, goal: WindsGoal, folder: Path, *, resume: bool) -> WindsStore:
+def open_winds_store(
+    base: CampaignBase, goal: WindsGoal, folder: Path, *, resume: bool, options: Mapping[str, object] | None = None
+) -> WindsStore:
     """Create the table of a search in a folder, or open it to resume the search.
 
     The number of flights may change when a search is resumed.  If it is smaller, the surplus flights stay in the table.
 
     base: campaign base, whose dispersions must not contain `SEARCHED_QUANTITIES`.
+    options: options of the flights, which a new table stores for `planfly.winds` with ``resume``.
     Raises StoreError for a table that cannot be used, such as the table of a search with another goal.
     """
-    settings = {
-        "name": base.name,
-        "seed": base.seed,
-        "spread": base.dispersions.to_json(),
-        "inputs": base.inputs(),
-        **asdict(goal),
-    }
-    return WindsStore(folder / WINDS_DATABASE, f"{base.inputs_hash()}-{code_hash()}", settings, resume=resume)
+    path = folder / WINDS_DATABASE
+    stored = read_stored_settings(path) if resume else {}
+    settings = {**base.settings_to_store(stored, options), **asdict(goal)}
+    return WindsStore(path, f"{base.inputs_hash()}-{code_hash()}", settings, resume=resume)
 
 
 def find_winds(
