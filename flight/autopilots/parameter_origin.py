@@ -262,10 +262,16 @@ def read_parameters_for(path: Path, autopilot: str) -> dict[str, Entry]:
     return entries
 
 
+class UnusedParametersError(ParameterError):
+    """A parameter file of which the simulated autopilot uses no parameter.  model: title of this autopilot."""
+
+    model = ""
+
+
 def refuse_unknown_parameters(
     path: Path, autopilot: str, entries: Mapping[str, Entry], used_values: Mapping[str, float]
 ) -> None:
-    """Raise ParameterError for a file of which the simulated autopilot uses no parameter.
+    """Raise UnusedParametersError for a file of which the simulated autopilot uses no parameter.
 
     A file whose parameter names belong to this autopilot is accepted.
 
@@ -276,7 +282,9 @@ def refuse_unknown_parameters(
     names = ", ".join(list(entries)[:_SHOWN_NAMES])
     allowed = f"expected a parameter file of {TITLES[autopilot]}"
     message = f"{path}: {names}: not used by the simulated {_MODELS[autopilot]}; {allowed}"
-    raise ParameterError(message, file=path, value=names, allowed=allowed)
+    error = UnusedParametersError(message, file=path, value=names, allowed=allowed)
+    error.model = _MODELS[autopilot]
+    raise error
 
 
 def other_autopilot_error(where: str, written_for: str, evidence: str, flying: str) -> ParameterError:

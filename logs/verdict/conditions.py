@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from aircraft.catalog import find_logged_aircraft
 from aircraft.tracking import CORRIDOR_RADII
 from flight.autopilots.autopilot import Autopilot
+from flight.autopilots.gust_height import gust_deviation
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Finding
 from logs.verdict.measures.route_requirements import judged_airspace, judged_surveys
@@ -195,9 +196,10 @@ def _world_line(conditions: Conditions) -> str:
         wind_text = f"wind from {conditions.forecast}; {wind_text} at the start"
     turbulence_text = ""
     if conditions.turbulence is not None:
-        turbulence_text = (
-            ", no turbulence" if conditions.turbulence == "none" else f", {conditions.turbulence} turbulence"
-        )
+        turbulence_text = ", no turbulence"
+        if conditions.turbulence != "none":
+            deviation = gust_deviation(conditions.turbulence)
+            turbulence_text = f", {conditions.turbulence} turbulence (vertical gusts: {deviation:.2f} m/s RMS)"
     navigation_text = (
         "" if conditions.navigation is None else f"; navigation {_NAVIGATION_TEXTS[conditions.navigation]}"
     )

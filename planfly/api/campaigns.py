@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Unpack
+from typing import Unpack, cast
 
 from logs.verdict.tolerances import ENERGY_RESERVE_FRACTION
 from planfly.arguments import check_arguments
@@ -76,6 +76,15 @@ class CampaignFlight:
 
     row: FlightRow
     log: Path
+
+
+def _with_stored_options(options: CampaignOptions | WindsOptions, directory: OutputDirectory) -> CampaignOptions:
+    """Return the options of a campaign; those that are not given have the values of a resumed campaign."""
+    stored = read_stored_settings(directory.folder / directory.table).get("options", {}) if directory.resume else {}
+    # A wind is stored as a list.
+    values = {name: tuple(value) if name == "wind" and value else value for name, value in stored.items()}
+    given = {name: value for name, value in options.items() if value is not None and value != ()}
+    return cast(CampaignOptions, {**options, **values, **given})
 
 
 def _open_base(
@@ -248,7 +257,8 @@ def campaign(
     .plan file.
     spread: a TOML file of the quantities that vary; None takes planfly's default.
     flights: number of flights; None takes 300, or, with ``prove``, at most 5,000; for a resumed campaign its earlier
-    number.  Without ``prove`` and ``at_least``, a resumed campaign keeps its earlier target.
+    number.  Without ``prove`` and ``at_least``, a resumed campaign keeps its earlier target, and without other options
+    its earlier ones.
     prove: a probability; flights are flown until they show whether the mission reaches it.
     at_least: a probability to judge after all flights.  Only one of the two may be given.
     confidence: confidence level of each bound; None takes 0.95, or the earlier value of a resumed campaign.
@@ -267,34 +277,40 @@ def campaign(
     """
     workers_used = make_workers(workers, scheduler, options["seed"])
     requested = (options["flights"], options["prove"], options["at_least"], options["confidence"])
-    goal, spread = make_goal(*requested), options["spread"]
+    goal = make_goal(*requested)
     with campaign_folder(out, CAMPAIGN_DATABASE, resume=resume, overwrite=overwrite) as directory:
         if resume:
             goal = continued_goal(directory.folder, *requested)
             if options["flights"] is None:
                 _report_flight_count(goal, directory.folder)
         _warn_of_too_few_flights(goal)
-        base = _open_base(target, options, _read_spread(spread), directory)
-        repeated = campaign_command_line(
-            _name_command_line_target(target, directory.folder),
-            goal,
-            _list_command_line_options(base, options, spread, directory.folder),
-        )
-        return _fly_and_summarise(base, goal, workers_used, directory, repeated, keep=out is not None)
+        options = _with_stored_options(options, directory)
+        base = _open_base(target, options, _read_spread(options["spread"]), directory)
+        stated = _list_command_line_options(base, options, options["spread"], directory.folder)
+        repeated = campaign_command_line(_name_command_line_target(target, directory.folder), goal, stated)
+        return _fly_and_summarise(base, goal, workers_used, directory, stated, repeated, keep=out is not None)
 
 
 def _fly_and_summarise(
-    base: CampaignBase, goal: Goal, workers: Workers, directory: OutputDirectory, command: str, *, keep: bool
+    base: CampaignBase,
+    goal: Goal,
+    workers: Workers,
+    directory: OutputDirectory,
+    options: Mapping[str, object],
+    command: str,
+    *,
+    keep: bool,
 ) -> CampaignResult:
     """Fly the flights that a campaign's table lacks, and summarise the campaign.
 
     goal: what the campaign has to prove, and its number of flights.
     directory: folder with the table.
+    options: options of the flights, which are stored for a resumption.
     command: command line that repeats the campaign, for its report.
     keep: True to write summary, report and logs into the folder; False for a temporary folder.
     """
     table_path = directory.folder / CAMPAIGN_DATABASE
-    with open_store(base, goal, directory.folder, resume=directory.resume) as store:
+    with open_store(base, goal, directory.folder, resume=directory.resume, options=options) as store:
         with stage("flying", "flying a campaign") as advance:
             estimate = fly_campaign(base, goal, workers, store, advance)
         short_summary = None if keep else summarise_campaign(base, goal, estimate, store)
@@ -324,6 +340,7 @@ def campaign_flight(
     folder = Path(out)
     goal = continued_goal(folder, options["flights"], options["prove"], options["at_least"], options["confidence"])
     directory = OutputDirectory(folder, CAMPAIGN_DATABASE, resume=True, overwrite=False)
+    options = _with_stored_options(options, directory)
     base = _open_base(target, options, _read_spread(options["spread"]), directory)
     row = _read_flight_row(base, goal, folder, index)
     log = folder / "flights" / f"flight-{index:06d}.mcap"
@@ -411,27 +428,29 @@ def winds(
     ...
     world.errors.ArgumentError: directions 3: expected a whole number from 4 to 72
     """
-    confidence, flights, spread = options["confidence"], options["flights"], options["spread"]
+    confidence, flights = options["confidence"], options["flights"]
     check_arguments(prove=prove, confidence=confidence, directions=directions, most=most, flights=flights)
     workers_used = make_workers(options["workers"], options["scheduler"], options["seed"])
     with campaign_folder(out, WINDS_DATABASE, resume=resume, overwrite=overwrite) as directory:
         folder = directory.folder
         goal = WindsGoal(prove, confidence, directions, most, flight_limit(flights, folder, resume=resume))
-        base = _open_base(target, options, _read_spread(spread).without(SEARCHED_QUANTITIES), directory)
+        mission_options = _with_stored_options(options, directory)
+        spread = mission_options["spread"]
+        base = _open_base(target, mission_options, _read_spread(spread).without(SEARCHED_QUANTITIES), directory)
         if base.scenario.wind.forecast is not None:
             allowed = (
                 "not allowed, because this search sets the wind itself; planfly window finds take-off"
                 " times in a forecast"
             )
-            raise ArgumentError.of_argument("forecast", options["forecast"], allowed, shown="")
-        with open_winds_store(base, goal, folder, resume=resume) as store, stage("flying", "winds") as advance:
+            raise ArgumentError.of_argument("forecast", mission_options["forecast"], allowed, shown="")
+        stated = _list_command_line_options(base, mission_options, spread, folder)
+        with (
+            open_winds_store(base, goal, folder, resume=resume, options=stated) as store,
+            stage("flying", "winds") as advance,
+        ):
             winds_found = find_winds(base, goal, workers_used, store, advance)
         if out is not None:
-            repeated = winds_command_line(
-                _name_command_line_target(target, folder),
-                goal,
-                _list_command_line_options(base, options, spread, folder),
-            )
+            repeated = winds_command_line(_name_command_line_target(target, folder), goal, stated)
             write_winds(folder, base, winds_found, repeated)
     return winds_found
 

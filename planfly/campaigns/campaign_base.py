@@ -3,6 +3,7 @@
 import hashlib
 import json
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, TypeGuard
@@ -37,7 +38,7 @@ from planfly.workflow.uav import (
 from planner.plan import Plan, plan_json, read_plan
 from world.airfield import LandingStrip
 from world.errors import FlightError, MissionError
-from world.files import write_atomically
+from world.files import absolute_path, write_atomically
 from world.forecast.scenario_wind import shift_wind
 from world.frames import to_map
 from world.scenario import Scenario, with_ground
@@ -108,6 +109,20 @@ class CampaignBase:
                 "spread": hash_input(json.dumps(self.dispersions.to_json(), sort_keys=True)),
             }
         )
+
+    def settings_to_store(self, stored: Mapping[str, Any], options: Mapping[str, object] | None) -> dict[str, Any]:
+        """Return the settings that a table stores for its campaign, in addition to the goal.
+
+        stored: settings of a resumed campaign, whose options are kept; empty for a new one.
+        options: options of the flights, for a new table.
+        """
+        return {
+            "name": self.name,
+            "seed": self.seed,
+            "spread": self.dispersions.to_json(),
+            "inputs": self.inputs(),
+            "options": stored.get("options") or json.loads(json.dumps(dict(options or {}), default=absolute_path)),
+        }
 
     def inputs_hash(self) -> str:
         """Return a hash of all inputs of the flights except the code."""

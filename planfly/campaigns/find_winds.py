@@ -2,7 +2,7 @@
 
 import math
 from collections import Counter
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass, replace
 from functools import partial
@@ -156,6 +156,25 @@ class WindsResult:
         return [counts[direction] for direction in range(len(self.boundaries))]
 
     @property
+    def flown_bounds(self) -> tuple[tuple[float | None, float | None], ...]:
+        """Strongest wind without a failure up to it, and weakest wind with a failure, of each direction, m/s.
+
+        None if there is no such wind.  Flights that are lost or not judged in full are left out.
+        """
+        left_out = {*self.lost, *(number for number, _ in self.undecided)}
+        bounds = []
+        for index in range(len(self.boundaries)):
+            outcomes = [
+                (speed, is_flyable)
+                for number, (direction, speed, is_flyable) in enumerate(self.flights)
+                if direction == index and number not in left_out
+            ]
+            failed = min((speed for speed, is_flyable in outcomes if not is_flyable), default=None)
+            flyable = [speed for speed, is_flyable in outcomes if is_flyable and (failed is None or speed < failed)]
+            bounds.append((max(flyable, default=None), failed))
+        return tuple(bounds)
+
+    @property
     def is_only_calm(self) -> bool:
         """True if all flights were in calm air and none was flyable, so that no wind was searched."""
         return self.calm is not None and self.calm.flights == len(self.flights)
@@ -237,22 +256,21 @@ class WindsResult:
         return f"<WindsResult {subject}; {count_text(len(self.flights), 'flight')}>"
 
 
-def open_winds_store(base: CampaignBase, goal: WindsGoal, folder: Path, *, resume: bool) -> WindsStore:
+def open_winds_store(
+    base: CampaignBase, goal: WindsGoal, folder: Path, *, resume: bool, options: Mapping[str, object] | None = None
+) -> WindsStore:
     """Create the table of a search in a folder, or open it to resume the search.
 
     The number of flights may change when a search is resumed.  If it is smaller, the surplus flights stay in the table.
 
     base: campaign base, whose dispersions must not contain `SEARCHED_QUANTITIES`.
+    options: options of the flights, which a new table stores for `planfly.winds` with ``resume``.
     Raises StoreError for a table that cannot be used, such as the table of a search with another goal.
     """
-    settings = {
-        "name": base.name,
-        "seed": base.seed,
-        "spread": base.dispersions.to_json(),
-        "inputs": base.inputs(),
-        **asdict(goal),
-    }
-    return WindsStore(folder / WINDS_DATABASE, f"{base.inputs_hash()}-{code_hash()}", settings, resume=resume)
+    path = folder / WINDS_DATABASE
+    stored = read_stored_settings(path) if resume else {}
+    settings = {**base.settings_to_store(stored, options), **asdict(goal)}
+    return WindsStore(path, f"{base.inputs_hash()}-{code_hash()}", settings, resume=resume)
 
 
 def find_winds(

@@ -1,6 +1,6 @@
 """Fly a campaign in parallel, store its flights by index, and decide its answer."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 
@@ -86,19 +86,17 @@ def resumed_goal(
     return replace(goal, confidence=confidence or old_goal.confidence, changed=old_goal.changed or not is_same)
 
 
-def open_store(base: CampaignBase, goal: Goal, folder: Path, *, resume: bool) -> Store:
+def open_store(
+    base: CampaignBase, goal: Goal, folder: Path, *, resume: bool, options: Mapping[str, object] | None = None
+) -> Store:
     """Create the table of a campaign in a folder, or open it to resume the campaign.
 
+    options: options of the flights, which a new table stores for `planfly.campaign` with ``resume``.
     Raises StoreError for a table that cannot be used, or that has more flights than the goal.
     """
-    settings = {
-        "name": base.name,
-        "seed": base.seed,
-        "spread": base.dispersions.to_json(),
-        "inputs": base.inputs(),
-        **asdict(goal),
-    }
     path = folder / CAMPAIGN_DATABASE
+    stored = read_stored_settings(path) if resume else {}
+    settings = {**base.settings_to_store(stored, options), **asdict(goal)}
     return Store(path, f"{base.inputs_hash()}-{code_hash()}", settings, resume=resume)
 
 

@@ -413,6 +413,7 @@ def write_winds(folder: Path, base: CampaignBase, winds: WindsResult, command: s
                 "boundary_mps": round(direction.boundary, 3),
                 "interval_mps": [round(direction.low, 3), round(direction.high, 3)],
                 "beyond": direction.is_beyond_search,
+                "flown_bounds_mps": [None if speed is None else round(speed, 3) for speed in winds.flown_bounds[k]],
                 "judged": winds.judged[k],
                 "reason": reasons[k],
                 "flown": [
@@ -561,6 +562,32 @@ def _lines_without_failures(winds: WindsResult) -> list[str]:
     ]
 
 
+def _flown_bound_lines(winds: WindsResult) -> list[str]:
+    """Return what the flights of each direction without a boundary show, with neighbouring directions in one line."""
+    if winds.is_only_calm or all(winds.estimated):
+        return []
+    texts = [
+        None if is_estimated else _bounds_text(*bounds)
+        for is_estimated, bounds in zip(winds.estimated, winds.flown_bounds, strict=True)
+    ]
+    counts = winds.flight_counts()
+    lines = ["directions without a boundary, by their own flights, which do not prove it:"]
+    for text, group in groupby(range(len(texts)), key=lambda number: texts[number]):
+        if text is not None:
+            numbers = list(group)
+            last = f" to {winds.from_deg(numbers[-1]):g}°" if len(numbers) > 1 else ""
+            flights = count_text(sum(counts[number] for number in numbers), "flight")
+            lines.append(f"  from {winds.from_deg(numbers[0]):g}°{last}: {text} ({flights})")
+    return lines
+
+
+def _bounds_text(flyable: float | None, failed: float | None) -> str:
+    """Return the text of the strongest wind without a failure and of the weakest wind with one, m/s."""
+    if failed is None:
+        return "not enough flights" if flyable is None else f"at least {flyable:.1f} m/s"
+    return f"below {failed:.1f} m/s" if flyable is None else f"between {flyable:.1f} and {failed:.1f} m/s"
+
+
 def _boundary_lines(winds: WindsResult) -> list[str]:
     """Return one line with the lowest and the highest boundary of a search for winds; [] if none is stated."""
     directions = [
@@ -603,17 +630,6 @@ def wind_lines(winds: WindsResult) -> list[str]:
         flights_text += " in calm air only, because none of them is flyable"
     elif any(winds.estimated):
         flights_text += f"; intervals at {percent}, from the flights in each direction"
-    # A line for each direction in which every flight fails and whose boundary is not judged.
-    failing_lines = []
-    for direction, undecided_count in zip(chart_directions(winds), winds.undecided_counts(), strict=True):
-        has_passed = any(flyable for _, _, flyable in direction.flights)
-        if direction.is_judged or undecided_count or has_passed or not direction.flights:
-            continue
-        speed, count, _ = direction.flights[0]
-        failing_lines.append(
-            f"wind from {direction.from_deg:g}°: all {count_text(count, 'flight')} in {speed:.1f} m/s, the weakest wind"
-            f" flown, fail; the boundary is below {speed:.1f} m/s and is not judged"
-        )
     calm = winds.calm
     calm_lines = []
     if calm is not None and calm.failed_count:
@@ -625,7 +641,7 @@ def wind_lines(winds: WindsResult) -> list[str]:
     return [
         *answer_lines,
         *calm_lines,
-        *failing_lines,
+        *_flown_bound_lines(winds),
         *(() if winds.conditions is None else flown_lines(winds.conditions)),
         *_deciding_lines(winds),
         *_lines_without_failures(winds),

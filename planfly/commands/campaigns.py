@@ -127,7 +127,12 @@ def add_winds_parser(command_line: LineParser) -> None:
 def _add_shared_options(parser: CommandParser) -> None:
     """Add the arguments and options that campaigns and searches for winds have in common."""
     add_flights_options(parser)
-    parser.add_argument("--resume", action="store_true", help="continue the campaign in --out")
+    parser.add_argument(
+        "--resume",
+        action="store_true",
+        help="continue the campaign in --out, with its options unless they are given; an option that contradicts them "
+        "is refused",
+    )
     add_result_options(
         parser,
         "folder for the files (default: runs/<name>-<command>); an existing one is continued with --resume, and "

@@ -148,6 +148,7 @@ def _json_answer(source: str, result: "ReturnsResult", code: int) -> object:
         ranges=[return_range_entry(result, return_range) for return_range in judged_returns.ranges],
         by_program=program_returns_entry(result),
         left_out=judged_returns.omitted_count,
+        starts_too_low=judged_returns.too_low_start_count,
         no_return=no_return.kind,
         no_return_s=None if math.isnan(no_return.time) else round(no_return.time, 2),
         engine_out=glides_entry(result),

@@ -16,7 +16,7 @@ from flight.mission.items import MAX_BYTES, Home, Mission, MissionItem, item_pro
 from planfly.flight_options import MissionOptions
 from planfly.studio.documents import Document, planned_mission
 from planfly.studio.edit_context import EditContext
-from planfly.studio.history import History
+from planfly.studio.history import History, ParameterChange, Step
 from planfly.studio.settings import ChangedParameters
 from planfly.studio.view_model import Json
 from planfly.studio.worker_process import INTERNAL
@@ -58,8 +58,8 @@ class Restored(NamedTuple):
 
     mission: the edited mission, which is the opened mission itself if it was not edited.
     context: editing context with the saved settings.
-    steps: edits in effect, each with its description; the last one results in the edited mission.
-    undone_steps: undone edits after the edited mission, each with its description, for redo.
+    steps: edits in effect; the last one results in the edited mission.
+    undone_steps: undone edits after the edited mission, for redo.
     replaced: saved settings that are not restored, each with the reason or the value that replaces it.
     by_options: True if options of the command line replaced saved settings, so that the autosave is written again.
     unused_edits: number of unsaved edits that are not restored, because the mission file has changed.
@@ -67,8 +67,8 @@ class Restored(NamedTuple):
 
     mission: Mission
     context: EditContext
-    steps: list[tuple[Mission, str]]
-    undone_steps: list[tuple[Mission, str]]
+    steps: list[Step]
+    undone_steps: list[Step]
     replaced: tuple[str, ...] = ()
     by_options: bool = False
     unused_edits: int = 0
@@ -92,10 +92,8 @@ def autosave_text(
         "schema": _SCHEMA,
         "name": document.name,
         "mission": mission_data(history.mission),
-        "steps": [[mission_data(mission), text] for mission, text in _steps_to_save(document, history)],
-        "undone": [
-            [mission_data(mission), text] for mission, text in history.steps[history.position :][:_MAX_UNDONE_STEPS]
-        ],
+        "steps": [_step_data(step) for step in _steps_to_save(document, history)],
+        "undone": [_step_data(step) for step in history.steps[history.position :][:_MAX_UNDONE_STEPS]],
         "first": mission_data(document.setup.mission),
         "file": _file_digest(document),
         "in_file": is_in_file,
@@ -119,16 +117,28 @@ def settings_data(context: EditContext) -> Json:
     return dict(json.loads(json.dumps(data)))
 
 
-def _steps_to_save(document: Document, history: History) -> list[tuple[Mission, str]]:
-    """Return the newest edits in effect that an autosave contains: each new mission with the text of its edit.
+def _step_data(step: Step) -> list[Any]:
+    """Convert an edit to plain data, which `_step_from_data` converts back."""
+    return [mission_data(step.mission), step.text, [list(change) for change in step.parameters]]
+
+
+def _step_from_data(data: list[Any], opened_mission: Mission) -> Step:
+    """Return an edit from its data; an older version of planfly wrote no parameters."""
+    mission, text, *parameters = data
+    changes = (ParameterChange(*change) for change in (parameters[0] if parameters else ()))
+    return Step(mission_from_data(mission, opened_mission), str(text), tuple(changes))
+
+
+def _steps_to_save(document: Document, history: History) -> list[Step]:
+    """Return the newest edits in effect that an autosave contains.
 
     Edits before the last saving of the document's file are left out, because the file contains their result.
     """
     steps = history.steps[: history.position]
-    saved_steps = [k for k, (mission, _) in enumerate(history.steps) if mission is history.saved]
+    saved_steps = [k for k, step in enumerate(history.steps) if step.mission is history.saved]
     if document.path is not None and saved_steps:
         steps = steps[saved_steps[-1] + 1 :] or steps[-1:]
-    item_counts = accumulate(len(mission.items) for mission, _ in reversed(steps))
+    item_counts = accumulate(len(step.mission.items) for step in reversed(steps))
     count = sum(total <= _MAX_SAVED_ITEMS for total in item_counts)
     return steps[-max(1, min(count, _MAX_SAVED_STEPS)) :]
 
@@ -175,8 +185,7 @@ def read_autosave(
     is_opened = data["mission"] == mission_data(opened_mission) or (is_same_file and data.get("in_file") is True)
     mission = opened_mission if is_opened else mission_from_data(data["mission"], opened_mission)
     steps, undone_steps = (
-        [(mission_from_data(step, opened_mission), str(text)) for step, text in data.get(name, [])]
-        for name in ("steps", "undone")
+        [_step_from_data(step, opened_mission) for step in data.get(name, [])] for name in ("steps", "undone")
     )
     try:
         new_context, replaced = restore_settings(context, data, options)

@@ -1,11 +1,28 @@
 """Record the edits of a mission, for undo and redo."""
 
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from flight.mission.items import Mission
 
 # Maximum number of steps that are kept; the first mission is always kept.
 MAX_STEPS = 1_000
+
+
+class ParameterChange(NamedTuple):
+    """Change of an autopilot parameter by an edit; a value of None is the one that is not set in the studio."""
+
+    name: str
+    old: float | None
+    new: float | None
+
+
+class Step(NamedTuple):
+    """An edit: the mission that it made, its description, and the parameters that it changed."""
+
+    mission: Mission
+    text: str
+    parameters: tuple[ParameterChange, ...] = ()
 
 
 @dataclass(slots=True)
@@ -14,7 +31,7 @@ class History:
 
     first: the mission as opened.
     saved: the mission in the file; the mission as opened or downloaded last if there is no file.
-    steps: the result of each edit, with its description.
+    steps: the edits.
     position: number of steps that are in effect.
 
     >>> history = History(Mission(None, ()))
@@ -24,7 +41,7 @@ class History:
     """
 
     first: Mission
-    steps: list[tuple[Mission, str]] = field(default_factory=list)
+    steps: list[Step] = field(default_factory=list)
     position: int = 0
     saved: Mission = field(init=False)
 
@@ -34,21 +51,21 @@ class History:
     @property
     def mission(self) -> Mission:
         """Mission at the current step."""
-        return self.steps[self.position - 1][0] if self.position else self.first
+        return self.steps[self.position - 1].mission if self.position else self.first
 
     @property
     def undo_text(self) -> str:
         """Text of the next undo; "" if there is nothing to undo."""
-        return self.steps[self.position - 1][1] if self.position else ""
+        return self.steps[self.position - 1].text if self.position else ""
 
     @property
     def redo_text(self) -> str:
         """Text of the next redo; "" if there is nothing to redo."""
-        return self.steps[self.position][1] if self.position < len(self.steps) else ""
+        return self.steps[self.position].text if self.position < len(self.steps) else ""
 
-    def add(self, mission: Mission, text: str) -> None:
+    def add(self, mission: Mission, text: str, parameters: tuple[ParameterChange, ...] = ()) -> None:
         """Record an edit, and discard undone edits; if there are too many steps, discard the oldest."""
-        self.steps = [*self.steps[: self.position], (mission, text)][-MAX_STEPS:]
+        self.steps = [*self.steps[: self.position], Step(mission, text, parameters)][-MAX_STEPS:]
         self.position = len(self.steps)
 
     def undo(self) -> bool:

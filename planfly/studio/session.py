@@ -5,6 +5,7 @@ revision; an edit of an older revision is refused, so that no page edits a missi
 """
 
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import NamedTuple
@@ -27,7 +28,7 @@ from planfly.studio.autosave import (
 )
 from planfly.studio.documents import KINDS, Document, SavedFile, open_document, planned_mission, save_document
 from planfly.studio.edit_context import EditContext
-from planfly.studio.history import History
+from planfly.studio.history import History, ParameterChange
 from planfly.studio.incremental_verdict import judge_windows
 from planfly.studio.messages import Apply, Choose, Delete, Drag, Insert, Move, Raise, Settings
 from planfly.studio.settings import (
@@ -42,6 +43,7 @@ from planfly.studio.view_model import Json, mission_json, windows_json, world_js
 from planfly.studio.worker_process import INTERNAL
 from planfly.workflow.apply_suggestion import item_moves
 from planfly.workflow.mission_context import JudgedMission
+from planfly.workflow.suggestion_trials import suggested_parameters
 from planner.plan import Plan
 from world.errors import MissionError, PlanflyError
 from world.files import write_atomically
@@ -174,9 +176,9 @@ class Session:
         self.rev, self.world_rev = self.rev + 1, self.world_rev + 1
         self.document_rev += 1
 
-    def _add_to_history(self, mission: Mission, text: str) -> None:
+    def _add_to_history(self, mission: Mission, text: str, parameters: tuple[ParameterChange, ...] = ()) -> None:
         """Record an edit, and discard documents whose opening was undone. text: description of the edit."""
-        self.history.add(mission, text)
+        self.history.add(mission, text, parameters)
         self.undone_states = []
 
     @property
@@ -226,8 +228,23 @@ class Session:
         if message.rev != self.rev:
             raise StaleEdit
         mission, text = self._apply_edit(message)
-        self._set_mission(mission)
-        self._add_to_history(mission, text)
+        values = suggested_parameters(self._tried_change(message)[1]) if isinstance(message, Apply) else {}
+        old_values = self.context.parameters.values
+        self._set_mission(mission, self._context_with_parameters(values))
+        changes = (ParameterChange(name, old_values.get(name), value) for name, value in values.items())
+        self._add_to_history(mission, text, tuple(changes))
+
+    def _context_with_parameters(self, values: Mapping[str, float | None]) -> EditContext:
+        """Return the editing context with other values of the parameters that the autopilot has, by name.
+
+        values: None resets a parameter that was set in the studio.
+        """
+        parameters = self.context.uav.autopilot.parameters
+        known_names = () if parameters is None else {parameter.name for parameter in parameters.values}
+        known_values = {name: value for name, value in values.items() if name in known_names}
+        if not known_values:
+            return self.context
+        return self.context.with_settings(self.context.scenario, self.context.parameters.with_values(known_values))
 
     def step_history(self, kind: str) -> None:
         """Undo, redo, or revert to the mission in the file; do nothing if there is nothing to undo, redo or revert.
@@ -254,7 +271,9 @@ class Session:
         has_moved = self.history.undo() if kind == "undo" else self.history.redo()
         try:
             if has_moved:
-                self._set_mission(self.mission)
+                changes = self.history.steps[min(previous_position, self.history.position)].parameters
+                values = {change.name: change.old if kind == "undo" else change.new for change in changes}
+                self._set_mission(self.mission, self._context_with_parameters(values))
         except Exception:
             self.history.position = previous_position
             raise
@@ -409,15 +428,23 @@ class Session:
 
         Raises MissionError for a suggestion that has not passed a trial on this revision.
         """
+        mission, suggestion = self._tried_change(message)
+        source = "the flight" if message.flown else rule_word(self.judged.verdict.findings[message.finding].rule)
+        moves = item_moves(self.context, self.mission, mission)
+        is_move_only = moves and not suggested_parameters(suggestion)
+        edit_text = f"move {moves_text(moves)}" if is_move_only else suggestion_text(without_trial(suggestion))
+        return replace(mission, autopilot=self.mission.autopilot), f"apply a suggestion of {source}: {edit_text}"
+
+    def _tried_change(self, message: Apply) -> tuple[Mission, Suggestion]:
+        """Return the changed mission of a suggestion, and the suggestion.
+
+        Raises MissionError for a suggestion that has not passed a trial on this revision.
+        """
         tried = self.tried.get("flown" if message.flown else "geometric")
         change = tried.changes.get((message.finding, message.which)) if tried and tried.rev == self.rev else None
         if change is None:
             raise MissionError(f"{self.document.name}: that suggestion no longer exists", field="suggestion")
-        mission, suggestion = change
-        source = "the flight" if message.flown else rule_word(self.judged.verdict.findings[message.finding].rule)
-        moves = item_moves(self.context, self.mission, mission)
-        edit_text = f"move {moves_text(moves)}" if moves else suggestion_text(without_trial(suggestion))
-        return replace(mission, autopilot=self.mission.autopilot), f"apply a suggestion of {source}: {edit_text}"
+        return change
 
     def _replace_items_between(self, plan: Plan, first: int, last: int) -> Mission:
         """Return the mission with a planned path in place of the items between two items.
@@ -610,11 +637,12 @@ class Session:
         if unused_edits:
             self._set_aside(file, unused_edits)
             return False
-        if is_edited:
+        if is_edited or any(step.parameters for step in steps):
             self.history.steps = steps[:-1]
             self.history.position = len(self.history.steps)
             # An autosave of an older version has no steps.
-            self._add_to_history(mission, steps[-1][1] if steps else "the edits of the previous session")
+            text = steps[-1].text if steps else "the edits of the previous session"
+            self._add_to_history(mission, text, steps[-1].parameters if steps else ())
         self.history.steps += undone_steps
         return is_edited or context is not previous_state[0]
 

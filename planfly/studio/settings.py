@@ -15,6 +15,7 @@ from aircraft.catalog import aircraft_names
 from flight.autopilots.autopilot import Parameters
 from flight.autopilots.catalog import load_autopilot
 from flight.autopilots.parameter_files import parameters_text, parse_parameters
+from flight.autopilots.parameter_origin import UnusedParametersError
 from planfly.arguments import is_valid_wind
 from planfly.flight_options import FlightOptions, apply_options
 from planfly.studio.messages import LIMITS, Settings
@@ -79,6 +80,12 @@ class ChangedParameters:
     def text(self, title: str) -> str:
         """Return the text of a parameter file for ground stations.  title: comment in its first line."""
         return parameters_text(self.values, title)
+
+    def with_values(self, values: Mapping[str, float | None]) -> "ChangedParameters":
+        """Return the parameters with other values by name; None no longer sets a parameter."""
+        merged = {name: value for name, value in (self.values | dict(values)).items() if value is not None}
+        typed = tuple(name for name in dict.fromkeys((*self.typed, *values)) if name in merged)
+        return ChangedParameters(merged, self.file if merged else "", self.unused if merged else (), typed)
 
     def load_uav(self, scenario: Scenario) -> Uav:
         """Load the UAV of a scenario with these parameters in its autopilot.
@@ -178,25 +185,21 @@ def apply_parameter_settings(current: ChangedParameters, scenario: Scenario, set
     """
     if settings.autopilot is not None:
         current = ChangedParameters()
-    values = {name: value for name, value in current.values.items() if name not in (settings.without or ())}
-    typed = tuple(name for name in current.typed if name in values)
-    result = ChangedParameters(values, current.file if values else "", current.unused if values else (), typed)
+    result = current.with_values(dict.fromkeys(settings.without or ()))
     if settings.parameter_file is not None:
         return read_parameters(scenario, settings.parameter_text or "", settings.parameter_file)
     if settings.parameter is not None:
         try:
             single = read_parameters(scenario, settings.parameter, "parameter")
-        except PlanflyError as error:
-            known_as_file = r"not used by the (simulated \w+); expected a parameter file of .*"
-            text = re.sub(known_as_file, r"not a parameter of the \1", str(error))
-            raise PlanflyError(text, file=error.file, field=error.field, value=error.value) from None
+        except UnusedParametersError as error:
+            text = f"parameter: {error.value}: not a parameter of the simulated {error.model}"
+            raise PlanflyError(text, file="parameter", value=error.value) from None
         if single.unused:
             name = single.unused[0]
             known_names = [parameter.name for parameter in _load_autopilot_parameters(scenario).values]
             allowed = f"expected a parameter of the simulated autopilot{did_you_mean(name, known_names)}"
             raise PlanflyError(f"parameter: {name}: {allowed}", field="parameter", value=name, allowed=allowed)
-        all_typed = tuple(dict.fromkeys((*typed, *single.values)))
-        result = ChangedParameters(values | single.values, result.file, result.unused, all_typed)
+        result = result.with_values(single.values)
     return result
 
 
@@ -216,7 +219,8 @@ def read_parameters(scenario: Scenario, text: str, name: str) -> ChangedParamete
         try:
             parameters = _load_autopilot_parameters(with_flight(scenario, params=str(file)))
         except PlanflyError as error:
-            raise PlanflyError(str(error).replace(str(file), name), file=name) from None
+            error.args, error.file = (str(error).replace(str(file), name),), name
+            raise
     file_values = parameters.by_origin("file")
     # Leave out parameters that only the scenario sets, because they belong to the scenario.
     own_values = {

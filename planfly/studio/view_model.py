@@ -15,7 +15,7 @@ from flight.mission.route import Route
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Finding
 from logs.verdict.measures.route_requirements import judged_airspace
-from logs.verdict.places import TriedSuggestions
+from logs.verdict.places import Suggestion, TriedSuggestions
 from logs.verdict.presentation import finding_words
 from logs.verdict.rules.registry import with_passing_suggestions
 from logs.verdict.verdict import Verdict
@@ -303,6 +303,12 @@ def findings_json(verdict: Verdict, tried: Sequence[TriedSuggestions]) -> list[J
     ]
 
 
+def can_apply_in_studio(suggestion: Suggestion) -> bool:
+    """Return True if the studio can make every change of a suggestion: to the items, or to a parameter."""
+    item_changes = tuple(change for change in suggestion if change.what != "parameter")
+    return bool(suggestion) and (not item_changes or can_apply(item_changes))
+
+
 def _finding_json(number: int, finding: Finding) -> Json:
     """Return page data of a finding, with its suggestions.  number: index of the finding in the verdict."""
     return {
@@ -315,7 +321,8 @@ def _finding_json(number: int, finding: Finding) -> Json:
         "index": finding.place.index,
         "text": finding.reason,
         "suggestions": [
-            {"text": suggestion_text(suggestion), "apply": can_apply(suggestion)} for suggestion in finding.suggestions
+            {"text": suggestion_text(suggestion), "apply": can_apply_in_studio(suggestion)}
+            for suggestion in finding.suggestions
         ],
     }
 

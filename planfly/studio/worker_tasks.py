@@ -22,9 +22,8 @@ from planfly.planning.pareto_plans import make_pareto_plans
 from planfly.studio.changes import flight_results
 from planfly.studio.edit_context import EditContext
 from planfly.studio.states import place_states
-from planfly.studio.view_model import findings_json, round_to_json, states_json, verdict_page_data
+from planfly.studio.view_model import can_apply_in_studio, findings_json, round_to_json, states_json, verdict_page_data
 from planfly.studio.worker_process import Advance
-from planfly.workflow.apply_suggestion import can_apply
 from planfly.workflow.make_plan import make_plan
 from planfly.workflow.mission_context import JudgedMission
 from planfly.workflow.pipeline import fly_and_judge
@@ -82,7 +81,7 @@ def try_flown_suggestions(payload: tuple[EditContext, bytes], advance: Advance) 
     """Try the suggestions of a failed flight in trial flights, and return those that passed.
 
     The result contains the findings with these suggestions as page data.  It also contains each changed mission with
-    its suggestion, keyed by the numbers of finding and suggestion; suggestions that change no mission are left out.
+    its suggestion, keyed by the numbers of finding and suggestion, unless the studio cannot apply the suggestion.
 
     payload: the editing context, and the pickled flight.
     """
@@ -108,7 +107,7 @@ def _try_suggestions(context: EditContext, judged_mission: JudgedMission, advanc
         for number, finding in enumerate(verdict.findings)
         if finding.ok is False
         for choice, suggestion in enumerate(offered[number].suggestions)
-        if can_apply(suggestion)
+        if can_apply_in_studio(suggestion)
     }
     return {"findings": findings_json(verdict, tried), "changes": changes}
 

@@ -282,6 +282,8 @@ class WindDirection:
     interval_mps: list[float]
     beyond: bool
     """True if the mission is flyable in every wind that was flown."""
+    flown_bounds_mps: list[float | None]
+    """Strongest wind without a failure up to it, and weakest wind with a failure; null if there is none."""
     judged: bool
     """False if the boundary depends mostly on assumptions, because there are too few flights."""
     reason: str

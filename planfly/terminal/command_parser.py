@@ -5,6 +5,7 @@ import os
 import re
 import sys
 from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
 from typing import Any, Literal, NoReturn, Protocol, TextIO
 
 from planfly.terminal.exit_codes import BAD_INPUT, EXIT_CODES
@@ -227,10 +228,9 @@ class LineParser(CommandParser):
             ).partition("=")[0]
             if option:
                 parser.error(f"{option}: no such option{_similar_option_hint(option, parser.long_options())}")
-            parser.error(
-                f"{next((argument for argument in unknown_arguments if argument != '--'), unknown_arguments[0])}:"
-                " no such argument"
-            )
+            word = next((argument for argument in unknown_arguments if argument != "--"), unknown_arguments[0])
+            is_file = Path(word).exists()
+            parser.error(f"{word}: {'the command takes one file at a time' if is_file else 'no such argument'}")
         return parsed
 
 

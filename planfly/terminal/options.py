@@ -178,7 +178,10 @@ def add_forecast_option(group: OptionGroup) -> None:
 def add_turbulence_option(group: OptionGroup) -> None:
     """Add the option for the turbulence."""
     group.add_argument(
-        "--turbulence", choices=CHOICES["turbulence"], help="turbulence (default: the scenario's, or none)"
+        "--turbulence",
+        choices=CHOICES["turbulence"],
+        help="turbulence of MIL-F-8785C by the standard deviation of its vertical gusts: light 0.77 m/s, moderate 1.54 "
+        "m/s (default: the scenario's, or none)",
     )
 
 

@@ -200,6 +200,8 @@ class ReturnsAnswer:
     """Returns flown with --sitl; worse outcomes are counted in headline and ranges."""
     left_out: int
     """Number of places that were left out: on the ground, or too low in a take-off or a landing to return."""
+    starts_too_low: int
+    """Number of returns that begin where the flight itself is below the required height; they are not safe."""
     no_return: str
     """Point of no return by energy: never, at once or later (no_return_s); if unknown, battery, used or arrives."""
     no_return_s: float | None

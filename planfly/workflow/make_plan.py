@@ -1,5 +1,6 @@
 """Make the plan of a scenario for its aircraft and autopilot, in the same way for every command."""
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -140,6 +141,8 @@ def _add_ground_phases(plan: Plan, uav: Uav, old_plan: Plan | None = None, *, co
     if loiter_hazards is None or not loiter_hazards[1]:
         return plan
     max_distance, hazard_texts = loiter_hazards
-    loiter_text = f"{uav.autopilot.title} circles around the destination, up to {max_distance:.0f} m from it"
+    loiter_text = f"{uav.autopilot.title} circles around the destination"
+    # The distance is infinite if the wind is too strong to fly a circle.
+    loiter_text += f", up to {max_distance:.0f} m from it" if math.isfinite(max_distance) else ""
     problems = (*plan.certificate.problems, f"{loiter_text}: {', '.join(hazard_texts)}")
     return replace(plan, certificate=replace(plan.certificate, problems=problems))

@@ -139,7 +139,8 @@ def check_mission_exists(path: Path) -> Path:
     if not path.is_file():
         hint = "" if path.exists() else did_you_mean(path.name, _mission_file_names(path.parent), path.parent)
         expected = "expected a plan.json, .waypoints or .plan file"
-        raise MissionError(f"{path}: {missing_text(path)}; {expected}{hint}", file=path)
+        one_text = ", one at a time" if path.is_dir() else ""
+        raise MissionError(f"{path}: {missing_text(path)}; {expected}{one_text}{hint}", file=path)
     return path
 
 

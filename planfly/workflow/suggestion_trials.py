@@ -375,7 +375,7 @@ class SuggestionTrials:
             except PlanflyError:
                 return
             new_trial = Trial(setup, self.context.uav.aircraft, self.should_abort)
-            parameters = tuple(_parameters(suggestion).items())
+            parameters = tuple(suggested_parameters(suggestion).items())
             key = mission.items, mission.home, setup.battery, setup.scenario.launch, parameters
             trial = self._trials.setdefault(key, new_trial)
             yield suggestion, trial
@@ -415,7 +415,7 @@ class SuggestionTrials:
                 return self.judged.mission, replace(setup, scenario=replace(setup.scenario, launch=launch))
         moves = tuple(change for change in suggestion if change.what != "parameter")
         mission = apply_suggestion(self.context, self.judged, finding, moves) if moves else self.judged.mission
-        if parameters := _parameters(suggestion):
+        if parameters := suggested_parameters(suggestion):
             return mission, self.context.setup_with_parameters(mission, parameters)
         return mission, self.context.setup(mission)
 
@@ -433,10 +433,12 @@ def _has_margin(finding: Finding, suggestion: Suggestion, verdict: Verdict) -> b
         for other in verdict.findings
         if other.rule == finding.rule and (other.place.kind, other.place.number) == (place.kind, place.number)
     ]
-    return not _parameters(suggestion) or all(margin is None or margin >= ALTITUDE_ERROR_M for margin in margins)
+    return not suggested_parameters(suggestion) or all(
+        margin is None or margin >= ALTITUDE_ERROR_M for margin in margins
+    )
 
 
-def _parameters(suggestion: Suggestion) -> dict[str, float]:
+def suggested_parameters(suggestion: Suggestion) -> dict[str, float]:
     """Return the autopilot parameters that a suggestion changes, with their values."""
     return {change.parameter: change.wanted for change in suggestion if change.what == "parameter"}
 
@@ -473,7 +475,7 @@ def _larger_suggestion(finding: Finding, suggestion: Suggestion, verdict: Verdic
     larger_suggestion = None
     for open_finding in same_finding or same_rule_legs:
         larger_suggestion = _add_needed_change(larger_suggestion or suggestion, open_finding) or larger_suggestion
-    if not (same_finding or same_rule_legs) and _parameters(suggestion):
+    if not (same_finding or same_rule_legs) and suggested_parameters(suggestion):
         # The finding passes without the margin of a parameter.
         return tuple(
             replace(change, wanted=change.wanted + RTL_ALTITUDE_STEP_M) if change.what == "parameter" else change

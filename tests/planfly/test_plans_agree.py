@@ -1,5 +1,6 @@
 """Whoever plans, a plan is called safe by the same things: circles in gusts, and those at the destination."""
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
@@ -12,7 +13,7 @@ import planfly
 from planfly.planning import pareto_plans as choice_of_ways
 from planfly.planning.gust_orbits import MAX_EXPECTED_ORBITS, expected_orbits, max_waypoints_in_gusts
 from planfly.studio import worker_tasks as works
-from planfly.workflow.make_plan import make_plan
+from planfly.workflow.make_plan import _add_ground_phases, make_plan
 from planfly.workflow.uav import load_uav
 from planner.plan import Plan
 from tests.planfly.planning.test_gust_orbits import SEED, scenario_of
@@ -70,6 +71,16 @@ def test_what_circles_about_the_destination_reach_is_in_every_certificate(way: C
     (problem,) = way(scenario_of("none", **BESIDE_THE_END)).certificate.problems
     assert "PX4 circles around the destination" in problem
     assert "missile sam is in range" in problem
+
+
+def test_a_circle_that_the_wind_forbids_has_no_distance(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As in wind that is faster than the aircraft, in which no path would be found."""
+    hazards = math.inf, ["the wind is too strong to fly this circle"]
+    monkeypatch.setattr("planfly.workflow.make_plan.end_loiter_hazards", lambda _: hazards)
+    plan = planned(scenario_of("none", **BESIDE_THE_END))
+    unchecked = replace(plan, certificate=replace(plan.certificate, problems=()))
+    (problem,) = _add_ground_phases(unchecked, load_uav(plan.scenario), continues=False).certificate.problems
+    assert problem == "PX4 circles around the destination: the wind is too strong to fly this circle"
 
 
 @pytest.mark.parametrize("ways", [1, 2])

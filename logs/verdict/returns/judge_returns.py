@@ -239,6 +239,11 @@ class Returns:
         """Returns whose outcome is in `UNSAFE`."""
         return tuple(ret for ret in self.each if ret.kind in UNSAFE)
 
+    @property
+    def too_low_start_count(self) -> int:
+        """Number of returns that begin where the flight itself is lower than the required height."""
+        return sum(ret.starts_too_low for ret in self.each)
+
     def count(self, kind: Kind) -> int:
         """Return the number of returns with this outcome."""
         return sum(ret.kind == kind for ret in self.each)

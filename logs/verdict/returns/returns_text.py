@@ -162,9 +162,12 @@ def headline(returns: Returns) -> str:
         if returns.omitted_count
         else ""
     )
-    return (
-        (f"not judged in full ({reasons}): " if reasons else "") + _judged_text(returns) + omitted_text + landing_suffix
+    low_count = returns.too_low_start_count
+    low_text = (
+        f"; at {count_text(low_count, 'start')} the flight itself is below the required height" if low_count else ""
     )
+    incomplete_text = f"not judged in full ({reasons}): " if reasons else ""
+    return f"{incomplete_text}{_judged_text(returns)}{low_text}{omitted_text}{landing_suffix}"
 
 
 def _judged_text(returns: Returns) -> str:

@@ -26,11 +26,11 @@ def completion_findings(
     if plan is not None and plan.failures:
         faults.append(message("the plan is not feasible", f": {plan.failures[0]}"))
     if end_reason != "completed":
-        place_text = ""
+        ending_place = ""
         if aligned is not None and not aligned.passed[-1]:
             row = len(aligned.track) - 1
-            place_text = f" on {place_text_within(requirements.leg(aligned.leg_at(row)))} {aligned.position_text(row)}"
-        faults.append(message(f"the flight ended early: {end_reason}", place_text))
+            ending_place = f" on {place_text(requirements.leg(aligned.leg_at(row)))} {aligned.position_text(row)}"
+        faults.append(message(f"the flight ended early: {end_reason}", ending_place))
     if not log_complete:
         faults.append(message("the log is damaged or unfinished"))
     flown_count, leg_numbers = 0, requirements.setup.route.leg_numbers

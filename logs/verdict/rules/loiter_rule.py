@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from flight.mission.itinerary import stated_loiter
+from flight.mission.itinerary import Loiter, stated_loiter
 from logs.verdict.findings import (
     UNKNOWN_AIRCRAFT,
     UNKNOWN_PATH,
@@ -189,7 +189,7 @@ def _loiter_finding(
     faults = _small_radius_faults(requirements, circle, min_radius) if is_known else []
     undecided_texts = [fault.text for fault in faults if _may_pass(requirements, circle)]
     faults = [] if undecided_texts else faults
-    facts = [*undecided_texts, f"{circle.laps:.2f} laps with a radius of {circle.radius:.0f} m"]
+    facts = [*undecided_texts, f"{_planned_laps_text(requirements, circle)} with a radius of {circle.radius:.0f} m"]
     hazards_text, parameter_name = "", requirements.setup.autopilot.loiters.radius_name
     if uses_parameter and faults and math.isfinite(min_radius):
         # If the parameter makes the loiter too tight, the autopilot flies it wider, as at the end of a return.
@@ -312,6 +312,21 @@ def _flown_radii(aligned: AlignedTrack, circle: LoiterCircle) -> Floats:
     return np.asarray(np.hypot(offsets[:, 0], offsets[:, 1]))
 
 
+def _stated_loiter(requirements: RouteRequirements, circle: LoiterCircle) -> Loiter | None:
+    """Return the loiter that the mission's item of a circle states; None for a circle without such an item."""
+    seq = int(requirements.setup.route.items[circle.first])
+    return next((stated_loiter(item) for item in requirements.setup.mission.items if item.seq == seq), None)
+
+
+def _planned_laps_text(requirements: RouteRequirements, circle: LoiterCircle) -> str:
+    """Describe the planned laps of a loiter: those that its item states, and those of its path from join to exit."""
+    drawn_text = f"{circle.laps:.2f} laps from joining to leaving"
+    loiter = _stated_loiter(requirements, circle)
+    if loiter is None or not loiter.turns:
+        return drawn_text
+    return f"{loiter.turns:g} {'lap' if loiter.turns == 1.0 else 'laps'} planned ({drawn_text})"
+
+
 def _flown_facts(
     requirements: RouteRequirements, aligned: AlignedTrack | None, circle: LoiterCircle, radii: Floats
 ) -> list[str]:
@@ -345,8 +360,7 @@ def _is_whole(requirements: RouteRequirements, aligned: AlignedTrack | None, cir
 
     A loiter that ends at an altitude needs no number of laps.
     """
-    seq = int(requirements.setup.route.items[circle.first])
-    loiter = next((stated_loiter(item) for item in requirements.setup.mission.items if item.seq == seq), None)
+    loiter = _stated_loiter(requirements, circle)
     is_to_altitude = loiter is not None and loiter.to_altitude
     laps = _flown_laps(requirements, aligned, circle)
     return math.isfinite(laps) and (is_to_altitude or laps >= circle.laps - LOITER_LAPS_TOLERANCE)

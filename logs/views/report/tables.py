@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from flight.mission_files.formats import mission_text
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track, control_limits, saturated_rows
-from logs.verdict.measures.path_sweeps import passages
+from logs.verdict.measures.path_sweeps import passages, segment_clearances
 from logs.verdict.measures.track_alignment import takeoff_and_approach_rows
 from logs.views.report.text import NOTHING, number, quantity
 from planner.plan import GIVEN_WAYPOINTS
@@ -87,11 +87,15 @@ def leg_rows(setup: FlightSetup, track: Track | None, failing: frozenset[int]) -
 
 
 def ground_clearance(setup: FlightSetup, track: Track) -> Floats | None:
-    """Return the height above ground of each row, m, (t,), from track and terrain; None without terrain."""
+    """Return the lowest height above ground from each row to the next, m, (t,), as the clearance rule measures it.
+
+    Return None without terrain.  The last row has its own height.
+    """
     terrain = setup.scenario.terrain
     if terrain is None:
         return None
-    return np.asarray(track.position[:, 2] - terrain.height(track.position[:, 0], track.position[:, 1]))
+    end = track.position[-1]
+    return np.append(segment_clearances(terrain, track.position)[0], end[2] - terrain.height(end[0], end[1]))
 
 
 def _make_flown_cells(track: Track | None, heights_above_ground: Floats | None, leg: int) -> tuple[str, ...]:

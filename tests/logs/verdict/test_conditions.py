@@ -45,8 +45,8 @@ def test_weather_and_ground() -> None:
     windy = with_wind(setup.scenario, 8.04, 3.0 * 3.14159265 / 2.0, "moderate")
     _, line = lines_of(setup.in_scenario(windy))
     begin = (
-        "Conditions: wind 8.04 m/s from 270 degrees at 420 m AMSL, +0.1 m/s per 100 m of height, moderate turbulence;"
-        " navigation without position error; terrain "
+        "Conditions: wind 8.04 m/s from 270 degrees at 420 m AMSL, +0.1 m/s per 100 m of height, moderate turbulence"
+        " (vertical gusts: 1.54 m/s RMS); navigation without position error; terrain "
     )
     assert line.startswith(begin)
     assert "heights above " in line

@@ -152,6 +152,24 @@ def test_no_boundary_of_too_few_flights_is_stated(base: CampaignBase, tmp_path: 
     assert wind_lines(partly)[1].endswith("(6.5 to 7.5 m/s at 95 %); highest: 9.0 m/s from 180°")
 
 
+def test_few_flights_say_what_they_show_of_each_direction(base: CampaignBase, tmp_path: Path) -> None:
+    """Flown in 0° up to 6 and failed from 8 m/s, in 90° and 180° flown in 5, in 270° lost or failed in 9 m/s."""
+    flights = ((0, 6.0, True), (0, 8.0, False), (0, 9.0, True), (1, 5.0, True), (2, 5.0, True), (3, 9.0, False))
+    found = replace(FOUND, flights=flights, lost=())
+    start = wind_lines(found).index("directions without a boundary, by their own flights, which do not prove it:")
+    assert wind_lines(found)[start + 1 : start + 4] == [
+        "  from 0°: between 6.0 and 8.0 m/s (3 flights)",
+        "  from 90° to 180°: at least 5.0 m/s (2 flights)",
+        "  from 270°: below 9.0 m/s (1 flight)",
+    ]
+    assert "  from 270°: not enough flights (1 flight)" in wind_lines(replace(found, lost=(5,)))
+    assert "  from 270°: not enough flights (1 flight)" in wind_lines(replace(found, undecided=((5, "x"),)))
+    assert not any("without a boundary" in line for line in wind_lines(ESTIMATED))
+    write_winds(tmp_path, base, found, "planfly winds x")
+    directions = json.loads((tmp_path / "winds.json").read_text())["directions"]
+    assert [one["flown_bounds_mps"] for one in directions] == [[6.0, 8.0], [5.0, None], [5.0, None], [None, 9.0]]
+
+
 def test_rules_that_fail_in_calm_air_are_named_with_their_places() -> None:
     """Three of four flights in calm air fail clearance at leg 4, one of them slope, too; from W it flies in 2 m/s."""
     by_rule = (

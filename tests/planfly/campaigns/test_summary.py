@@ -89,7 +89,9 @@ def test_whose_flights_they_are_stands_behind_the_answer(base: CampaignBase, tmp
     with made_report(base, tmp_path) as (store, summary):
         aircraft, world, pilot = campaign_lines(summary)[4:7]
         assert aircraft.startswith("  Aircraft: aerosonde, 11 kg, 25 m/s")
-        assert world.startswith("  Conditions: wind 5 m/s from 250 degrees, light turbulence; navigation ")
+        assert world.startswith(
+            "  Conditions: wind 5 m/s from 250 degrees, light turbulence (vertical gusts: 0.77 m/s RMS); navigation "
+        )
         assert world.endswith("; terrain flat at 100 m, heights above mean sea level")
         assert pilot.startswith("  Flown by: ")
         data = json.loads(summary_json(summary))["conditions"]

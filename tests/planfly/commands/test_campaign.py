@@ -50,6 +50,23 @@ def test_a_flight_is_flown_again_byte_for_byte(flown: tuple[list[str], Path]) ->
     assert (out / "flights" / log.name).read_bytes() == log.read_bytes()
 
 
+def test_a_campaign_is_resumed_with_its_own_options(
+    flown: tuple[list[str], Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The wind of 5 m/s is the scenario's, which is named by an option."""
+    line, first = flown
+    out = tmp_path / "out"
+    shutil.copytree(first, out)
+    short = [*line[:2], "--workers", "1", "--out", str(out), "--resume"]
+    assert main([*short, "--flights", "5"]) == 3
+    assert "wind 5 m/s from" in capsys.readouterr().out
+    assert json.loads((out / "summary.json").read_text())["flights"] == 5
+    assert main([*short, "--wind", "8,250"]) == 2
+    assert "wind.speed_mps 8.0 instead of 5.0" in capsys.readouterr().err
+    # The refused option is not stored.
+    assert main(short) == 3
+
+
 @pytest.mark.parametrize(
     ("more", "words"),
     [

@@ -20,7 +20,9 @@ from planfly.studio.autosave import mission_data, mission_from_data
 from planfly.studio.documents import Document, open_document, open_dropped, straight_plan
 from planfly.studio.session import Session, StaleEdit, TriedChanges, open_session
 from planfly.workflow import suggestion_trials
+from planfly.workflow.open_flight import make_setup
 from planfly.workflow.suggestion_trials import SuggestionTrials, with_tried_suggestions
+from planfly.workflow.uav import load_uav
 from tests.mission_lines import setup_of, wp
 from tests.own_aircraft import copy_aerosonde, write_mission, write_scenario
 from tests.planfly.studio.drafts import drawn_session, session_of, try_planned, world_of
@@ -512,7 +514,7 @@ def test_undone_edits_can_be_redone_after_the_server_died(tmp_path: Path) -> Non
     session, _ = open_session(str(file), world, kept)
     for by in (10.0, 20.0, 30.0):
         session.edit(messages.Raise(kind="raise", rev=session.rev, by=by))
-    results = [mission.items for mission, _ in session.history.steps]
+    results = [step.mission.items for step in session.history.steps]
     session.step_history("undo")
     session.step_history("undo")
     session.autosave(kept)
@@ -543,7 +545,7 @@ def test_each_edit_can_be_undone_after_the_server_died(tmp_path: Path, monkeypat
     def raise_all(session: Session, *heights: float) -> list[Mission]:
         for by in heights:
             session.edit(messages.Raise(kind="raise", rev=session.rev, by=by))
-        return [mission for mission, _ in session.history.steps]
+        return [step.mission for step in session.history.steps]
 
     def undone(session: Session) -> list[str]:
         """Undo all, and return what was undone."""
@@ -686,6 +688,51 @@ def test_a_suggested_speed_is_named_by_its_undo() -> None:
     session.tried["geometric"] = TriedChanges(session.rev, [], changes)
     session.edit(messages.Apply(kind="apply", rev=session.rev, finding=0, which=0))
     assert session.undo_text.endswith(": fly leg 2 (to item 4) at 20.5 m/s instead of 25 m/s")
+
+
+def test_a_suggested_parameter_is_set_and_undone(tmp_path: Path) -> None:
+    """A return from 150 m over a top of 100 m, down to RTL_ALTITUDE 100: half way it is 5 m lower than required."""
+    setup = setup_of(
+        wp(0, 0, 150.0),
+        wp(0, 4000, 150.0),
+        "3 20 0 0 0 0 0 0 0",
+        home="36.5 -84.2 0",
+        terrain={"kind": "peaks", "peak": [{"east_m": 0.0, "north_m": 2000.0, "height_m": 100.0, "sigma_m": 600.0}]},
+        limits={"min_clearance_m": 30.0},
+        flight={"autopilot": "ardupilot"},
+    )
+    setup = make_setup(setup.scenario, load_uav(setup.scenario), setup.mission, 1)
+    session = Session.from_document(Document("low.waypoints", "low", setup, "waypoints"), MissionOptions())
+    try_planned(session)
+    findings = session.mission_message()["findings"]
+    (finding,) = [one for one in findings if any("RTL_ALTITUDE" in way["text"] for way in one["suggestions"])]
+    (which,) = [k for k, way in enumerate(finding["suggestions"]) if "RTL_ALTITUDE" in way["text"]]
+    assert finding["suggestions"][which]["apply"]
+    world, items = session.world_rev, session.mission.items
+    session.edit(messages.Apply(kind="apply", rev=session.rev, finding=finding["number"], which=which))
+    (wanted,) = session.settings_json()["parameters"].values()
+    assert wanted in (115.0, 120.0)
+    assert session.undo_text == f"apply a suggestion of clearance: set RTL_ALTITUDE to {wanted:g} m instead of 100 m"
+    # The pages are sent the settings, and the flight is made with them.
+    assert session.world_rev == world + 1
+    assert session.judged.setup.autopilot.model.returns.rules.height == wanted
+    assert session.judged.verdict.flyable is not False
+    assert session.mission.items == items
+    # Another parameter that is set by hand stays, and the undo is kept for the next session.
+    session.change_settings(messages.Settings(kind="settings", parameter="WP_RADIUS=40"))
+    session.autosave(tmp_path / "low.json")
+    again = Session.from_document(session.document, MissionOptions())
+    assert again.restore(tmp_path / "low.json")
+    for one in (session, again):
+        one.step_history("undo")
+        assert one.settings_json()["parameters"] == {"WP_RADIUS": 40.0}
+        assert not one.judged.verdict.flyable
+        one.step_history("redo")
+        assert one.settings_json()["parameters"] == {"WP_RADIUS": 40.0, "RTL_ALTITUDE": wanted}
+    # Another autopilot does not have it: the mission's part of the edit is undone all the same.
+    session.change_settings(messages.Settings(kind="settings", autopilot="px4"))
+    session.step_history("undo")
+    assert (session.undo_text, session.settings_json()["parameters"]) == ("", {})
 
 
 def test_a_sphere_is_passed_with_what_navigation_may_be_off_to_spare() -> None:

@@ -6,11 +6,14 @@ import pty
 import re
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
+import planfly
 from planfly.commands.registry import build_parser
 from planfly.terminal.command_parser import CommandParser, LineParser, colour_text, wants_colour
+from world.errors import MissionError
 
 
 class Terminal(io.StringIO):
@@ -81,6 +84,20 @@ def test_a_coloured_help_says_the_same(command: str) -> None:
 # Bad usage is one line that names what was meant; the help stands in groups.
 
 Output = pytest.CaptureFixture[str]
+
+
+def test_a_second_file_is_refused_with_the_way_to_judge_several(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Output
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("a.plan", "b.plan"):
+        (tmp_path / name).write_text("{}", encoding="utf-8")
+    with pytest.raises(SystemExit) as stopped:
+        build_parser().parse_args(["check", "a.plan", "b.plan"])
+    assert stopped.value.code == 2
+    assert capsys.readouterr().err.startswith("planfly check: b.plan: the command takes one file at a time (see ")
+    with pytest.raises(MissionError, match=r"holds a.plan, b.plan; expected a .* or .plan file, one at a time$"):
+        planfly.check(tmp_path)
 
 
 @pytest.mark.parametrize(

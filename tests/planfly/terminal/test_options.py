@@ -54,6 +54,12 @@ def test_a_wind_is_a_speed_and_where_it_blows_from() -> None:
         parser_with(add_aircraft_and_wind_options).parse_args(["--turbulence", "severe"])
 
 
+def test_the_help_states_the_gusts_of_each_turbulence() -> None:
+    """MIL-F-8785C: a tenth of the wind at 20 ft, which is 15 knots in light and 30 in moderate turbulence."""
+    help_text = " ".join(parser_with(add_aircraft_and_wind_options).format_help().split())
+    assert f"light {0.1 * 15 * 1852 / 3600:.2f} m/s, moderate {0.1 * 30 * 1852 / 3600:.2f} m/s" in help_text
+
+
 @pytest.mark.parametrize("line", ["fly m.waypoints --sitl bin/arduplane", "run tight --sitl bin/arduplane"])
 def test_a_real_autopilot_flies_for_the_commands_that_fly(line: str) -> None:
     assert build_parser().parse_args(line.split()).sitl == "bin/arduplane"

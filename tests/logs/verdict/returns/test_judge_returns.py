@@ -305,6 +305,12 @@ def test_a_flight_that_is_too_low_without_a_take_off_excuses_no_return(tmp_path:
     assert {one.required_height for one in found.each} == {30.0}
     assert {one.kind for one in found.each if one.start[2] < 29.0} == {"low"}
     assert {one.kind for one in found.each if one.start[2] > 35.0} == {"safe"}
+    # The required height is 30 m, with a tolerance of 1 m.
+    count = sum(one.start[2] < 29.0 for one in found.each)
+    assert 1 < count < len(found.each)
+    assert f" safe; at {count} starts the flight itself is below the required height" in headline(found)
+    safe = replace(found, each=tuple(one for one in found.each if one.safe))
+    assert "the flight itself" not in headline(safe)
     (low,) = [one for one in found.ranges if one.worst.starts_too_low]
     text = range_text(low, found, setup.scenario)
     assert ": too low; " in text

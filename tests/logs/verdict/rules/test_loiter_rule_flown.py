@@ -81,7 +81,8 @@ def test_the_radius_as_flown_is_told(wider: float) -> None:
     low, high = (float(word) for word in item.reason.split("flown at ")[1].split(" m")[0].split(" to "))
     assert low == pytest.approx(200.0 + min(wider, 0.0), abs=0.06)
     assert high == pytest.approx(200.0 + max(wider, 0.0), abs=0.06)
-    assert f"{circle.laps:.2f} laps with a radius of 200 m" in item.reason
+    # The item states 2 laps; the path to the next waypoint leads farther around the circle.
+    assert f"2 laps planned ({circle.laps:.2f} laps from joining to leaving) with a radius of 200 m" in item.reason
     assert item.margin == pytest.approx(200.0 - float(requirements.min_radius[circle.first : circle.last + 1].max()))
 
 

@@ -39,6 +39,20 @@ def test_legs_add_up_to_the_flight() -> None:
     assert [row.failing for row in leg_rows(make_setup(), None, frozenset({1}))] == [False, True, False]
 
 
+def test_the_lowest_height_is_that_of_the_rule_between_rows() -> None:
+    """From 300 m to 300 m over a top of 280 m, half way between two rows of a sparse log."""
+    hill = {"east_m": 0.0, "north_m": 0.0, "height_m": 280.0, "sigma_m": 60.0}
+    setup, track = make_setup(terrain={"kind": "peaks", "peak": [hill]}), make_track()
+    position = np.tile([300.0, 0.0, 300.0], (len(track), 1))
+    position[:40, 0] = -300.0
+    flown = replace(track, position=position, leg=np.zeros_like(track.leg))
+    assert "never less than 20 m above ground" in flight_sentence(setup, flown)
+    heights = [
+        row.cells[LEG_COLUMNS.index("lowest height above ground (m)")] for row in leg_rows(setup, flown, frozenset())
+    ]
+    assert float(heights[0]) == pytest.approx(20.0, abs=0.5)
+
+
 def test_stays_and_held_controls_are_those_of_the_track() -> None:
     threat = {"name": "M", "east_m": 100, "north_m": 0, "amsl_m": 360, "kill_radius_m": 250, "kill_scale_m": 50}
     setup, track = make_setup(threats=[threat]), make_track()
