@@ -85,7 +85,7 @@ def add_check_parser(command_line: LineParser) -> None:
 def check(args: argparse.Namespace) -> int:
     """Judge a flight or a mission; return the exit code of the verdict, or 3 for an incomplete log."""
     from planfly.api import flying
-    from planfly.terminal.verdict_lines import print_verdict
+    from planfly.terminal.verdict_lines import verdict_lines
 
     if args.autopilots is not None:
         return _check_for_each_autopilot(args)
@@ -96,7 +96,7 @@ def check(args: argparse.Namespace) -> int:
     write_json_if_requested(args, lambda: _verdict_answer(result.verdict, returns, code))
     write_junit_if_requested(args, {args.what: result.verdict})
     print_warnings([result.loss] if result.loss else [])
-    print_verdict(result.verdict, result.setup.notes, result.setup, returns)
+    print(*verdict_lines(result.verdict, result.setup.notes, result.setup, returns), sep="\n")
     return code
 
 

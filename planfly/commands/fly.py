@@ -51,13 +51,13 @@ def add_fly_parser(command_line: LineParser) -> None:
 def fly(args: argparse.Namespace) -> int:
     """Fly a mission, write its log, and return the exit code of the verdict."""
     from planfly.api import flying
-    from planfly.terminal.verdict_lines import print_verdict
+    from planfly.terminal.verdict_lines import verdict_lines
 
     is_log_named = args.log is not None
     log = args.log if is_log_named else FLY_LOG
     flight = call_api(flying.fly, args, log=log, overwrite=args.overwrite or not is_log_named)
     print_warnings(flight.setup.scenario.notes)
-    print_verdict(flight.verdict, flight.setup.notes, flight.setup, flight.return_summary)
+    print(*verdict_lines(flight.verdict, flight.setup.notes, flight.setup, flight.return_summary), sep="\n")
     if flight.log is None:
         print("log       none: nothing was flown")
     else:

@@ -63,14 +63,14 @@ def add_import_log_parser(command_line: LineParser) -> None:
 def import_log(args: argparse.Namespace) -> int:
     """Import a log; return the exit code of the verdict, or 3 if part of the log could not be read."""
     from planfly.api import imported
-    from planfly.terminal.verdict_lines import print_verdict
+    from planfly.terminal.verdict_lines import verdict_lines
 
     if args.files is not None:
         return _guess_columns(args)
     if args.target is None:
         raise PlanflyError("import needs FLIGHT.mcap, the flight log to write", field="FLIGHT.mcap")
     flight = call_api(imported.import_log, args)
-    print_verdict(flight.verdict, flight.setup.route.notes)
+    print(*verdict_lines(flight.verdict, flight.setup.route.notes), sep="\n")
     print(f"log       {Path(args.target)} ({count_text(len(flight.track), 'row')})")
     code = INCOMPLETE if flight.lossy else verdict_code(flight.verdict)
     write_json_if_requested(args, lambda: _import_answer(Path(args.target), flight, code))

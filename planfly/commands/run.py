@@ -110,9 +110,9 @@ def _json_answer(result: "RunResult", has_rounds: bool, code: int, dispersed: "D
 
 def _print_round(finished_round: "Round") -> None:
     """Print the verdict on a round, the line on returns, the flight model, and the written files."""
-    from planfly.terminal.verdict_lines import print_verdict
+    from planfly.terminal.verdict_lines import verdict_lines
 
-    print_verdict(finished_round.verdict, finished_round.notes, returns=finished_round.return_summary)
+    print(*verdict_lines(finished_round.verdict, finished_round.notes, returns=finished_round.return_summary), sep="\n")
     print_engine(finished_round.engine)
     files = "plan.json, mission.waypoints, mission.plan, verdict.json; nothing was flown"
     if finished_round.flown:
