@@ -20,7 +20,7 @@ from benchmarks.timing import median_cpu
 from flight.dynamics.fdm import Fdm
 from flight.mission.from_plan import plan_mission
 from flight.simulation.setup import FDM_HZ, FlightSetup
-from flight.simulation.simulate import Flight, fly_to_end, simulate
+from flight.simulation.simulate import BLOCK_DURATION_S, Flight, fly_to_end
 from logs.recording.reader import read_log
 from logs.recording.recorder import Recorder
 from logs.verdict.judge_flight import judge_flight
@@ -100,10 +100,10 @@ def recording(setup: FlightSetup, uav: Uav, folder: Path, rounds: int = 2 * ROUN
     def fly(every: int) -> None:
         """Fly and record every n-th row."""
         with Recorder(log, setup, every=every, batch=BATCH_S) as recorder:
-            ended = ""
-            for block in simulate(Flight(setup, uav.aircraft)):
-                recorder.write_rows(block.rows)
-                ended = block.end_reason
+            flight, ended = Flight(setup, uav.aircraft), ""
+            while not ended:
+                rows, ended = flight.fly_block(round(BLOCK_DURATION_S / flight.dt))
+                recorder.write_rows(rows)
             recorder.finish(ended, None)
 
     work: dict[str, Callable[[], object]] = {

@@ -8,7 +8,7 @@ import os
 import sys
 from collections.abc import Sequence
 
-from planfly.commands.registry import build_parser, find_command
+from planfly.commands.registry import COMMANDS_BY_NAME, build_parser
 from planfly.runtime.process_setup import prepare_process, with_large_stack
 from planfly.terminal.arguments import COMPLETION_VARIABLE, complete_for_shell
 from planfly.terminal.command_parser import CommandParser, UsageExit, colour_text, error_text
@@ -84,7 +84,7 @@ def _run_command(argv: Sequence[str] | None) -> int:
     try:
         with redirect_output(args):
             try:
-                return find_command(args.command)(args)
+                return COMMANDS_BY_NAME[args.command].load()(args)
             except _REPORTED_ERRORS as error:
                 write_error_if_requested(args, *_exit_code_and_text(error, parser.commands[args.command]))
                 raise

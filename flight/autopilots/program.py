@@ -10,8 +10,8 @@ from typing import Any, ClassVar, Self
 from aircraft.catalog import Aircraft
 from flight.autopilots.autopilot import Autopilot, AutopilotProgram, describe_program
 from flight.autopilots.parts import MissionChecks, MissionParts
-from flight.simulation.running_flight import RunningFlight
 from flight.simulation.setup import FlightSetup
+from flight.simulation.simulate import RunningFlight
 
 
 class ProgramFlight(RunningFlight, AbstractContextManager["ProgramFlight"]):

@@ -426,7 +426,7 @@ def parse_plan_file(text: str, source: str) -> Mission:
     try:
         data = json.loads(text.removeprefix("\ufeff"), parse_constant=_refuse_constant)
     except (ValueError, RecursionError) as error:
-        raise MissionError(f"{source}: not valid JSON: {_first_line(error)}", file=source) from error
+        raise MissionError(f"{source}: not valid JSON: {str(error).splitlines()[0]}", file=source) from error
     warnings, plans = _expand_complex_items(data, source)
     try:
         file = _File.model_validate(data)
@@ -593,7 +593,7 @@ def plan_file_text(mission: Mission) -> str:
     """
     mission = renumber_items(mission)
     home = mission.home or Home(0.0, 0.0, 0.0)
-    modes = _altitude_modes(mission.items)
+    modes = {_altitude_mode(item.frame) for item in mission.items if is_located(item.command, item.frame)}
     data = {
         "fileType": "Plan",
         "geoFence": _fence_json(mission.fences),
@@ -602,7 +602,7 @@ def plan_file_text(mission: Mission) -> str:
             "cruiseSpeed": round(stated_cruise_speed(mission) or _CRUISE_SPEED_MPS),
             "firmwareType": next((number for number, name in _FIRMWARES.items() if name == mission.autopilot), 0),
             # 0: mixed.
-            "globalPlanAltitudeMode": modes[0] if len(modes) == 1 else 0,
+            "globalPlanAltitudeMode": modes.pop() if len(modes) == 1 else 0,
             "hoverSpeed": _HOVER_SPEED_MPS,
             "items": [_item_json(item) for item in mission.items],
             "plannedHomePosition": [home.lat_deg, home.lon_deg, home.alt],
@@ -621,11 +621,6 @@ def plan_file_text(mission: Mission) -> str:
 def _altitude_mode(frame: int) -> int:
     """Return QGC's altitude mode of a frame: 1 relative to home, 2 above mean sea level, 4 above terrain."""
     return 1 if frame in OVER_HOME else 2 if frame in AMSL else 4
-
-
-def _altitude_modes(items: tuple[MissionItem, ...]) -> list[int]:
-    """Return the different altitude modes of the items with a position."""
-    return sorted({_altitude_mode(item.frame) for item in items if is_located(item.command, item.frame)})
 
 
 def stated_cruise_speed(mission: Mission) -> float | None:
@@ -647,7 +642,8 @@ def stated_cruise_speed(mission: Mission) -> float | None:
 
 def _item_json(item: MissionItem) -> dict[str, Any]:
     """Return an item as a SimpleItem of a `.plan`."""
-    numbers = [_nan_as_null(value) for value in (*item.params, item.lat_deg, item.lon_deg, item.alt)]
+    values = (*item.params, item.lat_deg, item.lon_deg, item.alt)
+    numbers = [None if math.isnan(value) else value for value in values]
     data: dict[str, Any] = {
         "autoContinue": item.autocontinue,
         "command": int(item.command),
@@ -678,16 +674,6 @@ def _fence_json(fences: tuple[MissionItem, ...]) -> dict[str, Any]:
     return {"circles": circles, "polygons": polygons, "version": 2}
 
 
-def _nan_as_null(value: float) -> float | None:
-    """Return None (null in JSON) for NaN, and any other value unchanged."""
-    return None if math.isnan(value) else value
-
-
 def _refuse_constant(name: str) -> float:
     """Raise ValueError for NaN or Infinity, which Python's JSON reader accepts."""
     raise ValueError(f"{name} is not a number")
-
-
-def _first_line(error: BaseException) -> str:
-    """Return the first line of an error's text."""
-    return str(error).splitlines()[0]

@@ -1,29 +1,44 @@
-"""Fly JSBSim with a simulated autopilot along a route and over its terrain, until the flight ends."""
+"""Fly JSBSim along a route and over its terrain, until the flight ends.
+
+In a `Flight` a simulated autopilot controls the aircraft, in a `flight.autopilots.program.ProgramFlight` an external
+program.
+"""
 
 import math
 import struct
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import NamedTuple
+
+import numpy as np
 
 from aircraft.catalog import Aircraft
-from aircraft.contacts import find_contacts
+from aircraft.contacts import Gear, find_contacts
+from aircraft.path_limits import Limits, ground_speed_on
 from flight.autopilots.parts import ControlLaw
 from flight.dynamics.compiled_model import PROOF_STEPS, CompiledModel
 from flight.dynamics.fdm import JSBSIM_VERSION, Fdm, Variation
 from flight.dynamics.jsbsim_properties import Getter, Setter
 from flight.dynamics.model_program import UnsupportedModel
 from flight.dynamics.trim import steady_flight
-from flight.guidance.gains import load_gains
-from flight.guidance.path import FlyByPath
-from flight.mission.ground_phases import GroundPhases
-from flight.simulation.local_map import LocalMap
-from flight.simulation.running_flight import RunningFlight, Start, default_gear, find_release, release
+from flight.guidance.equivalent_airspeed import eas_to_tas_ratio
+from flight.guidance.gains import Gains, load_gains
+from flight.guidance.navigation_error import ERRORS, start_navigation
+from flight.guidance.path import FlyByPath, fly_by_path, waypoint_records
+from flight.mission.ground_phases import GroundPhases, TakeOff
+from flight.simulation.local_map import Ground, LocalMap
 from flight.simulation.setup import EngineChoice, FlightSetup
-from flight.simulation.tick import READ_FIELDS, Workspace
-from flight.simulation.track import COLUMNS, Rows, Track, as_track, join_rows
+from flight.simulation.tick import BLOCK_TICKS, ENDS, READ_FIELDS, Workspace, rtl_loiter_timeout
+from flight.simulation.track import Rows, Track, TrackBuilder, join_rows, quantise
+from flight.simulation.turbulence import start_gusts
+from world.arrays import Floats
 from world.errors import FlightError, StartError
+from world.forecast.wind_field import without_levels_above
+from world.frames import to_geo
+from world.geometry import leg_courses
+from world.kernels import Records
+from world.random_streams import NAVIGATION, TURBULENCE, stream
+from world.wind import W20
 
 # ----------------------------------------------------------------------
 # The flight loop: read JSBSim, do a tick, set JSBSim and step it, with as little Python as possible.
@@ -131,131 +146,422 @@ def make_loop(
 
 # Default duration of a guidance tick, s; `Flight.dt` is the duration in one flight.
 TICK_S = 1.0 / 60.0
-# Duration of one block of rows from `simulate`, s.
+# Duration of the rows that are flown at once, s.
 BLOCK_DURATION_S = 1.0
 # The same for a flight that is neither recorded nor shown; 40 us are spent in Python for each block.
 LONG_BLOCK_DURATION_S = 10.0
-# Smallest number of rows by which a track under construction is enlarged.
-_MIN_ADDED_ROWS = 6_000
 # Bank that guidance may add to the bank of planned turns in order to correct an error, rad.
 BANK_RESERVE_RAD = math.radians(3.0)
 # Time added to the time limit of a flight that takes off or lands, s.
 GROUND_TIME_ALLOWANCE_S = 120.0
+# Time limit of a flight, as a multiple of the time for its length at its lowest ground speed.
+TIME_LIMIT_FACTOR = 1.5
+# Time added to that limit, s.
+TIME_LIMIT_BASE_S = 60.0
+# Lowest ground speed that is assumed for it, m/s.
+MIN_GROUND_SPEED_MPS = 3.0
+
+
+# ----------------------------------------------------------------------
+# One flight in progress, for any autopilot: its start, ground, wind and time limit.
 
 
 @dataclass(frozen=True, slots=True)
-class SimulatedFlight:
-    """A flight that has ended.
+class Start:
+    """Position, course, airspeed and wind at the start of a route.
 
-    track: flown track.
-    ended: "completed", or the reason why the flight ended earlier.
+    lat_deg, lon_deg: geodetic.
+    amsl: altitude of the aircraft, m.
+    course: true course of the first leg, rad.
+    slope: slope of the first leg, rad.
+    airspeed: m/s, true.
+    wind: velocity of the air, north, east and down, m/s.
+    ground: altitude of the ground, m AMSL.
+    """
+
+    lat_deg: float
+    lon_deg: float
+    amsl: float
+    course: float
+    slope: float
+    airspeed: float
+    wind: tuple[float, float, float]
+    ground: float
+
+
+class RunningFlight:
+    """One flight in progress, advanced by `fly_block`.
+
+    dt: duration of a tick, s.
+    setup: setup of the flight, with the program that flies once that is known.
     path: reference path.
+    map: local map from JSBSim's positions, around area and route.
+    guidance_memory: memory of the guidance, a record of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.
+    fdm: the simulated aircraft.
+    max_ticks: time limit, ticks.
+    engine: flight model in use, and the reason for it, as in "JSBSim, as requested".
+    _law: control law of a simulated autopilot; None for an external program that starts in the air.
+    _fly_ticks: flies up to a number of ticks, fills the workspace's rows, and returns the end code; 0 if the flight
+        continues.
     """
 
-    track: Track
-    ended: str
-    path: FlyByPath
+    _law: ControlLaw | None = None
+    _fly_ticks: Callable[[int], int]
+    engine: str = "JSBSim, because the program of an autopilot flies"
+
+    def __init__(
+        self,
+        setup: FlightSetup,
+        aircraft: Aircraft,
+        gains: Gains,
+        variation: Variation | None = None,
+        local_map: LocalMap | None = None,
+        start_offset: tuple[float, float, float] = (0.0, 0.0, 0.0),
+        gear: Gear | None = None,
+    ) -> None:
+        """Load the aircraft, and start the flight.
+
+        local_map: local map of the setup, if another flight has already fitted one.
+        start_offset: east, north and up from the route's first waypoint to the start of the flight, m.
+        gear: gear for ground contact; None for a flight without ground contact.
+        """
+        self._start_offset = start_offset
+        self._ground = Ground(setup.scenario.terrain)
+        self._steps = setup.fdm_hz // setup.guidance_hz
+        self.dt = self._steps / setup.fdm_hz
+        self._gains = gains
+        self._prepare_route(setup, aircraft, local_map or LocalMap.around(setup))
+        self._new_fdm = partial(
+            Fdm,
+            aircraft,
+            rate_hz=setup.fdm_hz,
+            motor_braking=setup.scenario.flight.motor_braking,
+            variation=variation,
+            gear=gear,
+        )
+        self.fdm = self._new_fdm()
+
+    def _prepare_route(self, setup: FlightSetup, aircraft: Aircraft, local_map: LocalMap) -> None:
+        """Create the workspace of the compiled loop for a route, and set the flight's time limit.
+
+        local_map: local map of the setup.
+        """
+        self.setup, self.map = setup, local_map
+        # An autopilot with its own turns does not follow the arcs after fly-over waypoints.
+        turns = setup.autopilot.turns
+        follows_arcs = turns.follows_path and turns.keeps_to_arcs
+        follows_arcs = follows_arcs or not setup.route.fly_over.any()
+        self.path = (
+            setup.path
+            if follows_arcs
+            else fly_by_path(setup.route, setup.limits, setup.scenario.terrain, fly_over_turn="none")
+        )
+        waypoints = waypoint_records(setup.route, setup.mission, fly_over=setup.scenario.flight.fly_over)
+        waypoints["is_mission_end"] &= setup.autopilot.loiters.ends_in_circle
+        self._airspeeds = setup.autopilot.speeds.flown_airspeeds(setup.route.leg_airspeeds, setup.airspeed)
+        waypoints["airspeed"] = np.append(self._airspeeds, self._airspeeds[-1])
+        waypoints["min_ground_speed"] = setup.min_ground_speeds
+        law_memory = None if self._law is None else self._law.memory
+        self._workspace = Workspace(self._gains, self.path, waypoints, law_memory, setup.scenario.wind.field)
+        self._work = self._workspace.record
+        self._work.position_map, self._work.north_map = self.map.position.record, self.map.angle.record
+        self._work.pixel_map = self._ground.to_pixel.record
+        self.guidance_memory = self._work.memory
+        self._work.timing.dt = self.dt
+        self._work.settings.min_airspeed = 0.94 * aircraft.stall_speed
+        self._work.settings.center_longitude = self.map.center_longitude
+        self._work.settings.battery = setup.battery
+        length = self.path.length + _extra_loiter_length(setup, waypoints)
+        ground_speed = _min_ground_speed(setup, self._airspeeds) - _max_wind_deviation(setup, length)
+        time_limit = TIME_LIMIT_FACTOR * length / max(MIN_GROUND_SPEED_MPS, ground_speed) + TIME_LIMIT_BASE_S
+        # A loiter for a time lasts as long as its item states, although its path is only one circle.
+        timed_loiters = waypoints[(waypoints["loiter_time"] > 0.0) & (waypoints["loiter_time"] < math.inf)]
+        time_limit += sum(
+            dict(zip(timed_loiters["item"].tolist(), timed_loiters["loiter_time"].tolist(), strict=True)).values()
+        )
+        if setup.route.rtl_loiter is not None:
+            # An autopilot that flies an RTL by its own control law may loiter longer than the path does.
+            radius_factor = eas_to_tas_ratio(setup.route.rtl_loiter.up) ** 2
+            time_limit += rtl_loiter_timeout(radius_factor * setup.route.rtl_loiter.radius)
+        if waypoints["is_mission_end"][-1]:
+            time_limit += rtl_loiter_timeout(setup.autopilot.loiters.radius)
+        self.max_ticks = int(time_limit / self.dt)
+
+    @property
+    def position(self) -> Floats:
+        """Position of the aircraft at the start of the last tick, (3,) east, north and up, m."""
+        true = self._work.true
+        return np.array([true.east, true.north, true.up])
+
+    @property
+    def distance(self) -> float:
+        """Distance flown along the path, m."""
+        return min(float(self.guidance_memory.distance), self.path.length)
+
+    def _start_disturbances(self, setup: FlightSetup) -> None:
+        """Set the mean wind, and start turbulence and navigation error from their random streams."""
+        wind, record = setup.scenario.wind, self._work
+        wind_course = wind.to_course
+        w20 = W20[wind.turbulence]
+        record.wind = (
+            wind.speed,
+            math.cos(wind_course),
+            math.sin(wind_course),
+            wind.gradient,
+            wind.reference_amsl,
+            w20,
+            0.0,
+        )
+        self._windy = bool(wind.speed or wind.gradient or w20 or wind.field)
+        self._random = stream(wind.seed if wind.seed is not None else setup.seed, TURBULENCE)
+        start_gusts(self._random.standard_normal(5), record.gusts)
+        sigma, time_constant = ERRORS[setup.nav]
+        record.settings.navigation_sigma, record.settings.navigation_time = sigma, time_constant
+        self._navigation_random = stream(setup.seed, NAVIGATION) if sigma else None
+        if self._navigation_random is not None:
+            start_navigation(self._navigation_random.standard_normal(6), record.navigation)
+
+    def _find_start(self, setup: FlightSetup) -> Start:
+        """Return the start of the route, with the airspeed limited to the aircraft's range.
+
+        Raises StartError if the start is not above the terrain.
+        """
+        points, aircraft = setup.route.positions, self.fdm.aircraft
+        east, north, up = (float(value + offset) for value, offset in zip(points[0], self._start_offset, strict=True))
+        ground_altitude = self._ground.height(east, north)
+        if not math.isnan(ground_altitude) and up <= ground_altitude:
+            reason = f"start at {up:.0f} m AMSL: not above the terrain, which is at {ground_altitude:.0f} m"
+            raise StartError(setup.mission.source, reason, field="start", value=up)
+        lat, lon = (float(value) for value in to_geo(setup.scenario.origin, east, north))
+        first_leg = points[1] - points[0]
+        convergence = self.map.convergence(lat, lon)
+        # If the aircraft cannot hold the airspeed or the first slope, the flight starts level at the nearest airspeed
+        # that the aircraft can hold; the verdict reports it.
+        return Start(
+            lat_deg=lat,
+            lon_deg=lon,
+            amsl=up,
+            course=math.atan2(first_leg[0], first_leg[1]) - convergence,
+            slope=math.atan2(first_leg[2], math.hypot(first_leg[0], first_leg[1])),
+            airspeed=min(aircraft.airspeed_max, max(aircraft.airspeed_min, float(self._airspeeds[0]))),
+            wind=_find_wind(setup, (east, north, up), convergence),
+            ground=min(0.0, up - 1000.0) if math.isnan(ground_altitude) else ground_altitude,
+        )
+
+    def _start_trimmed(self, source: str, start: Start) -> None:
+        """Start the aircraft trimmed on the slope of the first leg, or level if it cannot hold that slope.
+
+        source: file of the mission, for messages.
+
+        Raises StartError if the aircraft can fly neither the slope nor level.
+        """
+        start_values = (start.lat_deg, start.lon_deg, start.amsl, start.course, start.airspeed)
+        try:
+            trimmed = self.fdm.start(*start_values, start.slope, start.wind, start.ground)
+        except FlightError:
+            try:
+                trimmed = self.fdm.start(*start_values, 0.0, start.wind, start.ground)
+            except FlightError as error:
+                error_fields = {"field": error.field, "value": error.value, "allowed": error.allowed}
+                raise StartError(source, str(error), **error_fields) from error
+        # Mean wind is set as part of the gust.
+        self.fdm.set_wind(0.0, 0.0, 0.0)
+        self.fdm.set_gust(*start.wind)
+        self._work.commands = tuple(trimmed.commands())
+        self._work.air.wind_north, self._work.air.wind_east = start.wind[:2]
+
+    def fly_block(self, count: int) -> tuple[Rows, str]:
+        """Fly up to ``count`` ticks; return their track rows and the reason for the flight's end.
+
+        The reason is "" while the flight continues.
+        """
+        workspace, row_blocks, end_reason = self._workspace, list[Rows](), ""
+        while count > 0 and not end_reason:
+            # The rows of these ticks fit in the workspace.
+            ticks = min(count, BLOCK_TICKS)
+            workspace.turbulence[:ticks] = self._random.standard_normal((ticks, 3))
+            if self._navigation_random is not None:
+                workspace.navigation[:ticks] = self._navigation_random.standard_normal((ticks, 3))
+            remaining_ticks = self.max_ticks - int(workspace.ticks_flown[0])
+            workspace.rows_filled[0] = 0
+            status = self._fly_ticks(min(ticks, remaining_ticks))
+            row_blocks.append(quantise(workspace.rows[: workspace.rows_filled[0]]))
+            if status:
+                end_reason = ENDS[status]
+            elif remaining_ticks <= ticks:
+                end_reason = self._timeout_text()
+            count -= ticks
+        return (row_blocks[0] if len(row_blocks) == 1 else join_rows(row_blocks)), end_reason
+
+    def _timeout_text(self) -> str:
+        """Return the end reason of a flight that exceeded its time limit; it names the item of a current loiter."""
+        route, next_waypoint = self.setup.route, min(int(self.guidance_memory.leg) + 1, self.setup.route.legs)
+        text = f"time limit of {self.max_ticks * self.dt:.0f} s reached"
+        if route.arc_radii[next_waypoint] > 0.0 and route.rtl_start is None:
+            return f"{text} in the loiter of item {route.items[next_waypoint]}"
+        return text
 
 
-class FlightBlock(NamedTuple):
-    """Consecutive rows of a flight, as `simulate` yields them.
+def _extra_loiter_length(setup: FlightSetup, waypoints: Records) -> float:
+    """Return the extra length flown in loiters whose radius is too small for the bank limit, m.
 
-    rows: `flight.simulation.track.TRACK_ROW` records, (t,).
-    end_reason: "completed", or the reason why the flight ended with these rows; "" while it continues.
-    distance: distance along the path at the last row, m.
+    An autopilot that steers to a loiter's center flies around the center at the radius that the bank limit requires. It
+    then flies one more lap until the next waypoint lies ahead. A loiter that cannot be flown in the wind adds nothing,
+    because no time limit would be long enough.
+
+    waypoints: waypoints of the route, (w,) of `flight.guidance.lateral_reference_laws.WAYPOINT`.
+    """
+    if not setup.autopilot.loiters.steers_to_center:
+        return 0.0
+    extra_lengths = dict[int, float]()
+    circles = waypoints[waypoints["loiter_radius"] != 0.0]
+    # Process waypoints of one loiter that agree in these fields only once.
+    first_indices = np.unique(circles[["item", "loiter_radius", "airspeed", "up"]], return_index=True)[1]
+    for waypoint in circles[first_indices]:
+        stated_radius = abs(float(waypoint["loiter_radius"]))
+        speed = float(waypoint["airspeed"])
+        altitude = float(waypoint["up"])
+        flown_radius = max(
+            setup.limits.turn_radius(course, course + math.pi, altitude, speed) for course in (0.0, math.pi)
+        )
+        # Autopilots hold an equivalent airspeed: the true airspeed is higher in thinner air.
+        flown_radius *= eas_to_tas_ratio(altitude) ** 2
+        if stated_radius < flown_radius < math.inf and not waypoint["is_rtl"]:
+            extra_length = (
+                2.0 * math.pi * (float(waypoint["loiter_turns"]) * (flown_radius - stated_radius) + flown_radius)
+            )
+            extra_lengths[int(waypoint["item"])] = max(extra_length, extra_lengths.get(int(waypoint["item"]), 0.0))
+    return sum(extra_lengths.values())
+
+
+def _min_ground_speed(setup: FlightSetup, airspeeds: Floats) -> float:
+    """Return the lowest ground speed on any leg in the mean wind, m/s; a default if no leg can be flown.
+
+    airspeeds: airspeed on each leg, m/s.
+    """
+    limits: Limits = setup.limits
+    points, courses = setup.route.positions, leg_courses(setup.route.positions)
+    tables = {airspeed: limits.performance(airspeed) for airspeed in set(airspeeds.tolist())}
+    speeds = []
+    for leg, airspeed in enumerate(airspeeds.tolist()):
+        table = tables[airspeed]
+        speeds += [float(ground_speed_on(table, courses[leg], up)) for up in points[leg : leg + 2, 2]]
+    return float(np.nanmin(speeds)) if np.isfinite(speeds).any() else MIN_GROUND_SPEED_MPS
+
+
+def _max_wind_deviation(setup: FlightSetup, length: float) -> float:
+    """Return the largest deviation of a forecast's wind from the mean wind around a flight, m/s.
+
+    length: length of the flight, m.
+
+    Without a forecast the result is 0.
+    """
+    field = setup.scenario.wind.field
+    if field is None:
+        return 0.0
+    longest_time = TIME_LIMIT_FACTOR * length / MIN_GROUND_SPEED_MPS + TIME_LIMIT_BASE_S
+    flight_field = without_levels_above(field.between(0.0, longest_time), float(setup.route.positions[:, 2].max()))
+    return float(np.linalg.norm(flight_field.velocities, axis=-1).max())
+
+
+def _find_wind(setup: FlightSetup, position: Sequence[float], convergence: float) -> tuple[float, float, float]:
+    """Return the mean wind at a position at the start of the flight: true north, east and down, m/s.
+
+    position: east, north, up, m.
+    convergence: grid convergence, the map course of true north, rad.
+    """
+    east, north = setup.scenario.wind_velocity(position)
+    # The wind of a forecast is along true north, and a stated wind along the map's north.
+    angle = convergence if setup.scenario.wind.field is None else 0.0
+    return *_to_true_north(east, north, angle), 0.0
+
+
+# ----------------------------------------------------------------------
+# Start from the ground.
+
+
+@dataclass(frozen=True, slots=True)
+class Release:
+    """State of the aircraft at its release.
+
+    position: latitude and longitude, deg, and altitude, m AMSL.
+    attitude: roll, pitch, yaw (true), rad.
+    velocity: velocity of the aircraft over the ground, north, east and down, m/s.
+    wind: velocity of the air, north, east and down, m/s.
+    ground: altitude of the ground, m AMSL.
     """
 
-    rows: Rows
-    end_reason: str
-    distance: float
+    position: tuple[float, float, float]
+    attitude: tuple[float, float, float]
+    velocity: tuple[float, float, float]
+    wind: tuple[float, float, float]
+    ground: float
 
 
-def simulate(flight: RunningFlight, block_duration: float = BLOCK_DURATION_S) -> Iterator[FlightBlock]:
-    """Fly until the flight ends, and yield its track rows in blocks.
+def default_gear(ground_phases: GroundPhases) -> Gear:
+    """Return the kind of gear for ground contacts that an aircraft lacks: wheels for a runway, otherwise a belly."""
+    return (
+        "wheels" if ground_phases.take_off is not None and ground_phases.take_off.launch.method == "runway" else "belly"
+    )
 
-    block_duration: duration of a block, s.
 
-    >>> import numpy as np
-    >>> from types import SimpleNamespace
-    >>> from flight.simulation.track import TRACK_ROW
-    >>> blocks = iter([(np.zeros(60, TRACK_ROW), ""), (np.zeros(12, TRACK_ROW), "ground contact")])
-    >>> memory, path = SimpleNamespace(distance=0.0), SimpleNamespace(length=9.0)
-    >>> flight = SimpleNamespace(dt=1 / 60, guidance_memory=memory, path=path, fly_block=lambda count: next(blocks))
-    >>> [(len(block.rows), block.end_reason) for block in simulate(flight)]
-    [(60, ''), (12, 'ground contact')]
+def find_release(
+    setup: FlightSetup, local_map: LocalMap, ground: Ground, aircraft: Aircraft, take_off: TakeOff
+) -> Release:
+    """Return the state of the aircraft at the end of its launch, or at rest on a runway.
+
+    local_map, ground: local map and terrain of the flight.
+    take_off: the take-off that is simulated.
     """
-    end_reason = ""
-    while not end_reason:
-        rows, end_reason = flight.fly_block(round(block_duration / flight.dt))
-        yield FlightBlock(rows, end_reason, min(float(flight.guidance_memory.distance), flight.path.length))
+    launch = take_off.launch
+    position, velocity = take_off.release()
+    if launch.method == "runway":
+        stand_heights = [contact.down for contact in find_contacts(aircraft, "wheels") if contact.is_support]
+        position[2] += max(stand_heights, default=0.0)
+    lat, lon = (float(value) for value in to_geo(setup.scenario.origin, position[0], position[1]))
+    convergence = local_map.convergence(lat, lon)
+    ground_altitude = ground.height(float(position[0]), float(position[1]))
+    return Release(
+        position=(lat, lon, float(position[2])),
+        attitude=(0.0, launch.incline, take_off.course - convergence),
+        velocity=(*_to_true_north(float(velocity[0]), float(velocity[1]), convergence), -float(velocity[2])),
+        wind=_find_wind(setup, position.tolist(), convergence),
+        ground=float(take_off.home[2]) if math.isnan(ground_altitude) else ground_altitude,
+    )
 
 
-def fly_to_end(flight: RunningFlight) -> SimulatedFlight:
-    """Fly until the flight ends. The same setup always gives the same track, bit for bit.
+def _to_true_north(east: float, north: float, convergence: float) -> tuple[float, float]:
+    """Return the true north and east components of a map vector.
 
-    Raises FlightError if a program does not fly to the end.
-
-    >>> import numpy as np
-    >>> from aircraft.catalog import load_aircraft
-    >>> from flight.dynamics.envelope_tables import load_envelope
-    >>> from flight.mission.items import Mission
-    >>> from flight.mission.route import Route, route_points
-    >>> from flight.simulation.setup import make_limits
-    >>> from world.scenario import load_scenario
-    >>> scenario, aerosonde = load_scenario("tight"), load_aircraft("aerosonde")
-    >>> waypoints = scenario.start + np.array([[0.0, 0.0, 0.0], [300.0, 0.0, 0.0]])
-    >>> route = Route(route_points(waypoints, 25.0), "")
-    >>> limits = make_limits(scenario, load_envelope(aerosonde), 25.0, 0.5)
-    >>> setup = FlightSetup(scenario, Mission(None, ()), route, limits, "aerosonde", 888.0, 1)
-    >>> flown = fly_to_end(Flight(setup, aerosonde))
-    >>> flown.ended, round(float(flown.track.time[-1])), bool(abs(flown.track.cross_track).max() < 0.1)
-    ('completed', 12, True)
+    convergence: grid convergence, the map course of true north, rad.
     """
-    builder, end_reason = TrackBuilder(), ""
-    for block in simulate(flight, LONG_BLOCK_DURATION_S):
-        builder.add(block.rows)
-        end_reason = block.end_reason
-    return SimulatedFlight(builder.track(), end_reason, flight.path)
+    cos, sin = math.cos(convergence), math.sin(convergence)
+    return north * cos + east * sin, east * cos - north * sin
 
 
-class TrackBuilder:
-    """Build the track of a flight while it is flown, in half the memory of the flown rows.
+def release(
+    fdm: Fdm, release_state: Release, commands: tuple[float, float, float, float]
+) -> tuple[float, float, float, float]:
+    """Put the aircraft into the state at the end of its launch, with control commands; return these commands.
 
-    >>> import numpy as np
-    >>> from flight.simulation.track import TRACK_ROW
-    >>> builder = TrackBuilder()
-    >>> for _ in range(2):
-    ...     builder.add(np.zeros(60, TRACK_ROW))
-    >>> len(builder.track())
-    120
+    commands: elevator, aileron, rudder (rad) and throttle (0..1).
     """
+    fdm.release(
+        release_state.position,
+        release_state.attitude,
+        release_state.velocity,
+        wind=release_state.wind,
+        terrain_amsl=release_state.ground,
+        commands=commands,
+    )
+    # Mean wind is set as part of the gust.
+    fdm.set_wind(0.0, 0.0, 0.0)
+    fdm.set_gust(*release_state.wind)
+    return commands
 
-    def __init__(self) -> None:
-        no_rows = as_track(join_rows([]))
-        self._columns = {name: getattr(no_rows, name).copy() for name in COLUMNS}
-        self._row_count = 0
 
-    def add(self, rows: Rows) -> None:
-        """Append rows, copied into arrays of the track's types."""
-        start, self._row_count = self._row_count, self._row_count + len(rows)
-        if self._row_count > len(self._columns["time"]):
-            self._set_capacity(max(self._row_count + _MIN_ADDED_ROWS, int(1.5 * self._row_count)))
-        for name, column in self._columns.items():
-            column[start : self._row_count] = rows[name]
-
-    def track(self) -> Track:
-        """Return the track of all rows; no rows can be added afterwards."""
-        self._set_capacity(self._row_count)
-        for column in self._columns.values():
-            column.setflags(write=False)
-        return Track(**self._columns)
-
-    def _set_capacity(self, row_count: int) -> None:
-        """Resize all columns to a number of rows."""
-        for column in self._columns.values():
-            # Resize the array in place: a copy of a long flight takes as much memory again.
-            column.resize((row_count, *column.shape[1:]), refcheck=False)
-
+# ----------------------------------------------------------------------
+# The flight by a simulated autopilot.
 
 # Fields of `flight.guidance.inner_loops.GUIDANCE_MEMORY` that describe the flown path and not the aircraft.
 _PATH_MEMORY_FIELDS = (
@@ -279,7 +585,7 @@ _DIVERSION_RECORDS = ("state", "true", "estimated", "commands", "air", "place", 
 
 
 class Flight(RunningFlight):
-    """A flight by a simulated autopilot: as fast as possible by `simulate`, or live in real time."""
+    """A flight by a simulated autopilot: as fast as possible, or live in real time."""
 
     _law: ControlLaw
 
@@ -312,10 +618,23 @@ class Flight(RunningFlight):
         super().__init__(setup, aircraft, gains, variation, local_map, start_offset, gear)
         if self._ground_phases:
             self.max_ticks += int(GROUND_TIME_ALLOWANCE_S / self.dt)
-        # Guidance knows the model, but not the differences of the aircraft from it.
+        start = self._find_start(setup)
+        if setup.autopilot.speeds.equivalent:
+            true_airspeed = start.airspeed * setup.autopilot.speeds.true_airspeed_factor(start.amsl)
+            start = replace(start, slope=0.0, airspeed=min(aircraft.airspeed_max, true_airspeed))
+        # Guidance knows the trim of the model, but not the differences of the aircraft from it.
         model = Fdm(aircraft, rate_hz=setup.fdm_hz, motor_braking=setup.scenario.flight.motor_braking)
-        self._trim_at_start(setup, model, gains.reference_airspeed)
-        self.guidance_memory.max_bank = setup.limits.max_bank + BANK_RESERVE_RAD
+        level_trim = steady_flight(model, gains.reference_airspeed, start.amsl)
+        if level_trim is None:
+            reason = f"no level flight at {gains.reference_airspeed:.1f} m/s and {start.amsl:.0f} m AMSL"
+            raise StartError(setup.aircraft, reason, field="airspeed", value=gains.reference_airspeed)
+        self._start_fdm = partial(self._start_motion, setup, start, level_trim.elevator)
+        self._start_fdm()
+        memory = self.guidance_memory
+        memory.trim_elevator, memory.trim_alpha = level_trim.elevator, level_trim.alpha
+        memory.trim_throttle = (steady_flight(model, start.airspeed, start.amsl) or level_trim).throttle
+        memory.last_airspeed, memory.stall_speed = -1.0, aircraft.stall_speed
+        memory.max_bank = setup.limits.max_bank + BANK_RESERVE_RAD
         self._law.initialise(self.guidance_memory, self._workspace.law_record)
         self._start_disturbances(setup)
         self._compiled, self.engine = self._choose_engine(setup)
@@ -342,27 +661,6 @@ class Flight(RunningFlight):
         self._law.initialise(self.guidance_memory, self._workspace.law_record)
         self._law.transfer_state(old_law_record, self._workspace.law_record, setup.route.positions[0])
         self._fly_ticks = self._make_loop()
-
-    def _trim_at_start(self, setup: FlightSetup, model: Fdm, reference_airspeed: float) -> None:
-        """Trim the aircraft at the start of the route, and store the trim of the model in the guidance memory.
-
-        reference_airspeed: airspeed for which the gains apply, m/s.
-        """
-        start = self._find_start(setup)
-        if setup.autopilot.speeds.equivalent:
-            true_airspeed = start.airspeed * setup.autopilot.speeds.true_airspeed_factor(start.amsl)
-            start = replace(start, slope=0.0, airspeed=min(self.fdm.aircraft.airspeed_max, true_airspeed))
-        level_trim = steady_flight(model, reference_airspeed, start.amsl)
-        if level_trim is None:
-            reason = f"no level flight at {reference_airspeed:.1f} m/s and {start.amsl:.0f} m AMSL"
-            raise StartError(setup.aircraft, reason, field="airspeed", value=reference_airspeed)
-        self._start_fdm = partial(self._start_motion, setup, start, level_trim.elevator)
-        self._start_fdm()
-        memory = self.guidance_memory
-        memory.trim_elevator, memory.trim_alpha = level_trim.elevator, level_trim.alpha
-        memory.trim_throttle = (steady_flight(model, start.airspeed, start.amsl) or level_trim).throttle
-        memory.last_airspeed = -1.0
-        memory.stall_speed = self.fdm.aircraft.stall_speed
 
     def _start_motion(self, setup: FlightSetup, start: Start, elevator: float) -> None:
         """Start the aircraft trimmed in the air, and then release it from its launcher if it takes off.
@@ -422,3 +720,45 @@ class Flight(RunningFlight):
 
 def _discard(_value: float) -> None:
     """Do nothing; stands for the setter of an output that the flight does not use."""
+
+
+@dataclass(frozen=True, slots=True)
+class SimulatedFlight:
+    """A flight that has ended.
+
+    track: flown track.
+    ended: "completed", or the reason why the flight ended earlier.
+    path: reference path.
+    """
+
+    track: Track
+    ended: str
+    path: FlyByPath
+
+
+def fly_to_end(flight: RunningFlight) -> SimulatedFlight:
+    """Fly until the flight ends. The same setup always gives the same track, bit for bit.
+
+    Raises FlightError if a program does not fly to the end.
+
+    >>> import numpy as np
+    >>> from aircraft.catalog import load_aircraft
+    >>> from flight.dynamics.envelope_tables import load_envelope
+    >>> from flight.mission.items import Mission
+    >>> from flight.mission.route import Route, route_points
+    >>> from flight.simulation.setup import make_limits
+    >>> from world.scenario import load_scenario
+    >>> scenario, aerosonde = load_scenario("tight"), load_aircraft("aerosonde")
+    >>> waypoints = scenario.start + np.array([[0.0, 0.0, 0.0], [300.0, 0.0, 0.0]])
+    >>> route = Route(route_points(waypoints, 25.0), "")
+    >>> limits = make_limits(scenario, load_envelope(aerosonde), 25.0, 0.5)
+    >>> setup = FlightSetup(scenario, Mission(None, ()), route, limits, "aerosonde", 888.0, 1)
+    >>> flown = fly_to_end(Flight(setup, aerosonde))
+    >>> flown.ended, round(float(flown.track.time[-1])), bool(abs(flown.track.cross_track).max() < 0.1)
+    ('completed', 12, True)
+    """
+    builder, end_reason = TrackBuilder(), ""
+    while not end_reason:
+        rows, end_reason = flight.fly_block(round(LONG_BLOCK_DURATION_S / flight.dt))
+        builder.add(rows)
+    return SimulatedFlight(builder.track(), end_reason, flight.path)

@@ -430,3 +430,45 @@ def saturated_rows(track: Track, control: int, min_command: float, max_command: 
     command = track.commands[:, control].astype(np.float64)
     tolerance = _LIMIT_TOLERANCE_FRACTION * (max_command - min_command)
     return np.asarray((command <= min_command + tolerance) | (command >= max_command - tolerance))
+
+
+# Smallest number of rows by which a track under construction is enlarged.
+_MIN_ADDED_ROWS = 6_000
+
+
+class TrackBuilder:
+    """Build the track of a flight while it is flown, in half the memory of the flown rows.
+
+    >>> import numpy as np
+    >>> builder = TrackBuilder()
+    >>> for _ in range(2):
+    ...     builder.add(np.zeros(60, TRACK_ROW))
+    >>> len(builder.track())
+    120
+    """
+
+    def __init__(self) -> None:
+        no_rows = as_track(join_rows([]))
+        self._columns = {name: getattr(no_rows, name).copy() for name in COLUMNS}
+        self._row_count = 0
+
+    def add(self, rows: Rows) -> None:
+        """Append rows, copied into arrays of the track's types."""
+        start, self._row_count = self._row_count, self._row_count + len(rows)
+        if self._row_count > len(self._columns["time"]):
+            self._set_capacity(max(self._row_count + _MIN_ADDED_ROWS, int(1.5 * self._row_count)))
+        for name, column in self._columns.items():
+            column[start : self._row_count] = rows[name]
+
+    def track(self) -> Track:
+        """Return the track of all rows; no rows can be added afterwards."""
+        self._set_capacity(self._row_count)
+        for column in self._columns.values():
+            column.setflags(write=False)
+        return Track(**self._columns)
+
+    def _set_capacity(self, row_count: int) -> None:
+        """Resize all columns to a number of rows."""
+        for column in self._columns.values():
+            # Resize the array in place: a copy of a long flight takes as much memory again.
+            column.resize((row_count, *column.shape[1:]), refcheck=False)

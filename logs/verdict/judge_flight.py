@@ -19,8 +19,8 @@ from logs.verdict.places import AirframeAnswer, Disagreement, LevelAnswer, Refer
 from logs.verdict.rule_words import FRONT_OVERLAP, GROUND_RULES, SIDE_OVERLAP
 from logs.verdict.rules.registry import (
     blocking_item_findings,
-    flown_findings,
     geometric_findings,
+    run_rules,
     with_passing_suggestions,
     with_suggestions,
 )
@@ -67,7 +67,7 @@ def judge_flight(
     if not len(track):
         return judge_unflown(whole_requirements, end_reason, log_complete=log_complete)
     air_requirements, aligned = flown_phases(whole_requirements, track)
-    findings = flown_findings(air_requirements, aligned, end_reason, log_complete)
+    findings = run_rules(air_requirements, aligned, end_reason=end_reason, log_complete=log_complete)
     complete = all(finding.ok is True for finding in findings if finding.rule == "completion")
     unjudged = undecided_text(findings)
     flyable = complete and not unjudged and not any(finding.ok is False for finding in findings)

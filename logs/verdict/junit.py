@@ -1,12 +1,12 @@
 """Write answers as JUnit XML for continuous integration; a verdict has a case for its answer and for each finding."""
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Literal, NamedTuple
 from xml.etree import ElementTree
 
 from logs.verdict.findings import Finding
-from logs.verdict.presentation import Presentation, finding_words
+from logs.verdict.presentation import finding_words
 
 
 class JunitCase(NamedTuple):
@@ -78,27 +78,17 @@ def _case_element(case: JunitCase, suite_name: str) -> ElementTree.Element:
     return element
 
 
-def junit_text(verdicts: Mapping[str, Presentation]) -> str:
-    """Return the text of a JUnit file with a test suite for each verdict.
+def verdict_suite(name: str, lines: Sequence[str], findings: tuple[Finding, ...], *, passes: bool) -> JunitSuite:
+    """Return the test suite of a verdict.
 
-    verdicts: verdicts by name of the judged plan or flight.
+    name: name of the judged plan or flight.
+    lines: lines of the summary, the headline first.
 
     A failed finding becomes a failure, and an unjudged finding a skipped test case.  The test case ``verdict`` fails
     unless the answer is "flyable", even if no finding failed and a part was just not judged.
-
-    `logs.verdict.verdict.Verdict.to_junit` writes one verdict.
     """
-    return suites_text(
-        JunitSuite(
-            name,
-            [
-                answer_case("" if verdict.state == "ok" else verdict.headline),
-                *_finding_cases(verdict.findings),
-            ],
-            "\n".join([verdict.headline, *verdict.details]),
-        )
-        for name, verdict in verdicts.items()
-    )
+    cases = [answer_case("" if passes else "".join(lines[:1])), *_finding_cases(findings)]
+    return JunitSuite(name, cases, "\n".join(lines))
 
 
 def junit_error_text(name: str, message: str) -> str:

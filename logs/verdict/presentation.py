@@ -1,16 +1,15 @@
-"""Define a verdict as it is shown: its state, its answer, and its findings in their order, with their texts.
+"""Define how findings are shown: their signs and words, and their order by rule.
 
-Every output reads a `Presentation`, which `logs.verdict.verdict.Verdict.present` makes, and only lays it out: terminal,
-report page, notebook, studio, JUnit and ground stations.
+Every output reads them here and in `logs.verdict.verdict.Verdict`, and only lays them out: terminal, report page,
+notebook, studio, JUnit and ground stations.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from logs.verdict.findings import Finding, State, closest_to_limit, undecided_findings, worst_first_key
-from logs.verdict.places import DecidingParameter
 from logs.verdict.rule_words import FRONT_OVERLAP, RULE_WORDS, SIDE_OVERLAP, Margin, RuleWords
-from logs.verdict.wording import noun_with_place, quantity_text, text_after
+from logs.verdict.wording import noun_with_place, quantity_text
 
 # Signs of states, for readers who see no color.
 STATE_SIGNS: dict[State, str] = {"ok": "✓", "fail": "✗", "open": "?", "unjudged": "–"}
@@ -121,117 +120,6 @@ class RuleFindings:
         judged_text = f"{failed_count} of {self.judged} fail" if failed_count else f"{self.judged} ok"
         parts = [judged_text if self.judged else "", f"{unjudged_count} not judged" if unjudged_count else ""]
         return ", ".join(filter(None, parts))
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Presentation:
-    """Verdict as it is shown to readers.
-
-    headline: the answer and its reasons in one line.
-    details: the other lines of the summary.
-    state: "ok", "open" (nothing failed, and a part was not judged) or "fail".
-    answer, level, complete, unjudged, deciding: as in `logs.verdict.verdict.Verdict`.
-    findings: all findings, in the verdict's order.
-    rules: the findings by rule, in the order of `RULE_WORDS`.
-    zones: number of airspace zones that apply to the verdict.
-    """
-
-    headline: str
-    details: tuple[str, ...]
-    state: State
-    answer: str
-    level: str
-    complete: bool
-    unjudged: str
-    deciding: DecidingParameter | None
-    findings: tuple[Finding, ...]
-    rules: tuple[RuleFindings, ...]
-    zones: int
-
-    @property
-    def failed(self) -> tuple[Finding, ...]:
-        """Failed findings, in the verdict's order."""
-        return tuple(finding for finding in self.findings if finding.state == "fail")
-
-    @property
-    def is_only_incomplete(self) -> bool:
-        """True if nothing failed but the completion of the flight."""
-        is_flight = self.state == "fail" and self.level != "plan" and not self.complete
-        return is_flight and all(finding.rule == "completion" for finding in self.failed)
-
-    @property
-    def title(self) -> str:
-        """Answer as a title, with the level or the incompleteness of the flight."""
-        answer = self.answer.capitalize()
-        if self.state == "ok":
-            return answer + ("" if self.level == "flown" else " on paper, not flown")
-        if self.level == "plan":
-            return f"{answer}: no feasible plan"
-        if self.is_only_incomplete:
-            return f"Incomplete, so {self.answer}"
-        return answer + ("" if self.complete or self.state == "open" else ", and incomplete")
-
-    @property
-    def sign(self) -> str:
-        """Sign of the state, or "!" if nothing failed but the completion of the flight."""
-        return "!" if self.is_only_incomplete else STATE_SIGNS[self.state]
-
-    @property
-    def reasons(self) -> str:
-        """Headline without the title or the answer at its beginning."""
-        return text_after(self.headline, (self.title, self.answer))
-
-    @property
-    def failed_rules(self) -> tuple[RuleFindings, ...]:
-        """The rules with failed findings, the most urgent first, as in the headline."""
-        failed = [rule for rule in self.rules if rule.failed]
-        return tuple(sorted(failed, key=lambda rule: -rule.words.urgency))
-
-    @property
-    def undecided(self) -> tuple[Finding, ...]:
-        """The findings that leave the verdict undecided."""
-        return undecided_findings(self.findings)
-
-    def remedy_text(self, finding: Finding) -> str:
-        """Return alternative changes of the plan, as text, that would make a failed finding pass.
-
-        The deciding parameter is named at the finding that it decides.  Return "" if no change is known.
-        """
-        if finding.state != "fail":
-            return ""
-        parts, deciding = [finding.suggestion] if finding.suggestions else [], self.deciding
-        if deciding is not None and (deciding.rule, deciding.place) == (finding.rule, finding.place):
-            unit = f"\u00a0{deciding.unit}" if deciding.unit else ""
-            values_text = f"{deciding.name} {deciding.passing:g}{unit} instead of {deciding.current:g}"
-            parts.append(f"the plan as it is, with {values_text}")
-        return "; ".join(parts)
-
-    @property
-    def first_remedied(self) -> Finding | None:
-        """First failed finding with a remedy; a finding on ground contact comes before all others.
-
-        None if no failed finding has a remedy.
-        """
-        worst_findings = [rule.failed[0] for rule in self.failed_rules]
-        # A ground contact comes first, because it ended the flight.  The sort keeps the order of the others.
-        worst_findings.sort(
-            key=lambda finding: finding.rule != "clearance" or finding.flown is None or finding.flown > 0.0
-        )
-        return next((finding for finding in worst_findings if self.remedy_text(finding)), None)
-
-    def findings_to_list(self, max_failed_and_undecided: int) -> list[tuple[int, Finding]]:
-        """Return the findings to show in a short list, each with its index in `findings`.
-
-        These are failed and undecided findings, then for each rule the passed finding closest to its limit.
-
-        max_failed_and_undecided: maximum number of failed and undecided findings.
-        """
-        undecided = {id(finding) for finding in self.undecided}
-        closest = {id(rule.closest) for rule in self.rules}
-        numbered = list(enumerate(self.findings))
-        listed_findings = [(k, finding) for k, finding in numbered if finding.ok is False or id(finding) in undecided]
-        closest_findings = [(k, finding) for k, finding in numbered if finding.ok is True and id(finding) in closest]
-        return [*listed_findings[:max_failed_and_undecided], *closest_findings]
 
 
 def findings_by_rule(findings: Sequence[Finding]) -> tuple[RuleFindings, ...]:

@@ -15,9 +15,10 @@ from logs.verdict.document import (
     parameters_document,
 )
 from logs.verdict.findings import APART_FROM_FLIGHT, Finding, State, closest_to_limit, undecided_findings
-from logs.verdict.junit import junit_text
+from logs.verdict.junit import JunitSuite, suites_text, verdict_suite
 from logs.verdict.places import DecidingParameter, LevelAnswer
-from logs.verdict.presentation import Presentation, findings_by_rule
+from logs.verdict.presentation import STATE_SIGNS, RuleFindings, findings_by_rule
+from logs.verdict.wording import text_after
 from world.extras import require_extra
 from world.html_table import html_table
 from world.wording import count_text
@@ -191,42 +192,118 @@ class Verdict:
             findings=tuple(map(finding_document, self.findings)),
         )
 
-    def present(self) -> Presentation:
-        """Return the verdict arranged for display: findings grouped by rule."""
-        headline, *details = self.lines or ("",)
-        return Presentation(
-            headline=headline,
-            details=tuple(details),
-            state=self.state,
-            answer=self.answer,
-            level=self.level,
-            complete=self.complete,
-            unjudged=self.unjudged,
-            deciding=self.deciding,
-            findings=self.findings,
-            rules=findings_by_rule(self.findings),
-            zones=0 if self.conditions is None else self.conditions.zones,
+    @property
+    def details(self) -> tuple[str, ...]:
+        """Lines of the summary without the headline."""
+        return self.lines[1:]
+
+    @property
+    def rules(self) -> tuple[RuleFindings, ...]:
+        """Findings by rule, in the order of `logs.verdict.rule_words.RULE_WORDS`."""
+        return findings_by_rule(self.findings)
+
+    @property
+    def is_only_incomplete(self) -> bool:
+        """True if nothing failed but the completion of the flight."""
+        is_flight = self.state == "fail" and self.level != "plan" and not self.complete
+        return is_flight and all(finding.rule == "completion" for finding in self.failed)
+
+    @property
+    def title(self) -> str:
+        """Answer as a title, with the level or the incompleteness of the flight."""
+        answer = self.answer.capitalize()
+        if self.state == "ok":
+            return answer + ("" if self.level == "flown" else " on paper, not flown")
+        if self.level == "plan":
+            return f"{answer}: no feasible plan"
+        if self.is_only_incomplete:
+            return f"Incomplete, so {self.answer}"
+        return answer + ("" if self.complete or self.state == "open" else ", and incomplete")
+
+    @property
+    def sign(self) -> str:
+        """Sign of the state, or "!" if nothing failed but the completion of the flight."""
+        return "!" if self.is_only_incomplete else STATE_SIGNS[self.state]
+
+    @property
+    def reasons(self) -> str:
+        """Headline without the title or the answer at its beginning."""
+        return text_after(self.headline, (self.title, self.answer))
+
+    @property
+    def failed_rules(self) -> tuple[RuleFindings, ...]:
+        """The rules with failed findings, the most urgent first, as in the headline."""
+        failed = [rule for rule in self.rules if rule.failed]
+        return tuple(sorted(failed, key=lambda rule: -rule.words.urgency))
+
+    @property
+    def undecided_findings(self) -> tuple[Finding, ...]:
+        """The findings that leave the verdict undecided."""
+        return undecided_findings(self.findings)
+
+    def remedy_text(self, finding: Finding) -> str:
+        """Return alternative changes of the plan, as text, that would make a failed finding pass.
+
+        The deciding parameter is named at the finding that it decides.  Return "" if no change is known.
+        """
+        if finding.state != "fail":
+            return ""
+        parts, deciding = [finding.suggestion] if finding.suggestions else [], self.deciding
+        if deciding is not None and (deciding.rule, deciding.place) == (finding.rule, finding.place):
+            unit = f"\u00a0{deciding.unit}" if deciding.unit else ""
+            values_text = f"{deciding.name} {deciding.passing:g}{unit} instead of {deciding.current:g}"
+            parts.append(f"the plan as it is, with {values_text}")
+        return "; ".join(parts)
+
+    @property
+    def first_remedied(self) -> Finding | None:
+        """First failed finding with a remedy; a finding on ground contact comes before all others.
+
+        None if no failed finding has a remedy.
+        """
+        worst_findings = [rule.failed[0] for rule in self.failed_rules]
+        # A ground contact comes first, because it ended the flight.  The sort keeps the order of the others.
+        worst_findings.sort(
+            key=lambda finding: finding.rule != "clearance" or finding.flown is None or finding.flown > 0.0
         )
+        return next((finding for finding in worst_findings if self.remedy_text(finding)), None)
+
+    def findings_to_list(self, max_failed_and_undecided: int) -> list[tuple[int, Finding]]:
+        """Return the findings to show in a short list, each with its index in `findings`.
+
+        These are failed and undecided findings, then for each rule the passed finding closest to its limit.
+
+        max_failed_and_undecided: maximum number of failed and undecided findings.
+        """
+        undecided = {id(finding) for finding in self.undecided_findings}
+        closest = {id(rule.closest) for rule in self.rules}
+        numbered = list(enumerate(self.findings))
+        listed_findings = [(k, finding) for k, finding in numbered if finding.ok is False or id(finding) in undecided]
+        closest_findings = [(k, finding) for k, finding in numbered if finding.ok is True and id(finding) in closest]
+        return [*listed_findings[:max_failed_and_undecided], *closest_findings]
+
+    def junit_suite(self, name: str) -> JunitSuite:
+        """Return the verdict as a JUnit suite.  name: name of the judged plan or flight."""
+        return verdict_suite(name, self.lines, self.findings, passes=self.flyable)
 
     def to_junit(self, name: str) -> str:
         """Return the verdict as JUnit XML for continuous integration.
 
         name: name of the judged plan or flight.
         """
-        return junit_text({name: self.present()})
+        return suites_text([self.junit_suite(name)])
 
     def _repr_html_(self) -> str:
         """Return the verdict as a table for a notebook, with a row for each rule and for each failed finding."""
-        shown = self.present()
         rows: list[tuple[str, ...]] = []
-        for rule in shown.rules:
+        for rule in self.rules:
             rows.append((rule.words.title, rule.count_text, "", ""))
             rows += [
                 ("", finding.where, finding.reason, finding.suggestion)
                 for finding in rule.findings
                 if finding.state == "fail"
             ]
-        return html_table(shown.headline, rows, ("rule", "result", "reason", "would pass"))
+        return html_table(self.headline, rows, ("rule", "result", "reason", "would pass"))
 
 
 def verdict_json(verdict: Verdict) -> str:

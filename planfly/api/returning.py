@@ -241,7 +241,8 @@ def returns(
     request = _check_request(every, suggest, out, sitl, points, overwrite=overwrite)
     if path is not None and is_imported_log(path):
         check_keywords_not_given(str(path), {"seed": options["seed"], "nav": options["nav"]}, _RETURNS_AS_FLOWN_TEXT)
-        return _judge_imported_flight(_read_imported_flight(path, options), request)
+        imported = _read_imported_flight(path, options)
+        return _judge_flight(imported.setup, imported.track, request, imported.ended)
     check_keywords_not_given(
         str(path or "mission"),
         select_log_options(options),
@@ -252,9 +253,10 @@ def returns(
     if isinstance(what, FlightLog | FlownMission):
         fixed_options: dict[str, Any] = {**flight_options, "terrain": None, "fence": options["fence"] or None}
         check_keywords_not_given(str(path or "flight"), fixed_options, _RETURNS_AS_FLOWN_TEXT)
-        return _judge_flight(
-            _with_terrain(what.setup, options["terrain"]), what.track, request, what.ended or INTERRUPTED
-        )
+        setup, terrain = what.setup, options["terrain"]
+        if terrain is not None:
+            setup = setup.in_scenario(with_terrain(setup.scenario, str(terrain)))
+        return _judge_flight(setup, what.track, request, what.ended or INTERRUPTED)
     return _judge_mission(open_flight(what, flight_options), request)
 
 
@@ -264,11 +266,6 @@ def _read_imported_flight(path: Path, options: LogOptions) -> "ImportedFlight":
     from planfly.api.imported import read_imported
 
     return read_imported(path, **options)
-
-
-def _with_terrain(setup: FlightSetup, terrain: str | Path | None) -> FlightSetup:
-    """Return a setup with another terrain; unchanged if no terrain is named."""
-    return setup if terrain is None else setup.in_scenario(with_terrain(setup.scenario, str(terrain)))
 
 
 class _ReturnsRequest(NamedTuple):
@@ -295,11 +292,6 @@ def _check_request(
     if out is not None:
         check_output_folder(Path(out), overwrite)
     return _ReturnsRequest(every, suggest, None if out is None else Path(out), overwrite, program, points)
-
-
-def _judge_imported_flight(imported: "ImportedFlight", request: _ReturnsRequest) -> ReturnsResult:
-    """Judge the returns of an imported flight."""
-    return _judge_flight(imported.setup, imported.track, request, imported.ended)
 
 
 def _judge_mission(setup: FlightSetup, request: _ReturnsRequest) -> ReturnsResult:

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import planfly
+from planfly.commands.registry import call_api
 from planfly.terminal.arguments import complete_aircraft, file_completer, number_parser, with_completer
 from planfly.terminal.command_parser import CommandParser, LineParser
 from planfly.terminal.exit_codes import FLYABLE
-from planfly.terminal.options import add_result_options, call_api
+from planfly.terminal.options import add_result_options
 from planfly.terminal.output import write_json_if_requested
 from planfly.terminal.results import print_warnings
 from world.errors import PlanflyError
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from aircraft.catalog import Aircraft
     from aircraft.envelope import Envelope
     from flight.dynamics.characteristics import Mode, TrimRow
-    from planfly import AircraftNumbers
+    from planfly import AircraftNumbers, IdentifiedAircraft
 
 # Bank angles of the printed turn radii, degrees.
 _BANKS_DEG = (15.0, 20.0, 30.0, 40.0)
@@ -131,6 +131,8 @@ def _add_data_sheet_options(parser: CommandParser) -> None:
 
 def aircraft(args: argparse.Namespace) -> int:
     """List the built-in aircraft, show the named aircraft, or make a folder for a new aircraft."""
+    from planfly.api import aircraft as aircraft_api
+
     if args.logs is not None:
         return _identify(args)
     for name in ("base", "check", "until"):
@@ -145,14 +147,14 @@ def aircraft(args: argparse.Namespace) -> int:
         allowed = "allowed only with `folder` FOLDER, the folder to make"
         raise PlanflyError.of_argument("source", args.source, allowed, shown="")
     if args.name is None:
-        embedded_aircraft = list(planfly.aircraft().values())
+        embedded_aircraft = list(aircraft_api.aircraft().values())
         for entry in embedded_aircraft:
             size_text = f"{entry.mass:.5g} kg, span {entry.wing_span:.5g} m"
             print(f"{entry.name:<14} {entry.title}: {size_text}, cruises at {entry.airspeed:g} m/s")
         write_json_if_requested(args, lambda: _json_answer(embedded_aircraft))
         return FLYABLE
     out = args.out or "runs/aircraft-{name}"
-    numbers = call_api(planfly.describe_aircraft, args, out=out, overwrite=args.overwrite or args.out is None)
+    numbers = call_api(aircraft_api.describe_aircraft, args, out=out, overwrite=args.overwrite or args.out is None)
     _print_numbers(numbers)
     print_warnings(numbers.lacking)
     for file in numbers.files:
@@ -171,6 +173,8 @@ def _json_answer(entries: "Sequence[Aircraft]", numbers: "AircraftNumbers | None
 
 def _make_folder(args: argparse.Namespace) -> int:
     """Make the folder of a new aircraft, from a data sheet or as a copy of another aircraft."""
+    from planfly.api import aircraft as aircraft_api
+
     if args.name is not None:
         message = f"{args.name}: cannot be combined with --new FOLDER; --from names the aircraft to start from"
         raise PlanflyError(message, field="--new", value=args.folder)
@@ -181,7 +185,7 @@ def _make_folder(args: argparse.Namespace) -> int:
         if is_given:
             raise PlanflyError(f"--new cannot be combined with {field}: {reason}", field=field)
     folder = Path(args.folder)
-    new_aircraft = call_api(planfly.new_aircraft, args)
+    new_aircraft = call_api(aircraft_api.new_aircraft, args)
     files = sorted(file.name for file in new_aircraft.folder.iterdir())
     folder_text = folder if folder.is_absolute() else f"./{folder}"
     has_sheet = any(getattr(args, name) is not None for name in (*_DATA_SHEET_KEYWORDS, "params"))
@@ -215,6 +219,8 @@ def _identify(args: argparse.Namespace) -> int:
 
     Raises PlanflyError for a missing option, and for options that cannot be combined with --identify.
     """
+    from planfly.api import identifying
+
     for name in ("mass", "span", "out"):
         if getattr(args, name) is None:
             reason = "the folder to make" if name == "out" else f"the {name} of the aircraft in these flights"
@@ -234,7 +240,7 @@ def _identify(args: argparse.Namespace) -> int:
     ):
         if is_given:
             raise PlanflyError(f"--identify cannot be combined with {field}: {reason_text}", field=field)
-    result = call_api(planfly.identify_aircraft, args, folder=args.out)
+    result = call_api(identifying.identify_aircraft, args, folder=args.out)
     new_aircraft, estimate = result.aircraft, result.estimate
     files_made = sorted(file.name for file in new_aircraft.folder.iterdir())
     print(f"aircraft  {args.out} ({', '.join(files_made)}), from {estimate.seconds / 60.0:.1f} min of flight")
@@ -256,7 +262,7 @@ def _identify(args: argparse.Namespace) -> int:
     return FLYABLE
 
 
-def _print_predictions(result: "planfly.IdentifiedAircraft", check: str | None) -> None:
+def _print_predictions(result: "IdentifiedAircraft", check: str | None) -> None:
     """Print each model's rms errors 0.5 s ahead, and the whiteness of the identified model's innovations.
 
     check: log that was predicted, or None for the logs of the identification.
@@ -278,7 +284,7 @@ def _print_predictions(result: "planfly.IdentifiedAircraft", check: str | None) 
     )
 
 
-def _print_uncertain_properties(result: "planfly.IdentifiedAircraft") -> None:
+def _print_uncertain_properties(result: "IdentifiedAircraft") -> None:
     """Print the properties that the logs do not determine, and the flights that would determine them."""
     if not result.estimate.dynamics:
         print("  performance only: moments need at least 10 rows of inertial sensors and of outputs per second")

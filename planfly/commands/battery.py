@@ -3,12 +3,12 @@
 import argparse
 from typing import TYPE_CHECKING
 
-import planfly
 from planfly.commands.campaigns import add_flights_options
+from planfly.commands.registry import call_api
 from planfly.terminal.arguments import number_parser
 from planfly.terminal.command_parser import LineParser, colour_text
 from planfly.terminal.exit_codes import FLYABLE, INCOMPLETE, NOT_FLYABLE
-from planfly.terminal.options import add_result_options, call_api
+from planfly.terminal.options import add_result_options
 from planfly.terminal.output import write_json_if_requested
 
 if TYPE_CHECKING:
@@ -54,9 +54,10 @@ def battery(args: argparse.Namespace) -> int:
     The exit code is 0 if the aircraft's battery is enough, 4 if it is too small, and 3 if this is not known.
     """
     from logs.verdict.conditions import flown_lines
+    from planfly.api import campaigns
     from planfly.campaigns.battery_text import answer_line, battery_lines
 
-    result = call_api(planfly.battery, args)
+    result = call_api(campaigns.battery, args)
     ok = result.is_enough
     code = INCOMPLETE if ok is None else FLYABLE if ok else NOT_FLYABLE
     print(f"battery   {colour_text(answer_line(result), 'warning' if ok is None else 'good' if ok else 'bad')}")

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-import planfly
+from planfly.commands.registry import call_api
 from planfly.terminal.arguments import complete_mission_or_scenario, file_completer, number_parser, with_completer
 from planfly.terminal.command_parser import CommandParser, LineParser
 from planfly.terminal.exit_codes import FLYABLE, INCOMPLETE, NOT_FLYABLE
@@ -17,7 +17,6 @@ from planfly.terminal.options import (
     add_result_options,
     add_steering_options,
     add_world_options,
-    call_api,
 )
 from planfly.terminal.output import write_error_if_requested, write_json_if_requested, write_suite_if_requested
 from planfly.workflow.output_paths import RESULTS
@@ -183,11 +182,13 @@ def add_flights_options(parser: CommandParser) -> None:
 
 def campaign(args: argparse.Namespace) -> int:
     """Fly a campaign, resume one, or fly one of its flights again."""
+    from planfly.api import campaigns
+
     folder = _result_folder(args, "campaign")
     if args.refly is not None:
         return _repeat_flight(args, folder)
     with _report_stored_flights(args, folder, "campaign.sqlite") as interruption_code:
-        result = call_api(planfly.campaign, args, out=folder)
+        result = call_api(campaigns.campaign, args, out=folder)
     if interruption_code():
         return interruption_code()
     from planfly.campaigns.summary import campaign_lines, campaign_suite
@@ -203,9 +204,11 @@ def campaign(args: argparse.Namespace) -> int:
 
 def winds(args: argparse.Namespace) -> int:
     """Find the strongest wind from each direction in which a mission succeeds, or resume the search; draw a chart."""
+    from planfly.api import campaigns
+
     folder = _result_folder(args, "winds")
     with _report_stored_flights(args, folder, "winds.sqlite") as interruption_code:
-        result = call_api(planfly.winds, args, out=folder)
+        result = call_api(campaigns.winds, args, out=folder)
     if interruption_code():
         return interruption_code()
     from planfly.campaigns.report import wind_lines, winds_suite
@@ -236,13 +239,14 @@ def _repeat_flight(args: argparse.Namespace, folder: Path) -> int:
     """
     from logs.verdict.rule_words import rule_word
     from logs.verdict.wording import place_text
+    from planfly.api import campaigns
 
     for option, target in (("--json", args.json), ("--junit", args.junit)):
         if target:
             raise PlanflyError(
                 f"{option}: cannot be combined with --refly, which flies a single flight", field=option, value=target
             )
-    flight = call_api(planfly.campaign_flight, args, index=args.refly, out=folder)
+    flight = call_api(campaigns.campaign_flight, args, index=args.refly, out=folder)
     print(f"flight {args.refly}: {flight.row.outcome}, ended: {flight.row.ended} (as in the campaign's table)")
     if flight.row.undecided_text:
         print(f"  Not judged: {flight.row.undecided_text}")

@@ -5,8 +5,8 @@ from collections.abc import Mapping
 from dataclasses import fields
 from typing import TYPE_CHECKING
 
-import planfly
 from planfly.arguments import CHOICES
+from planfly.commands.registry import call_api
 from planfly.terminal.arguments import (
     IMPORTED_LOG_SUFFIXES,
     MISSION_SUFFIXES,
@@ -22,7 +22,6 @@ from planfly.terminal.options import (
     add_imported_log_options,
     add_result_options,
     add_world_options,
-    call_api,
 )
 from planfly.terminal.output import write_json_if_requested, write_junit_if_requested
 from planfly.terminal.results import print_warnings
@@ -85,18 +84,19 @@ def add_check_parser(command_line: LineParser) -> None:
 
 def check(args: argparse.Namespace) -> int:
     """Judge a flight or a mission; return the exit code of the verdict, or 3 for an incomplete log."""
-    from planfly.terminal.verdict_lines import print_verdict
+    from planfly.api import flying
+    from planfly.terminal.verdict_lines import verdict_lines
 
     if args.autopilots is not None:
         return _check_for_each_autopilot(args)
-    result = call_api(planfly.judge, args)
+    result = call_api(flying.judge, args)
     if not result.is_log:
         print_warnings(result.setup.scenario.notes)
     code, returns = INCOMPLETE if result.lossy else verdict_code(result.verdict), result.return_summary
     write_json_if_requested(args, lambda: _verdict_answer(result.verdict, returns, code))
     write_junit_if_requested(args, {args.what: result.verdict})
     print_warnings([result.loss] if result.loss else [])
-    print_verdict(result.verdict, result.setup.notes, result.setup, returns)
+    print(*verdict_lines(result.verdict, result.setup.notes, result.setup, returns), sep="\n")
     return code
 
 
@@ -106,6 +106,7 @@ _SINGLE_AUTOPILOT_OPTIONS = ("params", "guidance", "autopilot", "plan", "flight"
 
 def _check_for_each_autopilot(args: argparse.Namespace) -> int:
     """Fly a mission by each named autopilot, and return the exit code of the worst verdict."""
+    from planfly.api import flying
     from planfly.terminal.verdict_lines import autopilot_lines
 
     for name in _SINGLE_AUTOPILOT_OPTIONS:
@@ -113,7 +114,7 @@ def _check_for_each_autopilot(args: argparse.Namespace) -> int:
             raise ArgumentError.of_argument(
                 name, value, "cannot be combined with --for, which flies with several autopilots"
             )
-    flights = call_api(planfly.fly_by_each, args, mission=args.what)
+    flights = call_api(flying.fly_by_each, args, mission=args.what)
     verdicts = {name: flight.verdict for name, flight in flights.items()}
     code = max(verdict_code(verdict) for verdict in verdicts.values())
     write_json_if_requested(args, lambda: _answer_for_each_autopilot(verdicts, args.what, code))

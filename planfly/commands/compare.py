@@ -5,7 +5,6 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import planfly
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import FLYABLE, INCOMPLETE
 from planfly.terminal.options import add_log_argument, add_result_options
@@ -38,12 +37,15 @@ def compare(args: argparse.Namespace) -> int:
 
     The exit code is 3 if one of the logs is incomplete.
     """
+    from logs.recording.reader import read_log
+    from planfly.api import reporting
+
     if any(_is_campaign(Path(name)) for name in (args.first, args.second)):
         return _compare_campaigns(args)
     from logs.views.report.compare import difference_lines
 
-    logs = [planfly.read_log(Path(file)) for file in (args.first, args.second)]
-    comparison = planfly.compare(logs[0], logs[1], args.out, svg=args.svg, overwrite=args.overwrite)
+    logs = [read_log(Path(file)) for file in (args.first, args.second)]
+    comparison = reporting.compare(logs[0], logs[1], args.out, svg=args.svg, overwrite=args.overwrite)
     target_files = [] if args.out is None else [Path(args.out) / name for name in COMPARE_FILES]
     files = [file for file in target_files if file.exists()]
     print("\n".join(difference_lines(comparison)))
@@ -66,12 +68,14 @@ def _is_campaign(path: Path) -> bool:
 
 def _compare_campaigns(args: argparse.Namespace) -> int:
     """Print the comparison of two campaigns."""
+    from planfly.api import campaigns
+
     for option, value in (("--out", args.out), ("--svg", args.svg)):
         if value:
             raise PlanflyError(
                 f"{option}: allowed only with two flight logs, not with campaigns", field=option, value=value
             )
-    comparison = planfly.compare_campaigns(args.first, args.second)
+    comparison = campaigns.compare_campaigns(args.first, args.second)
     from planfly.campaigns.compare_campaigns import comparison_lines
 
     print("\n".join(comparison_lines(comparison)))

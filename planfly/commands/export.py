@@ -2,7 +2,6 @@
 
 import argparse
 
-import planfly
 from planfly.arguments import CHOICES
 from planfly.terminal.arguments import (
     MISSION_SUFFIXES,
@@ -71,9 +70,11 @@ def add_export_parser(command_line: LineParser) -> None:
 
 def export(args: argparse.Namespace) -> int:
     """Read the source, then write every target; return 3 for an incomplete log."""
+    from planfly.api import exporting
+
     names = ("fence", "at", "scenario", "autopilot", "params", "aircraft", "overwrite")
     options = {name: getattr(args, name) for name in names}
-    result = planfly.export(args.source, *args.files, **options)
+    result = exporting.export(args.source, *args.files, **options)
     print_warnings(result.notes)
     for file, content in zip(result.files, result.contents, strict=True):
         print(f"{_content_kind(file.suffix.lower()):<9} {file} ({content})")

@@ -4,7 +4,7 @@ import argparse
 import shlex
 from typing import TYPE_CHECKING
 
-import planfly
+from planfly.commands.registry import call_api
 from planfly.terminal.arguments import MISSION_SUFFIXES, file_completer, number_parser, with_completer
 from planfly.terminal.command_parser import LineParser, colour_text
 from planfly.terminal.exit_codes import verdict_code
@@ -13,7 +13,6 @@ from planfly.terminal.options import (
     add_log_rate_option,
     add_result_options,
     add_world_options,
-    call_api,
 )
 from planfly.terminal.output import write_json_if_requested, write_junit_if_requested
 from planfly.terminal.results import print_engine, print_warnings
@@ -51,13 +50,14 @@ def add_fly_parser(command_line: LineParser) -> None:
 
 def fly(args: argparse.Namespace) -> int:
     """Fly a mission, write its log, and return the exit code of the verdict."""
-    from planfly.terminal.verdict_lines import print_verdict
+    from planfly.api import flying
+    from planfly.terminal.verdict_lines import verdict_lines
 
     is_log_named = args.log is not None
     log = args.log if is_log_named else FLY_LOG
-    flight = call_api(planfly.fly, args, log=log, overwrite=args.overwrite or not is_log_named)
+    flight = call_api(flying.fly, args, log=log, overwrite=args.overwrite or not is_log_named)
     print_warnings(flight.setup.scenario.notes)
-    print_verdict(flight.verdict, flight.setup.notes, flight.setup, flight.return_summary)
+    print(*verdict_lines(flight.verdict, flight.setup.notes, flight.setup, flight.return_summary), sep="\n")
     if flight.log is None:
         print("log       none: nothing was flown")
     else:

@@ -3,13 +3,13 @@
 import argparse
 from typing import TYPE_CHECKING
 
-import planfly
 from planfly.arguments import CHOICES
 from planfly.commands.campaigns import add_flights_options
+from planfly.commands.registry import call_api
 from planfly.terminal.arguments import file_completer, number_parser, with_completer
 from planfly.terminal.command_parser import LineParser, colour_text
 from planfly.terminal.exit_codes import FLYABLE, INCOMPLETE
-from planfly.terminal.options import add_result_options, call_api
+from planfly.terminal.options import add_result_options
 from planfly.terminal.output import write_json_if_requested
 
 if TYPE_CHECKING:
@@ -73,9 +73,10 @@ def ground_risk(args: argparse.Namespace) -> int:
     The exit code is 0 if the class is known, and 3 if the population is not.
     """
     from logs.verdict.conditions import flown_lines
+    from planfly.api import assessing
     from planfly.campaigns.ground_risk_text import answer_line, risk_lines
 
-    result = call_api(planfly.ground_risk, args)
+    result = call_api(assessing.ground_risk, args)
     code = FLYABLE if result.is_judged else INCOMPLETE
     print(f"risk      {colour_text(answer_line(result), 'good' if result.is_judged else 'warning')}")
     for text in (*flown_lines(result.base.conditions()), *risk_lines(result)):

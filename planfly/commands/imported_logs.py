@@ -4,8 +4,8 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import planfly
 from planfly.commands.check import LOGS
+from planfly.commands.registry import call_api
 from planfly.terminal.arguments import IMPORTED_LOG_SUFFIXES, complete_aircraft, file_completer, with_completer
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import FLYABLE, INCOMPLETE, verdict_code
@@ -15,7 +15,6 @@ from planfly.terminal.options import (
     add_result_options,
     add_turbulence_option,
     add_world_options,
-    call_api,
 )
 from planfly.terminal.output import write_json_if_requested, write_junit_if_requested
 from planfly.terminal.results import warn_about_incomplete_log
@@ -63,14 +62,15 @@ def add_import_log_parser(command_line: LineParser) -> None:
 
 def import_log(args: argparse.Namespace) -> int:
     """Import a log; return the exit code of the verdict, or 3 if part of the log could not be read."""
-    from planfly.terminal.verdict_lines import print_verdict
+    from planfly.api import imported
+    from planfly.terminal.verdict_lines import verdict_lines
 
     if args.files is not None:
         return _guess_columns(args)
     if args.target is None:
         raise PlanflyError("import needs FLIGHT.mcap, the flight log to write", field="FLIGHT.mcap")
-    flight = call_api(planfly.import_log, args)
-    print_verdict(flight.verdict, flight.setup.route.notes)
+    flight = call_api(imported.import_log, args)
+    print(*verdict_lines(flight.verdict, flight.setup.route.notes), sep="\n")
     print(f"log       {Path(args.target)} ({count_text(len(flight.track), 'row')})")
     code = INCOMPLETE if flight.lossy else verdict_code(flight.verdict)
     write_json_if_requested(args, lambda: _import_answer(Path(args.target), flight, code))
@@ -80,11 +80,13 @@ def import_log(args: argparse.Namespace) -> int:
 
 def _guess_columns(args: argparse.Namespace) -> int:
     """Write a table of columns guessed from data files, and print the number of guesses to check."""
+    from planfly.api import imported
+
     for name, value in (("FLIGHT.mcap", args.target), ("--json", args.json), ("--junit", args.junit)):
         if value is not None:
             message = f"--columns-from cannot be combined with {name}, because it writes a table and no flight log"
             raise PlanflyError(message, field=name)
-    guesses = planfly.guess_columns(args.files, args.log, overwrite=args.overwrite)
+    guesses = imported.guess_columns(args.files, args.log, overwrite=args.overwrite)
     print(f"table     {args.log}: {guesses.guesses} {'guess' if guesses.guesses == 1 else 'guesses'} to check")
     for line in guesses.missing:
         print(f"  {line}")
@@ -133,10 +135,13 @@ def add_refly_parser(command_line: LineParser) -> None:
 
 def refly(args: argparse.Namespace) -> int:
     """Fly the mission again, and compare and draw both flights; return 3 for an incomplete log."""
+    from logs.recording.reader import read_log
+    from planfly.api import imported
+
     source = Path(args.log)
-    log = planfly.read_log(source)
+    log = read_log(source)
     folder = args.out or source.with_name(f"{source.stem}-refly")
-    result = call_api(planfly.refly, args, log=log, out=folder, overwrite=args.overwrite or args.out is None)
+    result = call_api(imported.refly, args, log=log, out=folder, overwrite=args.overwrite or args.out is None)
     print("\n".join(result.lines))
     for file in result.files:
         print(f"refly     {file}")

@@ -3,9 +3,9 @@
 import argparse
 from typing import TYPE_CHECKING
 
-import planfly
 from planfly.arguments import CHOICES
 from planfly.commands.check import add_mission_or_log_argument
+from planfly.commands.registry import call_api
 from planfly.terminal.arguments import number_parser, parse_position
 from planfly.terminal.command_parser import LineParser, colour_text
 from planfly.terminal.exit_codes import FLYABLE, INCOMPLETE, NOT_FLYABLE
@@ -15,7 +15,6 @@ from planfly.terminal.options import (
     add_result_options,
     add_steering_options,
     add_world_options,
-    call_api,
 )
 from planfly.terminal.output import write_json_if_requested
 
@@ -76,8 +75,9 @@ def link(args: argparse.Namespace) -> int:
     The exit code is 0 if the link is kept, 4 if it is lost for too long, and 3 if this is not known.
     """
     from logs.verdict.conditions import flown_lines, judging_conditions
+    from planfly.api import linking
 
-    result = call_api(planfly.link, args)
+    result = call_api(linking.link, args)
     ok = result.finding.ok
     code = INCOMPLETE if ok is None else FLYABLE if ok else NOT_FLYABLE
     print(f"link      {colour_text(result.finding.reason, 'warning' if ok is None else 'good' if ok else 'bad')}")

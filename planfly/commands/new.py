@@ -3,12 +3,12 @@
 import argparse
 import shlex
 
-import planfly
 from planfly.arguments import CHOICES
+from planfly.commands.registry import call_api
 from planfly.terminal.arguments import complete_aircraft, number_parser, parse_position, with_completer
 from planfly.terminal.command_parser import LineParser, colour_text
 from planfly.terminal.exit_codes import FLYABLE, NOT_FLYABLE
-from planfly.terminal.options import add_result_options, add_terrain_option, call_api
+from planfly.terminal.options import add_result_options, add_terrain_option
 from planfly.terminal.output import write_json_if_requested
 
 
@@ -57,11 +57,13 @@ def add_new_parser(command_line: LineParser) -> None:
 
 def new(args: argparse.Namespace) -> int:
     """Write the scenario, and plan a path in it; return 4 if the plan is not safe, but keep the file."""
-    file = call_api(planfly.new_scenario, args)
+    from planfly.api import drafting, planning
+
+    file = call_api(drafting.new_scenario, args)
     print(f"scenario  {file}")
     if args.terrain is None:
         print("ground    flat, at mean sea level: no elevation file was named (--terrain DEM)")
-    plan = planfly.plan(file)
+    plan = planning.plan(file)
     code = FLYABLE if plan.safe else NOT_FLYABLE
     if plan.safe:
         ratio = plan.objectives.length_ratio
@@ -69,7 +71,7 @@ def new(args: argparse.Namespace) -> int:
         print(f"{safe_text}: {len(plan.waypoints)} waypoints, {ratio:.3f} times as long as the straight line")
     else:
         print(colour_text("plans     no safe path", "bad"))
-        for problem in (*plan.certificate.problems, *planfly.what_blocks(plan)):
+        for problem in (*plan.certificate.problems, *planning.what_blocks(plan)):
             print(f"  {problem}")
     print(f"next      planfly run {shlex.quote(str(file))}")
 

@@ -4,12 +4,12 @@ import argparse
 from dataclasses import asdict
 from pathlib import Path
 
-import planfly
 from planfly.arguments import CHOICES
+from planfly.commands.registry import call_api
 from planfly.terminal.arguments import number_parser, parse_problems
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import FLYABLE
-from planfly.terminal.options import add_result_options, call_api
+from planfly.terminal.options import add_result_options
 from planfly.terminal.output import write_json_if_requested
 from planfly.workflow.output_paths import RESULTS
 
@@ -50,8 +50,10 @@ def paper(args: argparse.Namespace) -> int:
 
     The exit code is 0 for every result, because "no path" is also an answer.
     """
+    from planfly.planning.paper import paper_tables
+
     folder = Path(args.out) if args.out else RESULTS / "paper"
-    tables = call_api(planfly.paper_tables, args, out=folder, overwrite=args.overwrite or args.out is None)
+    tables = call_api(paper_tables, args, out=folder, overwrite=args.overwrite or args.out is None)
     from planfly.planning.paper import table_text
 
     print(table_text(tables.rows))

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import TYPE_CHECKING
 
-import planfly
+from planfly.commands.registry import call_api
 from planfly.terminal.arguments import file_completer, number_parser, parse_budget, parse_threat, with_completer
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.dispersed_flights import check_flights_option, fly_dispersed
@@ -18,7 +18,6 @@ from planfly.terminal.options import (
     add_flights_option,
     add_result_options,
     add_scenario_argument,
-    call_api,
 )
 from planfly.terminal.output import write_json_if_requested
 from planfly.terminal.results import print_warnings
@@ -103,6 +102,8 @@ def _algorithms_help() -> str:
 
 def plan(args: argparse.Namespace) -> int:
     """Plan a path, and write the plan file; return 4 if the plan is not safe, or fails in its flights."""
+    from planfly.api import planning
+
     _check_replanning(args)
     check_flights_option(args, "front")
     if args.front is not None:
@@ -112,7 +113,7 @@ def plan(args: argparse.Namespace) -> int:
     evaluations, seconds = args.budget or (None, None)
     with _stop_on_interrupt() as should_stop:
         new_plan = call_api(
-            planfly.plan if args.old is None else planfly.replan,
+            planning.plan if args.old is None else planning.replan,
             args,
             budget=evaluations,
             seconds=seconds,
@@ -135,6 +136,7 @@ def plan(args: argparse.Namespace) -> int:
 
 def _plan_front(args: argparse.Namespace) -> int:
     """Plan a Pareto front and write its folder; return 4 if there is no safe plan."""
+    from planfly.api import fronts
     from planfly.api.fronts import FRONT_FOLDER
     from planfly.terminal.plan_answers import front_answer, front_lines
 
@@ -148,7 +150,7 @@ def _plan_front(args: argparse.Namespace) -> int:
     out = FRONT_FOLDER if args.out is None else args.out
     with _stop_on_interrupt() as should_stop:
         front = call_api(
-            planfly.plan_front,
+            fronts.plan_front,
             args,
             count=args.front,
             seconds=seconds,
@@ -235,6 +237,7 @@ def _print_plan(plan: "Plan", risks: tuple[str, ...], *, is_dispersed: bool) -> 
     is_dispersed: True if such flights follow.
     """
     from logs.verdict.conditions import autopilot_line, condition_lines
+    from planfly.api import planning
     from planfly.api.planning import conditions_of_plan
 
     state = "safe" if plan.safe else "feasible, but inside a missile's reach" if plan.feasible else "no feasible plan"
@@ -259,5 +262,5 @@ def _print_plan(plan: "Plan", risks: tuple[str, ...], *, is_dispersed: bool) -> 
         )
     for problem in plan.certificate.problems:
         print(f"  failed  {problem}")
-    for note in (*planfly.what_blocks(plan), *risks):
+    for note in (*planning.what_blocks(plan), *risks):
         print(f"  note    {note}")

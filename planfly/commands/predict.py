@@ -4,8 +4,8 @@ import argparse
 import math
 from typing import TYPE_CHECKING
 
-import planfly
 from planfly.commands.check import LOGS
+from planfly.commands.registry import call_api
 from planfly.terminal.arguments import IMPORTED_LOG_SUFFIXES, file_completer, number_parser, with_completer
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import FLYABLE
@@ -14,7 +14,6 @@ from planfly.terminal.options import (
     add_imported_log_options,
     add_result_options,
     add_world_options,
-    call_api,
 )
 from planfly.terminal.output import write_json_if_requested
 
@@ -58,7 +57,9 @@ def add_predict_parser(command_line: LineParser) -> None:
 
 def predict(args: argparse.Namespace) -> int:
     """Predict a log, and print how much of the flight is inside each band."""
-    result = call_api(planfly.predict, args)
+    from planfly.api import predicting
+
+    result = call_api(predicting.predict, args)
     print("\n".join(result.lines))
     for file in result.files:
         print(f"predicted {file}")

@@ -3,10 +3,10 @@
 import argparse
 from pathlib import Path
 
-import planfly
+from planfly.commands.registry import call_api
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import FLYABLE, INCOMPLETE
-from planfly.terminal.options import add_log_argument, add_result_options, call_api
+from planfly.terminal.options import add_log_argument, add_result_options
 from planfly.terminal.output import write_json_if_requested
 from planfly.terminal.results import warn_about_incomplete_log
 from world.wording import count_text
@@ -25,9 +25,11 @@ def add_recover_parser(command_line: LineParser) -> None:
 
 def recover(args: argparse.Namespace) -> int:
     """Write the readable part as a new log; write nothing if the log is complete."""
+    from planfly.api import imported
+
     source = Path(args.log)
     target = Path(args.out) if args.out else source.with_name(f"{source.stem}-recovered.mcap")
-    log = call_api(planfly.recover, args, out=target)
+    log = call_api(imported.recover, args, out=target)
     if log is None:
         print(f"{source}: complete: there is nothing to recover, and nothing was written")
         write_json_if_requested(args, lambda: _json_answer(target=None, rows=None, end_time=None))

@@ -1,22 +1,22 @@
 """List the commands, from which the parser, the help, the schemas and the dispatch are made.
 
 A command is a module of this package with two functions: ``add_NAME_parser`` adds its parser to the parser of the
-command line, and ``NAME`` takes the parsed arguments, calls the API, prints, and returns the exit code. The API
-compiles the kernels that it needs.
+command line, and ``NAME`` takes the parsed arguments, calls the API (`call_api`), writes the results to standard output
+and the progress to standard error, and returns the exit code. The API compiles the kernels that it needs.
 All modules are light: the code that a command needs is imported when the command runs.
 """
 
 import argparse
+import inspect
 import json
 from collections.abc import Callable
 from importlib import import_module
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 from planfly._version import __version__
 from planfly.terminal.command_parser import LineParser
 
-# Function of a command, which takes parsed arguments and returns the exit code.
-CommandFunction = Callable[[argparse.Namespace], int]
+Result = TypeVar("Result")
 
 
 class Command(NamedTuple):
@@ -83,7 +83,8 @@ COMMANDS = (
     Command("help", _HELP, module="shell", function="show_help"),
     Command("completion", _HELP, module="shell"),
 )
-_COMMANDS_BY_NAME = {command.name: command for command in COMMANDS}
+# The same by name.
+COMMANDS_BY_NAME = {command.name: command for command in COMMANDS}
 
 _FIRST_STEPS = """\
 first steps:
@@ -106,15 +107,18 @@ def build_parser() -> LineParser:
     return parser
 
 
-def find_command(name: str) -> CommandFunction:
-    """Return the function that executes a command; it takes parsed arguments and returns the exit code.
+def call_api(function: Callable[..., Result], args: argparse.Namespace, **overrides: Any) -> Result:
+    """Call a function of the API with the options that match its keywords, and return its result.
 
-    The function writes results to standard output and progress to standard error. Raises KeyError for an unknown name.
+    An option that was not given (None) leaves its keyword at the default.
+    overrides: keywords that override the options.
 
-    >>> find_command("scenarios").__module__
-    'planfly.commands.shell'
+    >>> call_api(lambda *, seed=1, out="here": (seed, out), argparse.Namespace(seed=3, out=None, json=None))
+    (3, 'here')
     """
-    return _COMMANDS_BY_NAME[name].load()
+    parameters = inspect.signature(function).parameters
+    options = {name: value for name, value in vars(args).items() if name in parameters} | overrides
+    return function(**{name: value for name, value in options.items() if value is not None})
 
 
 # ----------------------------------------------------------------------
@@ -142,7 +146,7 @@ def answer_schema(name: str) -> dict[str, Any]:
 
     if name not in commands_with_json():
         raise KeyError(name)
-    module, _, answer = _COMMANDS_BY_NAME[name].answer.rpartition(".")
+    module, _, answer = COMMANDS_BY_NAME[name].answer.rpartition(".")
     answers = import_module(f"planfly.terminal.{module or 'answers'}")
     schema = TypeAdapter(getattr(answers, answer)).json_schema(mode="serialization")
     return {"$schema": _JSON_SCHEMA_DRAFT, **schema, "title": f"planfly {name} --json"}

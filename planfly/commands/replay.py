@@ -7,7 +7,7 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import planfly
+from planfly.commands.registry import call_api
 from planfly.terminal.arguments import number_parser, parse_time_or_stations
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.control_characters import escape_controls
@@ -16,7 +16,6 @@ from planfly.terminal.options import (
     add_log_argument,
     add_result_options,
     add_vehicle_link_options,
-    call_api,
     print_and_flush,
     watch_stop_signals,
 )
@@ -108,19 +107,22 @@ def replay(args: argparse.Namespace) -> int:
 
     The exit code is 3 for an incomplete log.
     """
+    from logs.recording.reader import read_log
+    from planfly.api import replaying
+
     to_station = isinstance(args.to, str)
     if bool(args.foxglove) + bool(args.movie) + to_station > 1:
         options = "--foxglove, --movie, --to IP:PORT"
         raise PlanflyError(f"{options}: expected only one of them", field=options, allowed="expected only one of them")
-    log = planfly.read_log(Path(args.log))
+    log = read_log(Path(args.log))
     if not to_station:
         args.end = args.to
     if to_station or args.foxglove:
-        play_log = planfly.play_to_stations if to_station else planfly.play_to_foxglove
+        play_log = replaying.play_to_stations if to_station else replaying.play_to_foxglove
         with watch_stop_signals() as should_stop:
             call_api(play_log, args, log=log, stop=should_stop, on_message=print_and_flush)
     elif args.movie:
-        for file in call_api(planfly.movie, args, log=log, out=args.movie)[:3]:
+        for file in call_api(replaying.movie, args, log=log, out=args.movie)[:3]:
             print(f"movie     {file}")
     elif sys.stdout.isatty() and not (args.at_once or args.quiet or args.json):
         _show_instruments(log, args)
@@ -135,9 +137,10 @@ def replay(args: argparse.Namespace) -> int:
 
 def _json_answer(args: argparse.Namespace, log: "FlightLog", code: int) -> object:
     """Return the timeline of the replayed part, or of the whole flight if it is sent to ground stations."""
+    from planfly.api import replaying
     from planfly.terminal.answers import ReplayAnswer, TimelineEvent
 
-    entries = planfly.timeline(log) if isinstance(args.to, str) else call_api(planfly.timeline, args, log=log)
+    entries = replaying.timeline(log) if isinstance(args.to, str) else call_api(replaying.timeline, args, log=log)
     events = [TimelineEvent(time_s=entry.time, kind=entry.kind, text=entry.text) for entry in entries]
     return ReplayAnswer(exit_code=code, log=args.log, complete=log.complete, end_s=log.end_time, timeline=events)
 
@@ -145,9 +148,10 @@ def _json_answer(args: argparse.Namespace, log: "FlightLog", code: int) -> objec
 def _print_timeline(log: "FlightLog", args: argparse.Namespace) -> None:
     """Print the timeline at ``--speed`` times real time, or immediately without ``--speed``."""
     from logs.views.replay.timeline import entry_lines
+    from planfly.api import replaying
 
     speed = args.speed
-    entries = call_api(planfly.timeline, args, log=log)
+    entries = call_api(replaying.timeline, args, log=log)
     start, clock = args.start or float(log.track.time[0]), RunningClock()
     for entry in entries:
         while speed and (wait := (entry.time - start) / speed - clock()) > 0.0:
@@ -157,8 +161,10 @@ def _print_timeline(log: "FlightLog", args: argparse.Namespace) -> None:
 
 def _show_instruments(log: "FlightLog", args: argparse.Namespace) -> None:
     """Show frames until the end or an interruption; the last frame stays on the terminal."""
+    from planfly.api import replaying
+
     speed, lines = args.speed or 1.0, list[str]()
-    frames = call_api(planfly.replay, args, log=log, width=lambda: shutil.get_terminal_size().columns)
+    frames = call_api(replaying.replay, args, log=log, width=lambda: shutil.get_terminal_size().columns)
     screen = plain_stream(sys.stdout)
     print(_ENTER_SCREEN, end="", file=screen)
     try:

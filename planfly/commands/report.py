@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import planfly
 from planfly.terminal.arguments import file_completer, with_completer
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import BAD_INPUT, FLYABLE, INCOMPLETE, NOT_FLYABLE, verdict_code
@@ -39,14 +38,17 @@ def add_report_parser(command_line: LineParser) -> None:
 
 def report(args: argparse.Namespace) -> int:
     """Draw and write the report; return the exit code of the verdict, or 3 for an incomplete log."""
+    from logs.recording.reader import read_log
+    from planfly.api import reporting
+
     if args.layout:
         return _write_layout(args)
     if args.log is None:
         print("planfly report: expected a log, or --layout FILE (see planfly report --help)", file=sys.stderr)
         return BAD_INPUT
     source = Path(args.log)
-    log = planfly.read_log(source)
-    result = planfly.report(
+    log = read_log(source)
+    result = reporting.report(
         log,
         args.out or source.with_name(f"{source.stem}-report"),
         pictures=args.pictures,
@@ -74,10 +76,12 @@ def _json_answer(files: Sequence[Path], verdict: "Verdict | None", code: int) ->
 
 def _write_layout(args: argparse.Namespace) -> int:
     """Write the layout file for Foxglove.  Raises PlanflyError if a log is named, too."""
+    from planfly.api import reporting
+
     if args.log is not None:
         message = f"{args.log}: --layout writes only the layout; name no log with it"
         raise PlanflyError(message, file=args.log, field="--layout", value=args.layout)
-    file = planfly.foxglove_layout(args.layout, overwrite=args.overwrite)
+    file = reporting.foxglove_layout(args.layout, overwrite=args.overwrite)
     print(f"layout    {file}")
     write_json_if_requested(args, lambda: _json_answer([file], verdict=None, code=FLYABLE))
     return FLYABLE

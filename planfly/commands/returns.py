@@ -4,8 +4,8 @@ import argparse
 import math
 from typing import TYPE_CHECKING
 
-import planfly
 from planfly.commands.check import add_mission_or_log_argument
+from planfly.commands.registry import call_api
 from planfly.terminal.arguments import (
     number_parser,
 )
@@ -18,7 +18,6 @@ from planfly.terminal.options import (
     add_sitl_option,
     add_steering_options,
     add_world_options,
-    call_api,
 )
 from planfly.terminal.output import write_json_if_requested
 
@@ -84,8 +83,9 @@ def returns(args: argparse.Namespace) -> int:
     The exit code is 0 if all returns are safe, 4 if one is unsafe, and 3 if some are undecided.
     """
     from logs.verdict.conditions import flown_lines, judging_conditions
+    from planfly.api import returning
 
-    result = call_api(planfly.returns, args)
+    result = call_api(returning.returns, args)
     code = FLYABLE if result.safe else INCOMPLETE if result.undecided else NOT_FLYABLE
     print(
         f"returns   {colour_text(result.headline, 'good' if result.safe else 'warning' if result.undecided else 'bad')}"

@@ -4,7 +4,7 @@ import argparse
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-import planfly
+from planfly.commands.registry import call_api
 from planfly.terminal.arguments import number_parser
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.dispersed_flights import check_flights_option, fly_dispersed
@@ -16,7 +16,6 @@ from planfly.terminal.options import (
     add_result_options,
     add_scenario_argument,
     add_terrain_option,
-    call_api,
 )
 from planfly.terminal.output import write_json_if_requested, write_junit_if_requested
 from planfly.terminal.results import print_engine
@@ -65,8 +64,10 @@ def run(args: argparse.Namespace) -> int:
 
     Returns the exit code of the verdict, or 4 if the plan fails in the flights of ``--flights N``.
     """
+    from planfly.api import running
+
     check_flights_option(args, "sitl")
-    result = call_api(planfly.run, args, on_round=_print_round)
+    result = call_api(running.run, args, on_round=_print_round)
     if args.refine:
         _print_rounds(result)
     dispersed = fly_dispersed(args, _last_plan(result)) if args.flights and result.rounds[-1].flown else None
@@ -109,9 +110,9 @@ def _json_answer(result: "RunResult", has_rounds: bool, code: int, dispersed: "D
 
 def _print_round(finished_round: "Round") -> None:
     """Print the verdict on a round, the line on returns, the flight model, and the written files."""
-    from planfly.terminal.verdict_lines import print_verdict
+    from planfly.terminal.verdict_lines import verdict_lines
 
-    print_verdict(finished_round.verdict, finished_round.notes, returns=finished_round.return_summary)
+    print(*verdict_lines(finished_round.verdict, finished_round.notes, returns=finished_round.return_summary), sep="\n")
     print_engine(finished_round.engine)
     files = "plan.json, mission.waypoints, mission.plan, verdict.json; nothing was flown"
     if finished_round.flown:

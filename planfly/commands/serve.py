@@ -2,7 +2,7 @@
 
 import argparse
 
-import planfly
+from planfly.commands.registry import call_api
 from planfly.terminal.arguments import MISSION_SUFFIXES, file_completer, number_parser, with_completer
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import FLYABLE
@@ -11,7 +11,6 @@ from planfly.terminal.options import (
     add_steering_options,
     add_vehicle_link_options,
     add_world_options,
-    call_api,
     print_and_flush,
     watch_stop_signals,
 )
@@ -60,6 +59,8 @@ def add_serve_parser(command_line: LineParser) -> None:
 
 def serve(args: argparse.Namespace) -> int:
     """Serve until SIGINT or SIGTERM."""
+    from planfly.api import serving
+
     with watch_stop_signals() as should_stop:
-        call_api(planfly.serve, args, stop=should_stop, on_message=print_and_flush)
+        call_api(serving.serve, args, stop=should_stop, on_message=print_and_flush)
     return FLYABLE

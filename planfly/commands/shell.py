@@ -3,7 +3,6 @@
 import argparse
 import sys
 
-import planfly
 from planfly.terminal.arguments import SHELLS, shell_script, with_completer
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import BAD_INPUT, FLYABLE
@@ -97,7 +96,9 @@ def add_scenarios_parser(command_line: LineParser) -> None:
 
 def scenarios(args: argparse.Namespace) -> int:
     """Print the name and description of each built-in scenario."""
-    descriptions = planfly.scenarios()
+    from planfly.api import planning
+
+    descriptions = planning.scenarios()
     for name, description in descriptions.items():
         print(f"{name:<12} {description}")
 

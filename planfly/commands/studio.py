@@ -2,7 +2,7 @@
 
 import argparse
 
-import planfly
+from planfly.commands.registry import call_api
 from planfly.terminal.arguments import (
     IMPORTED_LOG_SUFFIXES,
     MISSION_SUFFIXES,
@@ -16,7 +16,6 @@ from planfly.terminal.options import (
     add_aircraft_and_wind_options,
     add_autopilot_options,
     add_world_options,
-    call_api,
     print_and_flush,
     watch_stop_signals,
 )
@@ -83,6 +82,8 @@ def add_studio_parser(command_line: LineParser) -> None:
 
 def studio(args: argparse.Namespace) -> int:
     """Serve until SIGINT or SIGTERM."""
+    from planfly.studio.open_studio import open_studio
+
     with watch_stop_signals() as should_stop:
-        call_api(planfly.open_studio, args, stop=should_stop, on_message=print_and_flush)
+        call_api(open_studio, args, stop=should_stop, on_message=print_and_flush)
     return FLYABLE

@@ -5,7 +5,7 @@ from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING
 
-import planfly
+from planfly.commands.registry import call_api
 from planfly.terminal.arguments import MISSION_SUFFIXES, file_completer, number_parser, parse_camera, with_completer
 from planfly.terminal.command_parser import LineParser, colour_text
 from planfly.terminal.exit_codes import NOT_FLYABLE, verdict_code
@@ -14,7 +14,6 @@ from planfly.terminal.options import (
     add_result_options,
     add_steering_options,
     add_world_options,
-    call_api,
 )
 from planfly.terminal.output import write_json_if_requested
 
@@ -67,8 +66,9 @@ def survey(args: argparse.Namespace) -> int:
     The exit code is 4 if too much of a photo line is lost, otherwise that of the verdict on the flight.
     """
     from logs.verdict.conditions import flown_lines, judging_conditions
+    from planfly.api import surveying
 
-    result = call_api(planfly.survey, args)
+    result = call_api(surveying.survey, args)
     code = verdict_code(result.verdict)
     if result.lost:
         code = NOT_FLYABLE

@@ -3,11 +3,11 @@
 import argparse
 import shlex
 
-import planfly
+from planfly.commands.registry import call_api
 from planfly.terminal.arguments import MISSION_SUFFIXES, file_completer, number_parser, parse_area, with_completer
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import FLYABLE
-from planfly.terminal.options import add_result_options, call_api
+from planfly.terminal.options import add_result_options
 from planfly.terminal.output import write_json_if_requested
 from planfly.terminal.results import print_warnings
 
@@ -58,7 +58,9 @@ def add_terrain_parser(command_line: LineParser) -> None:
 
 def terrain(args: argparse.Namespace) -> int:
     """Write the terrain of an area."""
-    result = call_api(planfly.terrain, args, out=args.out or "dem.tif")
+    from planfly.api import cutting_terrain
+
+    result = call_api(cutting_terrain.terrain, args, out=args.out or "dem.tif")
     rows, cols = result.shape
     tiles = result.tiles[0] if len(result.tiles) == 1 else f"{len(result.tiles)} tiles"
     print(f"terrain   {result.file}: {rows:,} x {cols:,} pixels from {tiles}")

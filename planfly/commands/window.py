@@ -3,12 +3,12 @@
 import argparse
 from typing import TYPE_CHECKING
 
-import planfly
 from planfly.commands.campaigns import add_flights_options
+from planfly.commands.registry import call_api
 from planfly.terminal.arguments import number_parser
 from planfly.terminal.command_parser import LineParser, colour_text
 from planfly.terminal.exit_codes import FLYABLE, INCOMPLETE, NOT_FLYABLE
-from planfly.terminal.options import add_result_options, call_api
+from planfly.terminal.options import add_result_options
 from planfly.terminal.output import write_json_if_requested
 
 if TYPE_CHECKING:
@@ -55,9 +55,10 @@ def window(args: argparse.Namespace) -> int:
     is not judged in full.
     """
     from logs.verdict.conditions import flown_lines
+    from planfly.api import finding_windows
     from planfly.campaigns.window_text import answer_line, unjudged_lines, window_lines
 
-    result = call_api(planfly.window, args)
+    result = call_api(finding_windows.window, args)
     go = result.is_go
     code = INCOMPLETE if go is None else FLYABLE if go else NOT_FLYABLE
     print(f"window    {colour_text(answer_line(result), 'warning' if go is None else 'good' if go else 'bad')}")

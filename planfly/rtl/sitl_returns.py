@@ -268,8 +268,11 @@ def _judge_flown_return(
     if path is None:
         return None
     start_row = len(track) - len(path)
-    position = _cut_at_landing(simulated_return.target, path)
-    target = _flown_target(world, simulated_return.target, position)
+    position, target = path, simulated_return.target
+    if target.landing is not None:
+        # The path to a landing sequence ends at the last waypoint before the landing.
+        position = _cut_at_nearest_point(_end_position(target), position)
+    target = _flown_target(world, target, position)
     approach = find_nearest_approaches(world, position)
     hits_ground = end_reason == "ground contact" and len(position) == len(path)
     has_arrived = hits_ground or bool(
@@ -316,16 +319,6 @@ def _end_position(target: ReturnTarget) -> tuple[float, float, float]:
     if target.landing is None:
         return target.position
     return (target.landing, *target.landing.next_stops)[-1].position
-
-
-def _cut_at_landing(target: ReturnTarget, position: Floats) -> Floats:
-    """Return a path to a landing sequence up to the last waypoint before the landing; other paths unchanged.
-
-    position: path points, (t, 3) m.
-    """
-    if target.landing is None:
-        return position
-    return _cut_at_nearest_point(_end_position(target), position)
 
 
 def _cut_at_nearest_point(point: tuple[float, float, float], position: Floats) -> Floats:

@@ -15,7 +15,7 @@ from flight.mission.surveys import camera_spacing
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Finding
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
-from logs.verdict.rules.registry import place_findings
+from logs.verdict.rules.registry import run_rules
 from planfly.studio.edit_context import EditContext
 from planfly.studio.moved_route import update_moved_route
 from world.geometry import leg_runs
@@ -151,7 +151,9 @@ def _judge_window(setup: FlightSetup, first: int, last: int, start: int) -> Wind
     """
     requirements = replace(route_requirements(setup), zone_check_legs=(first - start, last - start - 1))
     findings = tuple(
-        finding for finding in place_findings(requirements) if _is_in_window(finding, first - start, last - start)
+        finding
+        for finding in run_rules(requirements, None, geometric=True, includes_whole_flight=False)
+        if _is_in_window(finding, first - start, last - start)
     )
     return Window(first, last, start, requirements, findings)
 

@@ -278,15 +278,14 @@ def _state_data(state: State) -> list[str | float | None]:
 
 def verdict_page_data(verdict: Verdict) -> Json:
     """Return page data of a verdict: state, answer, headline, reasons, lines, level and count of failures."""
-    presentation = verdict.present()
     return {
-        "state": presentation.state,
-        "answer": presentation.answer,
-        "headline": presentation.headline,
-        "reasons": presentation.reasons,
-        "lines": list(presentation.details),
-        "level": presentation.level,
-        "failed": len(presentation.failed),
+        "state": verdict.state,
+        "answer": verdict.answer,
+        "headline": verdict.headline,
+        "reasons": verdict.reasons,
+        "lines": list(verdict.details),
+        "level": verdict.level,
+        "failed": len(verdict.failed),
     }
 
 
@@ -298,9 +297,7 @@ def findings_json(verdict: Verdict, tried: Sequence[TriedSuggestions]) -> list[J
     tried: suggestions that passed their trials; failed findings show no others.
     """
     verdict = replace(verdict, findings=with_passing_suggestions(verdict.findings, tried))
-    return [
-        _finding_json(number, finding) for number, finding in verdict.present().findings_to_list(_MAX_LISTED_FINDINGS)
-    ]
+    return [_finding_json(number, finding) for number, finding in verdict.findings_to_list(_MAX_LISTED_FINDINGS)]
 
 
 def can_apply_in_studio(suggestion: Suggestion) -> bool:

@@ -548,9 +548,9 @@ def write_junit_if_requested(args: argparse.Namespace, verdicts: Mapping[str, "V
     verdicts: verdict of each judged mission or flight, keyed by name.
     """
     if args.junit is not None:
-        from logs.verdict.junit import junit_text
+        from logs.verdict.junit import suites_text
 
-        write_atomically(Path(args.junit), junit_text({name: verdict.present() for name, verdict in verdicts.items()}))
+        write_atomically(Path(args.junit), suites_text(verdict.junit_suite(name) for name, verdict in verdicts.items()))
 
 
 def write_suite_if_requested(args: argparse.Namespace, make_suite: Callable[[], "JunitSuite"]) -> None:

@@ -1,6 +1,6 @@
-"""Format or print a verdict, or the verdicts for several autopilots, as lines for a terminal."""
+"""Format a verdict, or the verdicts for several autopilots, as lines for a terminal."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 
 from flight.simulation.setup import FlightSetup
 from logs.verdict.conditions import flown_lines
@@ -19,63 +19,43 @@ _LIMIT_SOURCES = ("scenario", "near the field", "aircraft", "autopilot", "missio
 _TITLE_WIDTH = 2 + max(len(rule.title) for rule in RULE_WORDS.values())
 
 
-def print_verdict(
+def verdict_lines(
     verdict: Verdict,
     notes: Iterable[str],
     setup: FlightSetup | None = None,
     returns: ReturnSummary | None = None,
-) -> None:
-    """Print a verdict: summary, failed rules, and the finding closest to its limit for each rule.
+) -> list[str]:
+    """Return the lines of a verdict for a terminal.
+
+    They are the summary, the failures, the finding closest to its limit for each rule, the notes, and the returns.
 
     setup: setup of the judged flight, used to look for suggestions on its planned route; None without a flight.
     returns: returns from a few points of the flight.  Unsafe returns of a flyable mission follow the first line.
     """
-    lines = verdict_lines(verdict, notes, lambda: setup is not None and has_geometric_suggestion(setup))
+    lines = [colour_text(verdict.headline, STATE_STYLES[verdict.state]), *verdict.details]
+    for rule in verdict.failed_rules:
+        lines += _failed_lines(rule)
+    no_change_text = _no_change_text(verdict, setup)
+    lines += [colour_text("          no remedy: ", "hint") + no_change_text] if no_change_text else []
+    undecided = verdict.undecided_findings
+    lines += [f"  open    {finding_heading(finding)}: {finding.reason}" for finding in undecided[: 2 * _MAX_LISTED]]
+    # One flight would decide all findings with the same suggestion.
+    deciding_flights = dict.fromkeys(finding.suggestion for finding in undecided if finding.suggestions)
+    lines += [colour_text("          would decide: ", "hint") + text for text in deciding_flights]
+    zone_count = 0 if verdict.conditions is None else verdict.conditions.zones
+    for rule in verdict.rules:
+        zone_count_text = f"{zone_count:,} zones; " if rule.words.name == "fence" and zone_count > 1 else ""
+        lines.append(f"  {rule.words.title:<{_TITLE_WIDTH}}{zone_count_text}{_rule_summary(rule)}")
+    lines += [f"  note    {note}" for note in notes]
     if returns is not None and returns.line:
         is_warning = verdict.flyable and returns.has_failures
         requirement = "; the scenario requires no safe return" if is_warning else ""
         text = f"returns   {returns.line}{requirement}; details: planfly returns"
         lines.insert(1 if is_warning else len(lines), colour_text(text, "warning") if is_warning else text)
-    print("\n".join(lines))
+    return lines
 
 
-def never_suggests() -> bool:
-    """Return False, for a verdict without a planned route that could have suggestions."""
-    return False
-
-
-def verdict_lines(
-    verdict: Verdict, notes: Iterable[str], suggests_by_geometry: Callable[[], bool] = never_suggests
-) -> list[str]:
-    """Return the lines of a verdict for a terminal.
-
-    They are the summary, the failures, the finding closest to its limit for each rule, and the notes.
-
-    suggests_by_geometry: function that returns True if changes of the planned route are suggested without a flight.  It
-        is called only if the flight has no suggestion.
-    """
-    presentation = verdict.present()
-    lines = [colour_text(presentation.headline, STATE_STYLES[presentation.state]), *presentation.details]
-    for rule in presentation.failed_rules:
-        lines += _failed_lines(rule)
-    no_change_text = _no_change_text(verdict, suggests_by_geometry)
-    lines += [colour_text("          no remedy: ", "hint") + no_change_text] if no_change_text else []
-    lines += [
-        f"  open    {finding_heading(finding)}: {finding.reason}"
-        for finding in presentation.undecided[: 2 * _MAX_LISTED]
-    ]
-    # One flight would decide all findings with the same suggestion.
-    deciding_flights = dict.fromkeys(finding.suggestion for finding in presentation.undecided if finding.suggestions)
-    lines += [colour_text("          would decide: ", "hint") + text for text in deciding_flights]
-    for rule in presentation.rules:
-        zone_count_text = (
-            f"{presentation.zones:,} zones; " if rule.words.name == "fence" and presentation.zones > 1 else ""
-        )
-        lines.append(f"  {rule.words.title:<{_TITLE_WIDTH}}{zone_count_text}{_rule_summary(rule)}")
-    return [*lines, *(f"  note    {note}" for note in notes)]
-
-
-def _no_change_text(verdict: Verdict, suggests_by_geometry: Callable[[], bool]) -> str:
+def _no_change_text(verdict: Verdict, setup: FlightSetup | None) -> str:
     """State that no change passed its trial if no failed finding has a suggestion; otherwise return "".
 
     After a failed flight, the text is returned only if the planned route fails, too.
@@ -91,8 +71,10 @@ def _no_change_text(verdict: Verdict, suggests_by_geometry: Callable[[], bool]) 
         return "no change that passes was found"
     if not any(level.name == "geometry" and not level.flyable and not level.undecided for level in verdict.levels):
         return ""
-    further_text = "; planfly check --geometry suggests changes for the planned route" if suggests_by_geometry() else ""
-    return f"no change that passes was found in simulated flights{further_text}"
+    text = "no change that passes was found in simulated flights"
+    if setup is not None and has_geometric_suggestion(setup):
+        text += "; planfly check --geometry suggests changes for the planned route"
+    return text
 
 
 def _failed_lines(rule: RuleFindings) -> list[str]:
@@ -162,7 +144,7 @@ def autopilot_lines(verdicts: Mapping[str, Verdict]) -> list[str]:
     """
     rows = [("", *verdicts), ("verdict", *(verdict.answer for verdict in verdicts.values()))]
     # Keyed by title: photo lines and their overlap are shown apart, and have the rule "survey" in common.
-    rules_by_title = [{rule.words.title: rule for rule in verdict.present().rules} for verdict in verdicts.values()]
+    rules_by_title = [{rule.words.title: rule for rule in verdict.rules} for verdict in verdicts.values()]
     all_findings = [finding for verdict in verdicts.values() for finding in verdict.findings]
     rows += [
         (title, *(rules[title].tally_text if title in rules else "" for rules in rules_by_title))

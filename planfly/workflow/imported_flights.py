@@ -23,8 +23,8 @@ from flight.mission.placing import PlacedMission, place_stops
 from flight.mission.route import route_through_stops
 from flight.mission_files.formats import read_mission
 from flight.simulation.setup import FlightSetup, ImportedLog, make_limits
-from flight.simulation.simulate import Flight, TrackBuilder, simulate
-from flight.simulation.track import Track
+from flight.simulation.simulate import BLOCK_DURATION_S, Flight
+from flight.simulation.track import Track, TrackBuilder
 from logs.importers.clean_positions import MAX_STEP_S
 from logs.importers.imported_flight import LoggedFlight, make_flight, make_track, mean_wind, with_flown_altitudes
 from logs.importers.open_log import open_log
@@ -537,11 +537,11 @@ def _refly_followed_legs(
         model_setup = replace(model_setup, seed=draw.seed)
     flight = Flight(model_setup, model, None if draw is None else draw.variation)
     builder, end_reason, length = TrackBuilder(), "", flight.path.length
-    for block in simulate(flight):
-        builder.add(block.rows)
-        end_reason = block.end_reason
+    while not end_reason:
+        rows, end_reason = flight.fly_block(round(BLOCK_DURATION_S / flight.dt))
+        builder.add(rows)
         if advance is not None:
-            advance(block.distance, length, f"{block.distance / 1000:.1f} of {length / 1000:.1f} km")
+            advance(flight.distance, length, f"{flight.distance / 1000:.1f} of {length / 1000:.1f} km")
     track = builder.track()
     if len(track) < 2:
         message = f"the model of {model.name} flew no part of the mission: {end_reason}"

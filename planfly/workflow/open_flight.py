@@ -65,7 +65,12 @@ def open_flight(
     terrain = None if options.get("terrain") is None else str(options.get("terrain"))
     if isinstance(plan_or_file, Plan) or Path(plan_or_file).suffix.lower() == ".json":
         return _open_plan(plan_or_file, options, program, engine, fences, terrain)
-    mission = fences.add_to_mission(check_fixed_wing(read_mission(check_mission_exists(Path(plan_or_file)))))
+    mission = fences.add_to_mission(read_mission(check_mission_exists(Path(plan_or_file))))
+    for item in mission.items:
+        if item.command in OTHER_VEHICLES:
+            name = command_name(item.command)
+            allowed = f"a command for {OTHER_VEHICLES[Command(item.command)]}; planfly flies only fixed-wing aircraft"
+            raise MissionError.at(mission.source, f"item {item.seq}", name, allowed, shown=name)
     if named_world is not None:
         scenario = load_scenario_with_options(named_world, options, program, mission)
         if scenario.link is not None:
@@ -150,24 +155,6 @@ def _mission_file_names(folder: Path) -> list[str]:
         return sorted(file.name for file in folder.iterdir() if file.suffix in (".json", ".waypoints", ".plan", ".txt"))
     except OSError:
         return []
-
-
-def check_fixed_wing(mission: Mission) -> Mission:
-    """Return the mission unchanged.  Raises MissionError if an item can only be flown by other vehicles.
-
-    >>> from flight.mission.items import MissionItem
-    >>> spline = MissionItem(3, 82, 3, (0.0,) * 4, 46.0, 8.0, 75.0)
-    >>> check_fixed_wing(Mission(None, (spline,), source="a.waypoints"))
-    Traceback (most recent call last):
-        ...
-    world.errors.MissionError: a.waypoints: item 3: NAV_SPLINE_WAYPOINT: a command for a multicopter; planfly flies ...
-    """
-    for item in mission.items:
-        if item.command in OTHER_VEHICLES:
-            name = command_name(item.command)
-            allowed = f"a command for {OTHER_VEHICLES[Command(item.command)]}; planfly flies only fixed-wing aircraft"
-            raise MissionError.at(mission.source, f"item {item.seq}", name, allowed, shown=name)
-    return mission
 
 
 def mission_of_plan(plan: Plan, uav: Uav, source: str = PLAN_FILE) -> Mission:

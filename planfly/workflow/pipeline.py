@@ -9,10 +9,9 @@ from flight.autopilots.catalog import find_program_class
 from flight.autopilots.program import ProgramAutopilot
 from flight.dynamics.fdm import Variation
 from flight.mission.items import Mission
-from flight.simulation.running_flight import RunningFlight
 from flight.simulation.setup import FlightSetup
-from flight.simulation.simulate import BLOCK_DURATION_S, LONG_BLOCK_DURATION_S, Flight, TrackBuilder, simulate
-from flight.simulation.track import Track, join_tracks
+from flight.simulation.simulate import BLOCK_DURATION_S, LONG_BLOCK_DURATION_S, Flight, RunningFlight
+from flight.simulation.track import Track, TrackBuilder, join_tracks
 from logs.recording.reader import LogEvent
 from logs.recording.recorder import CrashSafeRecorder, thin_track
 from logs.verdict.judge_flight import judge_flight, judge_plan_only
@@ -255,16 +254,15 @@ def _record_and_judge(task: _FlightTask, requirements: RouteRequirements, flight
             recorder = CrashSafeRecorder(task.log, flight.setup, every=task.every, batch=BATCH_S)
             open_logs.enter_context(recorder)
         # A recorded flight is written second by second, so that a crash of the process loses no more.
-        for block in simulate(flight, LONG_BLOCK_DURATION_S if recorder is None else BLOCK_DURATION_S):
-            builder.add(block.rows)
-            end_reason = block.end_reason
-            if recorder is not None and len(block.rows):
-                recorder.write_rows(block.rows)
+        block_ticks = round((LONG_BLOCK_DURATION_S if recorder is None else BLOCK_DURATION_S) / flight.dt)
+        while not end_reason:
+            rows, end_reason = flight.fly_block(block_ticks)
+            builder.add(rows)
+            if recorder is not None and len(rows):
+                recorder.write_rows(rows)
                 end_reason = end_reason or task.limits.log_limit_reason(recorder.size)
             if task.advance is not None:
-                task.advance(block.distance, length, f"{block.distance / 1000:.1f} of {length / 1000:.1f} km")
-            if end_reason:
-                break
+                task.advance(flight.distance, length, f"{flight.distance / 1000:.1f} of {length / 1000:.1f} km")
         track = builder.track()
         if recorder is not None:
             recorder.end_reason, track = end_reason, thin_track(track, task.every)

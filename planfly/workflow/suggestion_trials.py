@@ -290,8 +290,7 @@ class SuggestionTrials:
         Only findings with suggestions are tried.  Return [] if the mission has too many legs or too many such findings.
         """
         findings_by_rule = [
-            [finding for finding in rule.failed if finding.suggestions]
-            for rule in self.judged.verdict.present().failed_rules
+            [finding for finding in rule.failed if finding.suggestions] for rule in self.judged.verdict.failed_rules
         ]
         is_too_long = self.judged.requirements.legs > MAX_TRIED_LEGS
         if is_too_long or sum(map(len, findings_by_rule)) > _MAX_FAILED_FINDINGS:

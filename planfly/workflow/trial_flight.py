@@ -6,8 +6,8 @@ from functools import cached_property
 
 from aircraft.catalog import Aircraft
 from flight.simulation.setup import FlightSetup
-from flight.simulation.simulate import Flight, TrackBuilder, simulate
-from flight.simulation.track import Track, join_tracks
+from flight.simulation.simulate import BLOCK_DURATION_S, Flight
+from flight.simulation.track import Track, TrackBuilder, join_tracks
 from logs.verdict.judge_flight import judge_flight
 from logs.verdict.judge_geometry import judge_geometry
 from logs.verdict.measures.energy import reason_not_to_start
@@ -65,9 +65,10 @@ class Trial:
             return join_tracks([]), reason
         builder, end_reason = TrackBuilder(), ""
         try:
-            for block in simulate(Flight(self.setup, self.aircraft)):
-                builder.add(block.rows)
-                end_reason = block.end_reason
+            flight = Flight(self.setup, self.aircraft)
+            while not end_reason:
+                rows, end_reason = flight.fly_block(round(BLOCK_DURATION_S / flight.dt))
+                builder.add(rows)
                 if self.should_abort():
                     raise TrialAborted
         except StartError as error:

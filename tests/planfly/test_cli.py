@@ -6,14 +6,14 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from xml.etree import ElementTree
 
 import pytest
 
-from planfly import cli
 from planfly.cli import main
+from planfly.commands.registry import COMMANDS_BY_NAME
 from planfly.terminal import output
 from planfly.terminal.command_parser import UsageExit
 from world.errors import ScenarioError
@@ -38,7 +38,7 @@ def test_an_error_is_one_line_and_its_code(
     def fail(_args: argparse.Namespace) -> int:
         raise met
 
-    monkeypatch.setattr(cli, "find_command", lambda _: fail)
+    monkeypatch.setitem(COMMANDS_BY_NAME, "scenarios", SimpleNamespace(load=lambda: fail))
     assert main(["scenarios"]) == code
     printed = capsys.readouterr()
     assert (printed.out, printed.err) == ("", line)
@@ -93,7 +93,7 @@ def test_an_error_of_planfly_itself_is_in_both_files(tmp_path: Path, monkeypatch
     def fail(_args: argparse.Namespace) -> int:
         raise ZeroDivisionError("float division by zero")
 
-    monkeypatch.setattr(cli, "find_command", lambda _: fail)
+    monkeypatch.setitem(COMMANDS_BY_NAME, "fly", SimpleNamespace(load=lambda: fail))
     answer, cases = tmp_path / "r.json", tmp_path / "r.xml"
     with pytest.raises(ZeroDivisionError):
         main(["fly", "well.waypoints", "--json", str(answer), "--junit", str(cases)])
@@ -157,7 +157,7 @@ def test_a_fault_of_our_own_is_not_hidden(monkeypatch: pytest.MonkeyPatch) -> No
     def fail(_args: argparse.Namespace) -> int:
         raise ZeroDivisionError
 
-    monkeypatch.setattr(cli, "find_command", lambda _: fail)
+    monkeypatch.setitem(COMMANDS_BY_NAME, "scenarios", SimpleNamespace(load=lambda: fail))
     with pytest.raises(ZeroDivisionError):
         main(["scenarios"])
 
@@ -171,7 +171,7 @@ def test_too_little_memory_is_one_line(
     def fail(*_: object) -> int:
         raise MemoryError(*([said] if said else []))
 
-    monkeypatch.setattr("planfly.cli.find_command", lambda _name: fail)
+    monkeypatch.setitem(COMMANDS_BY_NAME, "scenarios", SimpleNamespace(load=lambda: fail))
     assert main(["scenarios"]) == 1
     assert capsys.readouterr().err == f"planfly: too little memory{told}\n"
 
@@ -179,13 +179,13 @@ def test_too_little_memory_is_one_line(
 def test_the_commands_own_code_is_the_process_exit_code(monkeypatch: pytest.MonkeyPatch) -> None:
     taken: list[str] = []
 
-    def find(name: str) -> Callable[[argparse.Namespace], int]:
-        taken.append(name)
-        return lambda _args: 4
+    def run(args: argparse.Namespace) -> int:
+        taken.append(args.what)
+        return 4
 
-    monkeypatch.setattr(cli, "find_command", find)
+    monkeypatch.setitem(COMMANDS_BY_NAME, "check", SimpleNamespace(load=lambda: run))
     assert main(["check", "m.plan"]) == 4
-    assert taken == ["check"]
+    assert taken == ["m.plan"]
 
 
 def test_help_loads_nothing_heavy() -> None:

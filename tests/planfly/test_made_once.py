@@ -47,7 +47,7 @@ STAGES = (
     "planfly.workflow.open_flight:make_setup",
     "flight.guidance.path:fly_by_path",
     "flight.simulation.local_map:LocalMap.around",
-    "flight.simulation.simulate:simulate",
+    "flight.simulation.simulate:Flight.__init__",
     "logs.verdict.judge_flight:judge_flight",
     "logs.verdict.judge_flight:judge_geometry",
     "logs.verdict.measures.route_requirements:route_requirements",
@@ -60,9 +60,9 @@ ONCE = dict.fromkeys(("load_uav", "load_envelope", "make_limits"), 1)
 ROUTED = dict.fromkeys(("make_itinerary", "place_stops", "route_through_stops", "make_setup", "fly_by_path"), 1)
 OPENED = ROUTED | {"plan_mission": 1}
 ALIGNED = dict.fromkeys(("route_requirements", "align_track"), 1)
-FLIGHT = OPENED | ALIGNED | dict.fromkeys(("around", "simulate", "judge_flight"), 1)
+FLIGHT = OPENED | ALIGNED | dict.fromkeys(("around", "__init__", "judge_flight"), 1)
 # A reference flight is at true airspeeds along a path of its own, and judged like the setup's flight.
-REFERENCE = dict.fromkeys(("fly_by_path", "around", "simulate", "route_requirements", "align_track", "judge_flight"), 2)
+REFERENCE = dict.fromkeys(("fly_by_path", "around", "__init__", "route_requirements", "align_track", "judge_flight"), 2)
 LOG = ALIGNED | dict.fromkeys(("make_limits", "fly_by_path"), 1)
 MISSION = Path(__file__).parents[1] / "flight" / "missions" / "by_hand.waypoints"
 
@@ -197,4 +197,5 @@ def test_a_served_mission_is_prepared_once_and_flown_from_that(entered: Counter[
     process.join(20.0)
     # The mission is judged before its flight, too.
     judged = ALIGNED | dict.fromkeys(("around", "judge_geometry", "judge_flight"), 1)
-    assert dict(entered) == ROUTED | judged | {"route_requirements": 2}
+    # One tick of a flight of its own shows whether the flight can start.
+    assert dict(entered) == ROUTED | judged | {"route_requirements": 2, "__init__": 2}

@@ -320,7 +320,7 @@ class Lockstep(ABC):
     def make_loop(self, tick: Callable[[], int], steps: int, *, gusts: bool, ground: bool) -> Callable[[int], int]:
         """Return a function that flies up to a number of ticks, and returns the end code or 0.
 
-        `flight.simulation.simulate` uses it like the compiled loop of a control law.
+        `flight.simulation.simulate.RunningFlight` uses it like the compiled loop of a control law.
 
         tick: `flight.autopilots.sitl.flight.autopilot_tick` on the workspace.
         steps: number of frames in a tick.

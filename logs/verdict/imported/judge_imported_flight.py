@@ -27,7 +27,7 @@ from logs.verdict.findings import Finding, make_finding
 from logs.verdict.imported.flown_legs import FlownLegs, flown_legs, gaps_between, stretch_end_text
 from logs.verdict.places import FLIGHT, LevelAnswer, Place
 from logs.verdict.rule_words import RULE_WORDS
-from logs.verdict.rules.registry import RULES, track_findings
+from logs.verdict.rules.registry import RULES, run_rules
 from logs.verdict.summary import headline, undecided_text
 from logs.verdict.tolerances import MAX_UNSEEN_TIME_S
 from logs.verdict.verdict import Verdict
@@ -338,7 +338,7 @@ def _stretch_times(legs: FlownLegs) -> tuple[float, float]:
 def _stretch_findings(setup: FlightSetup, legs: FlownLegs) -> list[Finding]:
     """Judge one stretch; its findings number legs and waypoints as in the whole route."""
     findings = []
-    for finding in track_findings(legs.requirements, legs.aligned):
+    for finding in run_rules(legs.requirements, legs.aligned):
         checked_finding = _unjudge_with_gaps(_unjudge_without_data(setup, legs, finding), legs)
         if legs.partial:
             checked_finding = _unjudge_if_unreached(checked_finding, legs)

@@ -21,7 +21,7 @@ from logs.verdict.findings import (
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import TriedSuggestions
-from logs.verdict.rule import Judge, Rule
+from logs.verdict.rule import Rule
 from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.rules import (
     bounds_rule,
@@ -110,76 +110,47 @@ def geometric_findings(
     flight_findings: findings on a flight of the route.  Findings of rules with `Rule.is_same_for_plan` are copied from
         them; None to run these rules, too.
     """
-    return _run_rules(requirements, aligned=None, end_findings=(), geometric=True, flight_findings=flight_findings)
+    return run_rules(requirements, None, geometric=True, flight_findings=flight_findings)
 
 
-def place_findings(requirements: RouteRequirements) -> tuple[Finding, ...]:
-    """Return only those geometric findings that judge legs, corners, threats and zones, not the route as a whole."""
-    return _run_rules(requirements, aligned=None, end_findings=(), geometric=True, includes_whole_flight=False)
-
-
-def track_findings(requirements: RouteRequirements, aligned: AlignedTrack | None) -> tuple[Finding, ...]:
-    """Return the findings on a flown track, compared with its route and the aircraft's envelope.
-
-    The end of the flight is not judged here; see `flown_findings`.
-    """
-    return (*blocking_item_findings(requirements.setup), *_run_rules(requirements, aligned, (), geometric=False))
-
-
-def flown_findings(
-    requirements: RouteRequirements, aligned: AlignedTrack | None, end_reason: str, log_complete: bool
-) -> tuple[Finding, ...]:
-    """Return findings on the track of a flight and on how the flight ended.
-
-    end_reason: "completed", or the reason why the flight ended early.
-    log_complete: True if the log is not cut off.
-    """
-    end_judges = [rule.judge_end for rule in RULES.values() if rule.judge_end is not None]
-    end_findings = tuple(
-        finding for judge in end_judges for finding in judge(requirements, aligned, end_reason, log_complete)
-    )
-    return (
-        *blocking_item_findings(requirements.setup),
-        *_run_rules(requirements, aligned, end_findings, geometric=False),
-    )
-
-
-def _run_rules(
+def run_rules(
     requirements: RouteRequirements,
     aligned: AlignedTrack | None,
-    end_findings: Sequence[Finding],
     *,
-    geometric: bool,
+    geometric: bool = False,
+    end_reason: str | None = None,
+    log_complete: bool = True,
     includes_whole_flight: bool = True,
     flight_findings: Sequence[Finding] | None = None,
 ) -> tuple[Finding, ...]:
-    """Run all rules, add `end_findings`, and let the rules merge the findings.
+    """Return the findings of all rules on a flown track or on a route, after the rules have merged them.
 
-    end_findings: findings on how the flight ended.
+    geometric: True to judge the route by its geometry; False to judge the flight and the mission's items.
+    end_reason: "completed", or the reason why the flight ended early; None if the end of the flight is not judged.
+    log_complete: True if the log is not cut off.
     includes_whole_flight: True to include rules that judge the whole flight, and to keep only the worst findings of
-        each stop.
+        each stop; False for only the findings on legs, corners, threats and zones.
     flight_findings: as in `geometric_findings`.
     """
-
-    def rule_findings(rule: Rule, judge: Judge) -> Sequence[Finding]:
-        """Run one rule, or take its findings from the flight's findings if they are the same for the plan."""
+    findings: list[Finding] = []
+    for rule in RULES.values():
+        if rule.judge is None or (rule.judges_whole_flight and not includes_whole_flight):
+            continue
         if rule.is_same_for_plan and flight_findings is not None:
-            return [finding for finding in flight_findings if finding.rule == rule.name]
-        return judge(requirements, aligned, geometric=geometric)
-
-    findings: tuple[Finding, ...] = tuple(
-        finding
-        for rule in RULES.values()
-        if rule.judge is not None and (includes_whole_flight or not rule.judges_whole_flight)
-        for finding in rule_findings(rule, rule.judge)
-    )
-    findings = (*findings, *end_findings)
+            findings += [finding for finding in flight_findings if finding.rule == rule.name]
+        else:
+            findings += rule.judge(requirements, aligned, geometric=geometric)
+    if end_reason is not None:
+        for rule in RULES.values():
+            if rule.judge_end is not None:
+                findings += rule.judge_end(requirements, aligned, end_reason, log_complete)
+    merged = tuple(findings)
     for rule in RULES.values():
         if rule.merge is not None:
-            findings = rule.merge(requirements, aligned, findings)
+            merged = rule.merge(requirements, aligned, merged)
     if includes_whole_flight:
-        findings = (*worst_finding_per_stop(findings), *_other_side_findings(requirements, findings))
-    return findings
+        merged = (*worst_finding_per_stop(merged), *_other_side_findings(requirements, merged))
+    return merged if geometric else (*blocking_item_findings(requirements.setup), *merged)
 
 
 # Rules that judge the aircraft's position, which depends on the side to which it turns at a course reversal.

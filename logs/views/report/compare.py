@@ -375,10 +375,9 @@ def _render_page(
     """Return the comparison's page with its pictures, charts and scripts."""
     pictures = [(*_PICTURES[name.removesuffix(".png")], picture_data_url(data)) for name, data in files.items()]
     data, script = comparison_data(flights, views), script_text(CHART_SCRIPTS)
-    verdicts = [(name, verdict.present()) for name, verdict in zip(comparison.names, comparison.verdicts, strict=True)]
     return page_template("compare.html").render(
         names=comparison.names,
-        verdicts=verdicts,
+        verdicts=list(zip(comparison.names, comparison.verdicts, strict=True)),
         rows=difference_rows(comparison),
         notes=comparison.notes,
         pictures=pictures,

@@ -277,17 +277,16 @@ def _render_page(
     """
     track, verdict = subject.track, subject.verdict
     failed = failures(verdict, len(setup.route.points))
-    shown = verdict.present()
     shown_pictures = report_pictures(subject, page_charts(views), pictures)
     return page_template("report.html").render(
         name=setup.scenario.name,
-        verdict=shown,
+        verdict=verdict,
         missed_text=missed_text,
         flown=track is not None,
-        counts=count_sentence(shown.findings),
+        counts=count_sentence(verdict.findings),
         flight_line=tables.flight_sentence(setup, track),
-        rules=[rule_row(rule) for rule in shown.rules if rule.state != "fail"],
-        findings=finding_rows(shown.findings),
+        rules=[rule_row(rule) for rule in verdict.rules if rule.state != "fail"],
+        findings=finding_rows(verdict.findings),
         notes=[
             note
             for note in tables.mission_notes(setup)

@@ -8,7 +8,7 @@ from logs.verdict.judge_flight import judge_plan_only
 from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.measures.track_alignment import align_track
 from logs.verdict.places import PLAN
-from logs.verdict.rules.registry import RULES, flown_findings
+from logs.verdict.rules.registry import RULES, run_rules
 from logs.verdict.verdict import verdict_json
 from tests.logs.verdict.judging import bad_plan, failing
 
@@ -36,7 +36,7 @@ def test_a_leg_that_is_too_short_for_its_turns_is_named_instead_of_the_margin_th
 def test_rules_come_in_the_verdicts_order() -> None:
     log = example_log()
     requirements = route_requirements(log.setup)
-    findings = flown_findings(requirements, align_track(requirements, log.track), "completed", True)
+    findings = run_rules(requirements, align_track(requirements, log.track), end_reason="completed")
     order = list(RULES)
     assert [order.index(item.rule) for item in findings] == sorted(order.index(item.rule) for item in findings)
 
@@ -44,5 +44,5 @@ def test_rules_come_in_the_verdicts_order() -> None:
 def test_without_the_envelope_nothing_is_said_of_the_stall() -> None:
     log = example_log()
     requirements = route_requirements(log.setup, envelope=False)
-    findings = flown_findings(requirements, align_track(requirements, log.track), "completed", True)
+    findings = run_rules(requirements, align_track(requirements, log.track), end_reason="completed")
     assert not [item for item in findings if item.rule == "stall"]

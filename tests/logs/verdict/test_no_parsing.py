@@ -62,7 +62,7 @@ def data_of(verdict: Verdict) -> dict[str, Any]:
 
 def used(verdict: Verdict, setup: FlightSetup) -> list[Any]:
     """What figures, report and the next round of planning take from a verdict, without words."""
-    shown = verdict.present()
+    shown = verdict
     rows = [(row.state, row.rule, row.counts, row.planned, row.flown, row.margin) for row in map(rule_row, shown.rules)]
     tighter, changes = tighten_limits(setup.scenario, verdict)
     values = [list_place_values(verdict.findings, rule) for rule in RULES]

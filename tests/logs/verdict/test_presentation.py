@@ -48,25 +48,21 @@ def test_findings_stand_by_rule_in_the_order_of_the_rules() -> None:
 
 
 def test_what_ends_a_flight_is_named_first_and_of_a_rule_the_worst() -> None:
-    failed = VERDICT.present().failed_rules
+    failed = VERDICT.failed_rules
     # Urgencies: completion 3, slope 1, clearance 0.
     assert [rule.words.name for rule in failed] == ["completion", "slope", "clearance"]
     assert [finding.place.index for finding in failed[-1].failed] == [1, 0]
 
 
 def test_the_list_has_what_failed_or_is_open_and_then_the_closest_of_each_other_rule() -> None:
-    assert [number for number, _ in VERDICT.present().findings_to_list(60)] == [0, 1, 2, 3, 7, 6]
+    assert [number for number, _ in VERDICT.findings_to_list(60)] == [0, 1, 2, 3, 7, 6]
     # Of many failures as many as are asked for; a rule whose worst failure is left out has no other finding.
-    assert [number for number, _ in VERDICT.present().findings_to_list(2)] == [0, 1, 6]
+    assert [number for number, _ in VERDICT.findings_to_list(2)] == [0, 1, 6]
 
 
 def test_the_state_is_open_where_nothing_failed_and_a_part_was_not_judged() -> None:
     def state(flyable: bool, unjudged: str, findings: tuple[Finding, ...] = ()) -> str:
-        return (
-            Verdict(findings, flyable=flyable, complete=True, lines=("a",), level="flown", unjudged=unjudged)
-            .present()
-            .state
-        )
+        return Verdict(findings, flyable=flyable, complete=True, lines=("a",), level="flown", unjudged=unjudged).state
 
     assert state(True, "") == "ok"
     assert state(False, "slopes") == "open"
@@ -82,7 +78,7 @@ def test_every_rendering_shows_the_same_failures_in_the_same_order() -> None:
     page = ElementTree.fromstring(VERDICT._repr_html_())
     cells = [[cell.text or "" for cell in row] for row in page.find("table/tbody") or ()]
     assert ["clearance", "1 of 3 ok", "", ""] in cells
-    rows = [rule_row(rule) for rule in VERDICT.present().rules]
+    rows = [rule_row(rule) for rule in VERDICT.rules]
     assert [row.counts for row in rows if row.rule == "clearance"] == ["2 of 3 fail"]
     listed = [(row["number"], row["ok"]) for row in findings_json(VERDICT, ()) if row["kind"] == "leg"]
     assert listed == [(0, None), (1, False), (2, False), (3, False), (6, True)]
@@ -114,7 +110,7 @@ def test_states_of_findings_and_of_their_rule() -> None:
 def test_the_reasons_are_the_headline_without_its_answer() -> None:
     def shown(headline: str, *, complete: bool = True, level: str = "flown") -> tuple[str, str, str]:
         verdict = Verdict(FINDINGS, flyable=False, complete=complete, lines=(headline,), level=level)
-        return verdict.present().title, verdict.present().sign, verdict.present().reasons
+        return verdict.title, verdict.sign, verdict.reasons
 
     assert shown("not flyable: slope on leg 1") == ("Not flyable", "✗", "slope on leg 1")
     assert shown("not flyable: slope", complete=False) == ("Not flyable, and incomplete", "✗", "slope")

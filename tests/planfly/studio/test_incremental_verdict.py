@@ -14,7 +14,7 @@ from flight.mission.items import Command, Mission, MissionItem
 from flight.mission.route import ROUTE_POINT, Route
 from logs.verdict.findings import Finding
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
-from logs.verdict.rules.registry import place_findings
+from logs.verdict.rules.registry import run_rules
 from planfly.studio.edit_context import EditContext
 from planfly.studio.incremental_verdict import judge_windows
 from planfly.studio.moved_route import update_moved_route
@@ -32,6 +32,10 @@ MISSIONS, MOVED, ZONES = scaled(1000, 5), scaled(300, 6), scaled(400, 150)
 # A window's path is rounded from its own beginning, and heights over ground differ by what that is worth, m.
 ROUNDED = 0.02
 Judged = dict[tuple[str, str, int], list[Any]]
+
+
+def place_findings(requirements: RouteRequirements) -> tuple[Finding, ...]:
+    return run_rules(requirements, None, geometric=True, includes_whole_flight=False)
 
 
 def by_place(findings: Sequence[Finding], shift: int = 0) -> Judged:

@@ -22,7 +22,9 @@ def without_suggestions(verdict: Verdict) -> Verdict:
 
 
 def texts(verdict: Verdict, *, suggests: bool) -> list[str]:
-    lines = verdict_lines(verdict, (), lambda: suggests)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("planfly.terminal.verdict_lines.has_geometric_suggestion", lambda _setup: suggests)
+        lines = verdict_lines(verdict, (), make_setup(ROUTE))
     return [text for line in lines for label in ("would pass: ", "no remedy: ") for text in line.split(label)[1:]]
 
 

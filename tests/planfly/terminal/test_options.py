@@ -1,6 +1,5 @@
-"""Options that several commands take, and how the API is called with them."""
+"""Options that several commands take."""
 
-import argparse
 import os
 import signal
 from collections.abc import Callable
@@ -15,20 +14,8 @@ from planfly.terminal.options import (
     add_flight_options,
     add_result_options,
     add_steering_options,
-    call_api,
     watch_stop_signals,
 )
-
-
-def test_a_call_states_the_keywords_that_the_options_name() -> None:
-    def api(mission: str, *, seed: int = 1, out: str = "here", fence: tuple[str, ...] = ()) -> tuple[Any, ...]:
-        return mission, seed, out, fence
-
-    args = argparse.Namespace(mission="a.plan", seed=3, out=None, fence=[], json="-", overwrite=True)
-    assert call_api(api, args) == ("a.plan", 3, "here", [])
-    assert call_api(api, args, seed=4, out="there") == ("a.plan", 4, "there", [])
-    assert call_api(api, args, seed=None) == ("a.plan", 1, "here", [])
-
 
 # ----------------------------------------------------------------------
 # Options that several commands take, and what each refuses.

@@ -17,7 +17,7 @@ from planfly.commands.registry import build_parser
 from planfly.rtl.return_summary import ReturnSummary
 from planfly.terminal.command_parser import error_text
 from planfly.terminal.results import print_warnings
-from planfly.terminal.verdict_lines import print_verdict
+from planfly.terminal.verdict_lines import verdict_lines
 from tests.logs.made_flight import make_setup
 from world.errors import LogError, PlanflyError
 
@@ -71,7 +71,7 @@ def test_a_value_beyond_its_limit_that_passes_is_within_its_tolerance(capsys: py
 
 
 def printed(capsys: pytest.CaptureFixture[str], verdict: Verdict, *notes: str) -> list[str]:
-    print_verdict(verdict, notes)
+    print(*verdict_lines(verdict, notes), sep="\n")
     return capsys.readouterr().out.splitlines()
 
 
@@ -186,7 +186,7 @@ def test_unsafe_returns_of_a_flyable_mission_follow_its_first_line(
     returns: Any = SimpleNamespace(safe=safe, undecided=undecided, each=(None,))
     summary = ReturnSummary("all 3 returns violate town", returns=returns)
     verdict = Verdict((), flyable=answer == "flyable", complete=True, lines=ANSWER_LINES[answer], level="geometric")
-    print_verdict(verdict, ["a note"], returns=summary)
+    print(*verdict_lines(verdict, ["a note"], returns=summary), sep="\n")
     lines = capsys.readouterr().out.splitlines()
     (place,) = [number for number, line in enumerate(lines) if line.startswith("returns")]
     assert place == row % len(lines)
@@ -196,5 +196,5 @@ def test_unsafe_returns_of_a_flyable_mission_follow_its_first_line(
 
 def test_a_mission_without_a_home_has_no_line_on_returns(capsys: pytest.CaptureFixture[str]) -> None:
     verdict = Verdict((), flyable=True, complete=True, lines=("flyable",), level="geometric")
-    print_verdict(verdict, [], returns=ReturnSummary())
+    print(*verdict_lines(verdict, [], returns=ReturnSummary()), sep="\n")
     assert "returns" not in capsys.readouterr().out

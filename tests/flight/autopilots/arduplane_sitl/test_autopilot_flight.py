@@ -17,7 +17,6 @@ from aircraft.catalog import load_aircraft
 from flight.autopilots.arduplane_sitl import physics
 from flight.autopilots.arduplane_sitl.flight import AutopilotFlight, fly_autopilot
 from flight.simulation.setup import FlightSetup
-from flight.simulation.simulate import simulate
 from tests.autopilots import arduplane_program, shorten_run_in
 from tests.flight.autopilots.arduplane_sitl.conftest import MakeFake
 from tests.mission_lines import setup_of, wp
@@ -175,7 +174,7 @@ def test_an_exception_ends_the_program_and_removes_its_folder(
     before, folders = children(), left_behind()
 
     def interrupt(flight: AutopilotFlight) -> None:
-        next(simulate(flight))
+        flight.fly_block(60)
         raise KeyboardInterrupt
 
     monkeypatch.setattr("flight.autopilots.arduplane_sitl.flight.fly_to_end", interrupt)

@@ -22,8 +22,8 @@ from flight.autopilots.sitl.flight import launch_rail
 from flight.autopilots.sitl.mission import make_uploaded_mission
 from flight.guidance.navigation_error import MOTION
 from flight.mission.items import Command
-from flight.simulation.running_flight import Release
 from flight.simulation.setup import FlightSetup
+from flight.simulation.simulate import Release
 from logs.verdict.judge_flight import judge_flight
 from tests.autopilots import arduplane_program
 from tests.flight.autopilots.arduplane.flown_grounds import circuit

@@ -69,7 +69,7 @@ def test_tables_call_a_rule_as_the_terminal_does() -> None:
 
 def test_the_parameter_stands_at_the_finding_that_it_decides_alone() -> None:
     low = failed("clearance", 52.0, 60.0, -8.0)
-    remedy_text = Verdict((low,), False, True, (), "flown", deciding=DECIDING).present().remedy_text
+    remedy_text = Verdict((low,), False, True, (), "flown", deciding=DECIDING).remedy_text
     assert remedy_text(low) == "the plan as it is, with TECS_HDEM_TCONST 1.2\u00a0s instead of 3"
     assert remedy_text(failed("clearance", 52.0, 60.0, -8.0, Place("leg", 5))) == ""
     assert remedy_text(failed("height", 52.0, 60.0, -8.0)) == ""
@@ -85,7 +85,7 @@ def test_the_remedy_of_a_ground_contact_comes_first(clearance: float, advised: s
         replace(failed(rule, flown, limit, flown - limit), suggestions=(changes[rule],))
         for rule, flown, limit in (("slope", -6.0, -4.6), ("clearance", clearance, 30.0))
     )
-    first = Verdict(findings, False, True, (), "flown").present().first_remedied
+    first = Verdict(findings, False, True, (), "flown").first_remedied
     assert first is not None
     assert first.rule == advised
 
@@ -108,7 +108,7 @@ def test_the_remedy_of_a_ground_contact_comes_first(clearance: float, advised: s
 def test_title_states_the_verdict(
     flyable: bool, complete: bool, level: str, findings: tuple[Finding, ...], label: str
 ) -> None:
-    shown = Verdict(findings, flyable, complete, (), level).present()
+    shown = Verdict(findings, flyable, complete, (), level)
     assert shown.title == label
     assert shown.state == ("ok" if flyable else "fail")
 
@@ -197,5 +197,5 @@ def test_a_verdict_that_leaves_something_open_neither_passes_nor_fails() -> None
         " limits are uncertain",
     )
     levels = (LevelAnswer("geometry", False, lines[0], undecided=True),)
-    shown = Verdict((), False, True, lines, "geometric", levels, unjudged="slope on leg 1").present()
+    shown = Verdict((), False, True, lines, "geometric", levels, unjudged="slope on leg 1")
     assert (shown.state, shown.title, shown.reasons) == ("open", "Not judged in full", lines[0].partition(": ")[2])
