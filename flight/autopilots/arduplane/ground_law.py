@@ -269,6 +269,9 @@ def end_status(work: Record, ground: Record) -> int:
 
     work: a `flight.simulation.tick.WORKSPACE` record.
     ground: a `GROUND_STATE` record, filled by this control law or from the flight of ArduPlane's program.
+
+    Ground contact ends the flight on the legs of the mission, after lift-off, and far from the landing point. Near the
+    landing point it is a touchdown: the flight is complete once the aircraft has been at rest for `_STOPPED_TIME_S`.
     """
     state, ground_speed = work.state, math.hypot(work.true.velocity_east, work.true.velocity_north)
     is_battery_empty = work.air.energy >= work.settings.battery
@@ -421,7 +424,7 @@ def _leveling_fraction(estimated: Record, parameters: Record, ground: Record) ->
     """Return the factor (0..1) by which the minimum pitch is reduced near the end of the take-off.
 
     Follows `Plane::get_takeoff_pitch_min_cd`: the reduction begins once the climb would reach the end altitude within
-    TKOFF_PLIM_SEC. Before that the factor is 1.
+    TKOFF_PLIM_SEC; the height and the time of its beginning are stored in ``ground``. Before that the factor is 1.
 
     estimated: estimated position and velocity over the ground, a `MOTION` record.
     parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
@@ -502,7 +505,8 @@ def _begin_first_leg(
 def _tick_landing(work: Record, arduplane: Record, landing_point: Record) -> None:
     """Set the commands for one tick of the landing.
 
-    Navigation and TECS run every `NAVIGATION_TICK_S`, the attitude controllers in each tick.
+    Navigation and TECS run every `NAVIGATION_TICK_S`, the attitude controllers in each tick. In the flare the throttle
+    closes at its slew rate.
 
     work: state, commands and settings of the flight, a `WORKSPACE` record; updated.
     arduplane: parameters and memories of the control law and of take-off and landing; updated.
@@ -592,7 +596,8 @@ def _update_stage(
 ) -> None:
     """Begin the approach stage or the flare once its condition is met.
 
-    Follows `AP_Landing::type_slope_verify_land`.
+    The approach begins once the aircraft is lined up, in any case after half of the line. The flare begins at a height,
+    or at a time before the ground, or past the landing point. Follows `AP_Landing::type_slope_verify_land`.
 
     estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
     parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.

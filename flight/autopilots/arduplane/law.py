@@ -118,7 +118,8 @@ _RTL_CLIMB_EXTRA_M = 10.0
 def update_height_demand(estimated: Record, target: Record, parameters: Record, memory: Record, dt: float) -> None:
     """Update the altitude demand for the current leg; it has a limited rate and lags its target.
 
-    Follows `AP_TECS::_update_height_demand`.
+    While throttle or pitch is at its limit, the target does not move further away from the aircraft. Follows
+    `AP_TECS::_update_height_demand`.
 
     estimated: a record of `flight.guidance.navigation_error.MOTION`.
     target: the leg's end, a record of `flight.guidance.lateral_reference_laws.WAYPOINT`.
@@ -432,7 +433,8 @@ def control_as_ardupilot(
     """Compute the commands for one tick of ``dt`` s, and update the memories ``guidance`` and ``memory``.
 
     ArduPlane's navigation and TECS run every `NAVIGATION_TICK_S`, its attitude controllers in each tick. ArduPlane does
-    not use the path: the track is only measured against it.
+    not use the path: the track is only measured against it. The end of the mission's last loiter or RTL is noted in
+    ``guidance``.
 
     state, estimated: true attitude, airspeed and rates, a `STATE` record, and estimated motion, a `MOTION` record.
     pieces, nodes: course and altitude profile of the reference path, arrays of a `FlyByPath`.

@@ -127,7 +127,10 @@ def navigate_legs(
 
 @inner
 def target_position(waypoint: Record) -> tuple[float, float]:
-    """Return east and north of a waypoint, m; for a waypoint on a loiter, of the loiter's center."""
+    """Return east and north of the point to which ArduPlane flies, m: a loiter's center, or the waypoint itself.
+
+    For an RTL the waypoint itself is returned.
+    """
     return (
         (waypoint.centre_east, waypoint.centre_north)
         if waypoint.loiter_radius != 0.0 and not waypoint.is_rtl
@@ -175,7 +178,8 @@ def _follow_line(
 def keep_turn_side(estimated: Record, angle: float, target_e: float, target_n: float, memory: Record) -> float:
     """Return L1's angle (rad), or the last angle if the new angle would reverse a turn of almost 180 degrees.
 
-    Follows `AP_L1_Control::_prevent_indecision`, with the course instead of the heading.
+    The result is stored as the last angle. Follows `AP_L1_Control::_prevent_indecision`, with the course instead of the
+    heading.
 
     angle: angle from the direction to the L1 point to the ground velocity, rad (`-Nu`).
     target_e, target_n: position that the aircraft flies to, m.
@@ -258,8 +262,9 @@ def _is_leg_over(
 ) -> bool:
     """Return True if the leg's end is within the turn distance, or if the aircraft is past the end.
 
-    Follows `Plane::verify_nav_wp`. A leg is never over while the aircraft is further than WP_MAX_RADIUS from the
-    target; an aircraft that passes the target at such a distance turns back to it.
+    Follows `Plane::verify_nav_wp`. The aircraft must be past the end of a leg to a fly-over waypoint. A leg is never
+    over while the aircraft is further than WP_MAX_RADIUS from the target; an aircraft that passes the target at such a
+    distance turns back to it.
 
     end_e, end_n: end of the leg, m, to which the aircraft flies; with a pass-by distance it lies beyond the target.
     turn_angle: turn of the route at the target, rad.
@@ -404,8 +409,8 @@ def _is_heading_lined_up(
 
     The tolerance grows with each lap. From a loiter with an exit bearing, the aircraft leaves on this bearing. If the
     next waypoint is inside the circle, no tangent leads to it, and the aircraft leaves on a tangent that passes the
-    waypoint. Follows `ModeLoiter::isHeadingLinedUp`, whose tangent touches the circle in the direction of the aircraft
-    from the center.
+    waypoint. If the next waypoint is the loiter's center, the aircraft leaves at once. Follows
+    `ModeLoiter::isHeadingLinedUp`, whose tangent touches the circle in the direction of the aircraft from the center.
 
     estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
     next_waypoint: `WAYPOINT` record of the next leg's end.
