@@ -196,6 +196,7 @@ def guide_to_path(
     curvature: 1/m, positive to the right.
     wind_east, wind_north: velocity of the air, m/s.
     target_airspeed: m/s. If the ground speed would be too low at this airspeed, ``memory.min_airspeed`` is set.
+    parameters, memory: PX4's parameters, and the control law's memory, a `PX4_MEMORY` record.
     """
     air_east, air_north = estimated.velocity_east - wind_east, estimated.velocity_north - wind_north
     airspeed = max(0.1, math.hypot(air_east, air_north))
@@ -256,7 +257,8 @@ def follow_leg(
 ) -> None:
     """Guide the aircraft onto the line from the leg's start to its end (`navigateWaypoints`).
 
-    Before the start, and further from it than the switch distance, it flies straight to the start; past the end, to it.
+    An aircraft past the end flies straight back to the end. An aircraft before the start, and further from it than the
+    switch distance, flies straight to the start.
     estimated: position and velocity over the ground, a `MOTION` record.
     end_east, end_north: end of the leg, m. Its start is in the memory.
     wind_east, wind_north, target_airspeed: velocity of the air and airspeed to fly at, m/s.

@@ -447,9 +447,10 @@ def begin_leg(estimated: Record, waypoints: Records, leg: int, memory: Record) -
 
 @inner
 def is_past_corner(estimated: Record, corner: Record) -> bool:
-    """Return True if an aircraft on a loiter has passed a corner of the loiter by less than 90 degrees.
+    """Return True if an aircraft on a loiter has passed a waypoint on its circle by less than 90 degrees.
 
     estimated: estimated position and velocity over the ground, a `MOTION` record.
+    corner: the waypoint on the circle, with the circle's center and radius, a `WAYPOINT` record.
     """
     corner_bearing = math.atan2(corner.east - corner.centre_east, corner.north - corner.centre_north)
     bearing = math.atan2(estimated.east - corner.centre_east, estimated.north - corner.centre_north)
