@@ -244,7 +244,8 @@ def ground_loop(
 def update_ground_contact(state: Record, clearance: float, ground: Record) -> None:
     """Update the flags that show whether the aircraft touches the ground and whether it has tipped over.
 
-    The ground is level, as in JSBSim.
+    The aircraft has tipped over if it does not stand on the lowest of its points that touch the ground. The ground is
+    level, as in JSBSim.
 
     state: a `flight.dynamics.state.STATE` record.
     clearance: height of the center of gravity above ground, m.
@@ -272,6 +273,8 @@ def end_status(work: Record, ground: Record) -> int:
 
     Ground contact ends the flight on the legs of the mission, after lift-off, and far from the landing point. Near the
     landing point it is a touchdown: the flight is complete once the aircraft has been at rest for `_STOPPED_TIME_S`.
+    Take-off and landing also end if the aircraft banks too far or tips over, and with an empty battery in the air.
+    A take-off ends if the motor does not start, and a landing if the aircraft stalls before the flare.
     """
     state, ground_speed = work.state, math.hypot(work.true.velocity_east, work.true.velocity_north)
     is_battery_empty = work.air.energy >= work.settings.battery

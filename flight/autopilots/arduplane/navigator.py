@@ -48,7 +48,8 @@ _SAME_PLACE_M = 0.01
 def turn_distance(acceptance: float, turn_angle: float, wp_radius: float, l1_distance: float, eas2tas: float) -> float:
     """Return the distance before a waypoint at which ArduPlane turns to the next leg, m.
 
-    The distance is 0 if ArduPlane flies to the waypoint itself.
+    This is the acceptance radius that the mission states. Without one it is the smaller of WP_RADIUS and the L1
+    distance, reduced in proportion for a turn of less than 90 degrees.
 
     Follows `AP_L1_Control::turn_distance`.
 
@@ -90,6 +91,9 @@ def navigate_legs(
     dt: float,
 ) -> None:
     """Set the lateral acceleration demand on the current leg, and begin the next leg once this leg is over.
+
+    A leg to a waypoint follows the line to it, a leg to a loiter also flies around the loiter, and an RTL lasts until
+    it joins the landing sequence. The last leg of the route never ends here.
 
     estimated: a record of `flight.guidance.navigation_error.MOTION`.
     waypoints: (w,) of `flight.guidance.lateral_reference_laws.WAYPOINT`.
@@ -304,8 +308,8 @@ def _update_loiter(
 ) -> None:
     """Fly to a loiter and around it, until the loiter is complete and the aircraft heads for the next waypoint.
 
-    Follows `Plane::update_loiter`: far from the circle the aircraft flies straight to its centre, then around it. The
-    next leg begins once the loiter is complete and the course leads to the next waypoint that is not on the circle.
+    Follows `Plane::update_loiter`: far from the circle the aircraft flies straight to its center, then around it. The
+    next leg begins once the loiter is complete and the course leads to the next waypoint of another stop.
 
     estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
     waypoints: `WAYPOINT` records of the route, (w,).

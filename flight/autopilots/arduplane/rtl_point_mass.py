@@ -269,13 +269,12 @@ def fly_stages(
     positions: Floats,
     result: Record,
 ) -> None:
-    """Simulate the flight from stage to stage for up to ``timeout`` s; fill the `RETURN_RESULT` ``result``.
+    """Simulate the flight from stage to stage for up to ``timeout`` s; fill ``positions`` and ``result``.
 
     start, stages: `RETURN_START` record, and successive targets, loiters or waypoints, as `WAYPOINT` records (n,).
     climb, climb_parameters: the climb at the start and its parameters. engine_out: True if the engine failed there.
     min_clearance, min_distance: height above ground and distance outside spheres, m, below which the flight is aborted.
-    positions: rows of east, north, up to fill, m, one per second. aircraft, excesses, power, field: a `PointMass`.
-    heights, to_pixel, has_terrain, spheres, radii: terrain and kill spheres as in `ReturnEnvironment`.
+    positions: one row a second, m. aircraft to field, heights to has_terrain: a `PointMass` and a `ReturnEnvironment`.
     """
     spaced, progress_records = np.zeros(6, WAYPOINT), np.zeros(1, LOITER_PROGRESS)  # Spaced as in `waypoint_column`.
     waypoints, loiter = spaced[::2], progress_records[0]

@@ -91,6 +91,8 @@ def navigate(
 ) -> None:
     """Follow the current leg, set the altitude setpoint, and begin the next leg once the target is reached.
 
+    The target is the next waypoint, loiter or RTL. Gates before it only divide the way to it into legs.
+
     estimated: a record of `flight.guidance.navigation_error.MOTION`.
     waypoints: (w,) of `flight.guidance.lateral_reference_laws.WAYPOINT`.
     wind_east, wind_north: velocity of the air, m/s.

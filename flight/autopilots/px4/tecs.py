@@ -75,6 +75,7 @@ def update_tecs(
 ) -> None:
     """Update the throttle and pitch setpoints for the altitude setpoint and an airspeed setpoint.
 
+    The throttle controls the total energy, the pitch its distribution between altitude and airspeed.
     Follows `TECS::update` and `TECSControl::update`, with `_calcAltitudeControlOutput` and
     `_calcAirspeedControlOutput`.  The setpoint of the SKE rate follows from the airspeed setpoint
     (`_calcSpecificEnergyRates`).
