@@ -320,7 +320,7 @@ def campaign_flight(
     index: number of the flight, from 0.  out: the campaign's folder.
     Raises a `planfly.PlanflyError` for bad input, and if the result of the flight differs from the table.
     """
-    check_arguments(index=index, seed=options["seed"])
+    check_arguments(index=index)
     folder = Path(out)
     goal = continued_goal(folder, options["flights"], options["prove"], options["at_least"], options["confidence"])
     directory = OutputDirectory(folder, CAMPAIGN_DATABASE, resume=True, overwrite=False)

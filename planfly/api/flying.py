@@ -154,8 +154,6 @@ def fly(
     ('completed', True, 4.0)
     """
     limits = FlightLimits(options["max_hours"], options["max_log"])
-    checked_options = {name: options[name] for name in ("seed", "log_hz", "max_hours", "max_log", "engine")}
-    check_arguments(**checked_options)
     program = None if options["sitl"] is None else check_program(options["sitl"])
     setup = open_flight(mission, options, program, options["engine"])
     target = None if log is None else _prepare_log_file(log, setup, mission, program, overwrite)

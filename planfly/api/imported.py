@@ -59,7 +59,6 @@ def read_imported(log: str | Path, **options: Unpack[LogOptions]) -> ImportedFli
         if (value := dict(options)[name]) is not None:
             allowed = "not allowed for an imported flight, which is judged with the autopilot and the speeds of its log"
             raise ScenarioError.of_argument(name, value, allowed, shown="", file=log)
-    check_arguments(flight=options["flight"], datum=options["datum"])
     return import_flight(Path(log), options)
 
 

@@ -77,7 +77,6 @@ def plan(
     >>> planfly.plan("tight", waypoints=mine)
     <Plan tight: 22 waypoints, not feasible, ...>
     """
-    check_arguments(seed=options["seed"], budget=options["budget"], seconds=options["seconds"])
     world = _with_budget(load_scenario_with_options(scenario, options), options["budget"])
     if waypoints is None:
         return _search_and_write(
@@ -174,7 +173,7 @@ def replan(
     >>> again.flown_legs, bool((again.waypoints[:4] == path.waypoints[:4]).all())
     (3, True)
     """
-    check_arguments(seed=options["seed"], budget=options["budget"], seconds=options["seconds"], at_leg=at_leg)
+    check_arguments(at_leg=at_leg)
     world = _with_budget(load_scenario_with_options(scenario, options), options["budget"])
     old_plan = old if isinstance(old, Plan) else read_plan(Path(old))
     check_same_mission(world, old_plan)

@@ -114,7 +114,7 @@ def predict(
     """
     if options["aircraft"] is None:
         raise PlanflyError.of_argument("aircraft", None, "name the aircraft that predicts the flight", shown="")
-    check_arguments(flight=options["flight"], datum=options["datum"], start=start)
+    check_arguments(start=start)
     if out is not None:
         check_output_folder(Path(out), overwrite)
     name = str(options["aircraft"])

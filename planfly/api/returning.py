@@ -235,7 +235,7 @@ def returns(
     >>> found.safe, found.returns.ranges[0].worst.target.name, found.glides.each[0].reach
     (False, 'home', 'home')
     """
-    check_arguments(every=every, points=points, seed=options["seed"], flight=options["flight"], datum=options["datum"])
+    check_arguments(every=every, points=points)
     path = Path(what) if isinstance(what, str | Path) else None
     request = _check_request(every, suggest, out, sitl, points, overwrite=overwrite)
     if path is not None and is_imported_log(path):

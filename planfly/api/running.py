@@ -158,10 +158,7 @@ def run(
     (False, 1, ['plan.json', 'mission.waypoints', 'mission.plan'])
     """
     limits = FlightLimits(options["max_hours"], options["max_log"])
-    check_arguments(
-        seed=seed, refine=refine, log_hz=options["log_hz"], max_hours=limits.hours, max_log=limits.megabytes
-    )
-    check_arguments(engine=options["engine"])
+    check_arguments(seed=seed, refine=refine)
     program = None if options["sitl"] is None else check_program(options["sitl"])
     world = load_scenario_with_options(scenario, options, program)
     chosen_seed, uav = choose_seed(world, seed), load_uav(world)

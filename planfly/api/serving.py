@@ -60,7 +60,7 @@ def serve(
     from planfly.live.served_vehicle import serve_vehicle
 
     access = link_access(to, bind, allow, sign_key)
-    check_arguments(served_speed=speed, seed=options["seed"])
+    check_arguments(served_speed=speed)
     serve_options = ServeOptions("" if mission is None else str(mission), speed, Path(log), options)
     flights = load_served_scenario(serve_options)
     if serve_options.logs.exists() and not serve_options.logs.is_dir():

@@ -30,7 +30,7 @@ from logs.verdict.measures.waypoint_circles import circles_text, waypoint_circle
 from logs.verdict.verdict import Verdict
 from logs.views.surveys import survey_chart
 from planfly.api.flying import check_keywords_not_given
-from planfly.arguments import CAMERA_FORMAT, check_arguments, is_valid_camera
+from planfly.arguments import CAMERA_FORMAT, is_valid_camera
 from planfly.flight_logs import is_log
 from planfly.flight_options import MissionOptions
 from planfly.kernel_units.unit_kernels import FLYING
@@ -196,7 +196,6 @@ def survey(
     options: options of a mission, see `planfly.fly`.
     Raises a `planfly.PlanflyError` for bad input, and for a mission without a survey.
     """
-    check_arguments(seed=options["seed"])
     user_camera = _parse_camera(camera)
     fixed_options: dict[str, Any] = {**options, "fence": options["fence"] or None, "suggest": suggest or None}
     if out is not None:

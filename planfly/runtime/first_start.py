@@ -14,7 +14,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import ParamSpec, TypeVar, get_args, get_type_hints
 
-from planfly.flight_options import option_defaults
+from planfly.arguments import check_arguments
+from planfly.flight_options import RANGED_OPTIONS, option_defaults
 from planfly.kernel_units.unit_kernels import list_unit_kernels
 from planfly.runtime.stages import has_receiver, report_line, stage
 from world.argument_types import check_types
@@ -188,7 +189,7 @@ def api_function(*kernel_units: str) -> Callable[[Callable[_Parameters, _Result]
     The options of an ``Unpack[...]`` parameter are listed in its signature, with their defaults.
 
     kernel_units: see `warm_up`.
-    The function raises the ArgumentError of `world.argument_types.check_types`.
+    The function raises the ArgumentErrors of `world.argument_types.check_types` and `check_arguments`.
 
     >>> from typing import Unpack
     >>> from planfly.flight_options import MissionOptions
@@ -223,8 +224,10 @@ def api_function(*kernel_units: str) -> Callable[[Callable[_Parameters, _Result]
                     hint = did_you_mean(name, signature.parameters)
                     raise TypeError(f"{function.__name__}() got an unexpected keyword argument {name!r}{hint}")
             checked_args, checked_keywords = check_types(signature, args, keywords)
+            all_keywords = {**defaults, **checked_keywords}
+            check_arguments(**{name: all_keywords[name] for name in RANGED_OPTIONS if name in defaults})
             with warm_up(*kernel_units):
-                return function(*checked_args, **{**defaults, **checked_keywords})
+                return function(*checked_args, **all_keywords)
 
         checked_function.__signature__ = signature  # type: ignore[attr-defined]
         return checked_function

@@ -65,7 +65,7 @@ def open_studio(
     Raises a `planfly.PlanflyError` for bad input.
     """
     end_repeated_call()
-    check_arguments(seed=options["seed"], port=port)
+    check_arguments(port=port)
     listener = _open_listener(port)
     with contextlib.closing(listener):
         target = str(what)
