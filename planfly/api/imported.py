@@ -13,10 +13,10 @@ from logs.recording.recover import recover_log
 from logs.verdict.imported.model_comparison import Reflight
 from logs.verdict.judge_flight import judge_flight
 from logs.views.report.text import list_not_reflown, refly_lines
+from planfly.api.api_function import api_function
 from planfly.arguments import check_arguments
 from planfly.flight_options import LogOptions
 from planfly.kernel_units.unit_kernels import FLYING
-from planfly.runtime.first_start import api_function
 from planfly.runtime.stages import stage
 from planfly.workflow.imported_flights import ImportedFlight, fly_again, import_flight
 from planfly.workflow.output_paths import (

@@ -11,11 +11,11 @@ from numpy.typing import ArrayLike
 
 from flight.autopilots.catalog import load_autopilot
 from logs.verdict.conditions import Conditions, plan_conditions
+from planfly.api.api_function import api_function
 from planfly.arguments import check_arguments
 from planfly.flight_options import PlanOptions, load_scenario_with_options
 from planfly.kernel_units.unit_kernels import PLANNING
 from planfly.planning.expected_failures import expected_failures
-from planfly.runtime.first_start import api_function
 from planfly.runtime.stages import stage
 from planfly.threat_tables import GivenThreats, threat_tables
 from planfly.workflow.make_plan import make_given_plan, make_plan

@@ -35,6 +35,7 @@ from logs.verdict.returns.returns_text import (
 from logs.verdict.returns.suggest_returns import Remedy, is_improvement, suggest_parameters, suggest_rally_points
 from logs.verdict.suggestions import home_height, home_height_text
 from logs.views.exports.map_files import glide_shapes, kml_text, map_zones, plan_line, return_lines, track_line
+from planfly.api.api_function import api_function
 from planfly.api.flying import check_keywords_not_given, check_program
 from planfly.arguments import check_arguments
 from planfly.flight_logs import is_log
@@ -48,7 +49,6 @@ from planfly.rtl.sitl_returns import (
     check_returns_as_arduplane,
     fly_by_program,
 )
-from planfly.runtime.first_start import api_function
 from planfly.runtime.stages import stage
 from planfly.workflow.open_flight import open_flight
 from planfly.workflow.output_paths import RETURN_FILES, check_output_folder, clean_folder

@@ -5,10 +5,10 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Unpack
 
+from planfly.api.api_function import api_function
 from planfly.arguments import check_arguments
 from planfly.flight_options import MissionOptions
 from planfly.kernel_units.unit_kernels import FLYING
-from planfly.runtime.first_start import api_function
 from planfly.runtime.process_setup import end_repeated_call
 from world.errors import FlightError, PlanflyError
 from world.extras import requires_extra

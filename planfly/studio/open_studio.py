@@ -11,10 +11,10 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Unpack
 
+from planfly.api.api_function import api_function
 from planfly.arguments import check_arguments
 from planfly.flight_options import MissionOptions
 from planfly.kernel_units.unit_kernels import PLANNING_AND_FLYING
-from planfly.runtime.first_start import api_function
 from planfly.runtime.process_setup import end_repeated_call
 from planfly.studio.session import open_session
 from world.errors import PlanflyError
