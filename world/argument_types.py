@@ -19,7 +19,7 @@ _Result = TypeVar("_Result")
 def checks_types(function: Callable[_Parameters, _Result]) -> Callable[_Parameters, _Result]:
     """Decorate a function of the API so that wrong argument types raise the ArgumentError of `check_types`.
 
-    The function has no options; for a function with options use `planfly.runtime.first_start.api_function`.
+    The function has no options; for a function with options use `planfly.api.api_function.api_function`.
 
     >>> @checks_types
     ... def read(log: str | Path) -> None: ...
