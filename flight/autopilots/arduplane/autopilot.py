@@ -51,7 +51,7 @@ from flight.autopilots.parts import (
     TurnRules,
 )
 from flight.guidance.equivalent_airspeed import eas_to_tas_ratio
-from flight.mission.ground_phases import GroundPhases, TakeOff
+from flight.mission.ground_phases import GroundPhases
 from flight.mission.items import LANDINGS, Command
 from flight.mission.itinerary import Loiter
 from flight.mission.loiter_circles import LoiterRules
@@ -577,7 +577,13 @@ class ArduPlaneFromGround:
             ground.home_up = take_off.home_altitude
             ground.takeoff_end_altitude = take_off.end_altitude
             ground.launch_up = take_off.home[2]
-            ground.takeoff_pitch, ground.leg = self._climb_pitch(take_off), take_off.waypoint
+            ground.takeoff_pitch, ground.leg = take_off.pitch, take_off.waypoint
+            # If the motor runs before the launch, TECS runs too. The launch then winds up the pitch integrator of TECS
+            # to the maximum pitch, as two flights of ArduPlane 4.6.3 showed. If the launch acceleration starts the
+            # motor, ArduPlane climbs with the item's pitch, as five flights showed.
+            if self.motor_start == -math.inf and take_off.acceleration > 0.0:
+                max_pitch = min(parameters.pitch_limit_max, parameters.tecs_pitch_max or math.inf)
+                ground.takeoff_pitch = max(take_off.pitch, max_pitch)
             # Time since the ground speed reached 5 m/s, from which on ArduPlane knows its course over the ground.
             acceleration = take_off.acceleration
             ground.time_at_course_speed = (
@@ -595,18 +601,6 @@ class ArduPlaneFromGround:
             ground.flares_by_demand = self.parameters.version != "4.6"
             ground.flare_height, ground.flare_distance = glide.flare_height, glide.flare_distance
             ground.airspeed = landing_airspeed(self.parameters, approach.tail_wind)
-
-    def _climb_pitch(self, take_off: TakeOff) -> float:
-        """Return the climb pitch of a take-off, rad: the pitch of the take-off item, or the maximum pitch.
-
-        If the motor runs before the launch, TECS runs too. The launch then winds up the pitch integrator of TECS to the
-        maximum pitch, as two flights of ArduPlane 4.6.3 showed. If the launch acceleration starts the motor, ArduPlane
-        climbs with the item's pitch, as five flights showed.
-        """
-        if self.motor_start > -math.inf or take_off.acceleration <= 0.0:
-            return take_off.pitch
-        parameters = self.parameters
-        return max(take_off.pitch, min(parameters.pitch_limit_max, parameters.tecs_pitch_max or math.inf))
 
 
 # On a field lower than home by more than this, m, the flare climbs ...
