@@ -199,8 +199,18 @@ class ArduPlane(Autopilot):
 
         The others are FENCE_OPTIONS and BATT_*. Unsimulated settings are those of the simulated autopilot, not those of
         a flight with the ArduPlane program.
+
+        >>> default = ArduPilotParameters.defaults()
+        >>> [len(ArduPlane(default.changed(MIS_OPTIONS=bits)).checks.parameter_notes) for bits in (0, 1, 8)]
+        [0, 1, 0]
         """
-        parameters = self.parameters
+        parameters, mission_notes = self.parameters, list[str]()
+        if int(parameters["MIS_OPTIONS"]) & _CLEAR_AT_START:
+            # `AP_Mission::init`; a mission uploaded after the start is flown.
+            mission_notes.append(
+                f"MIS_OPTIONS {parameters['MIS_OPTIONS']:g} clears the mission each time ArduPlane starts: upload the"
+                " mission after the last power-up"
+            )
         return MissionChecks(
             dialect="ardupilot",
             resets_jump_counters=parameters.resets_jump_counters,
@@ -210,7 +220,7 @@ class ArduPlane(Autopilot):
             ),
             battery_failsafes=battery_failsafes(parameters),
             describe_unsimulated_settings=partial(self.describe_unsimulated_settings, by_program=False),
-            parameter_notes=(*parameters.notes, *_mission_notes(parameters)),
+            parameter_notes=(*parameters.notes, *mission_notes),
         )
 
     @property
@@ -683,20 +693,3 @@ def _radius_growth(amsl: float) -> float:
     The ratio is the square of the ratio of true to equivalent airspeed.
     """
     return float(eas_to_tas_ratio(amsl)) ** 2
-
-
-def _mission_notes(parameters: ArduPilotParameters) -> list[str]:
-    """Return a note if ArduPlane clears its mission when it starts (`AP_Mission::init`).
-
-    The note says that a mission uploaded after the start is flown.
-
-    >>> default = ArduPilotParameters.defaults()
-    >>> [len(_mission_notes(default.changed(MIS_OPTIONS=bits))) for bits in (0, 1, 8)]
-    [0, 1, 0]
-    """
-    if not int(parameters["MIS_OPTIONS"]) & _CLEAR_AT_START:
-        return []
-    return [
-        f"MIS_OPTIONS {parameters['MIS_OPTIONS']:g} clears the mission each time ArduPlane starts: upload the mission"
-        " after the last power-up"
-    ]
