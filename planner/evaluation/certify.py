@@ -257,17 +257,17 @@ def _clearance_margin(data: ProblemArrays, waypoints: Floats, problems: list[str
     problems += _summarise_faults([(0.0, name, "leaves the terrain data") for name in off_terrain])
     problems += _summarise_faults(
         [
-            (place.margin, name, f"{_ground_text(place.height)} at its lowest point; {required_text}")
+            (
+                place.margin,
+                name,
+                f"{abs(place.height):.1f} m {'below' if place.height < 0.0 else 'above'} ground at its lowest point;"
+                f" {required_text}",
+            )
             for name, place in too_low.items()
             if name not in off_terrain
         ]
     )
     return _without_rounding(float(margins.min()))
-
-
-def _ground_text(height: float) -> str:
-    """Describe a height above ground, m, that is negative below the ground."""
-    return f"{abs(height):.1f} m {'below' if height < 0.0 else 'above'} ground"
 
 
 class _LowPlace(NamedTuple):

@@ -69,7 +69,13 @@ def tracked_pieces(data: ProblemArrays, waypoints: Floats) -> Records:
     pieces = np.zeros((count - 1) * (len(_CUTS) + 3) + 2 * count, dtype=TRACKED_PIECE)
     piece_count = 0
     for i in range(count - 1):
-        piece_ends, begin_fraction = _piece_ends(lags[i].decay, legs[i].run), 0.0
+        # Ends of the pieces, as increasing fractions of the leg; the last is 1.
+        piece_ends, begin_fraction = np.ones(len(_CUTS) + 3), 0.0
+        for cut in range(len(_CUTS)):
+            piece_ends[cut] = min(1.0, _CUTS[cut] / max(1e-9, lags[i].decay))
+        end_zone = min(1.0, END_DISTANCE_M / max(1e-9, legs[i].run))
+        piece_ends[len(_CUTS)], piece_ends[len(_CUTS) + 1] = end_zone, 1.0 - end_zone
+        sort_few(piece_ends)
         for end_fraction in piece_ends:
             if end_fraction <= begin_fraction:
                 continue
@@ -101,21 +107,6 @@ def tracked_pieces(data: ProblemArrays, waypoints: Floats) -> Records:
                 _set_deviations(lags[i], 0.0, min(1.0, corners[i].after / max(1e-6, legs[i].run)), piece)
             piece_count += 1
     return pieces[:piece_count]
-
-
-@inner
-def _piece_ends(decay: float, horizontal_length: float) -> Floats:
-    """Return the ends of the pieces of a leg, as increasing fractions of the leg; the last is 1.
-
-    decay: length of the leg, in multiples of the lag length.
-    """
-    fractions = np.ones(len(_CUTS) + 3)
-    for k in range(len(_CUTS)):
-        fractions[k] = min(1.0, _CUTS[k] / max(1e-9, decay))
-    end_zone = min(1.0, END_DISTANCE_M / max(1e-9, horizontal_length))
-    fractions[len(_CUTS)], fractions[len(_CUTS) + 1] = end_zone, 1.0 - end_zone
-    sort_few(fractions)
-    return fractions
 
 
 @inner
@@ -298,7 +289,27 @@ def heights_above_ground(data: ProblemArrays, waypoints: Floats) -> Records:
     Return `CERTIFIED_PIECE` records, first of its legs, then of its arcs or corners.
     """
     if data.tracking.has_error:
-        return _tracked_heights(data, tracked_pieces(data, waypoints))
+        # The height includes the tracking error below the piece and to either side of it, and is NaN over unknown
+        # ground.
+        tracked = tracked_pieces(data, waypoints)
+        out = np.zeros(tracked.size, dtype=CERTIFIED_PIECE)
+        for k in range(tracked.size):
+            piece = tracked[k]
+            dx, dy = piece.end[0] - piece.begin[0], piece.end[1] - piece.begin[1]
+            horizontal_length = max(1e-9, math.hypot(dx, dy))
+            min_height = math.inf
+            for side in (0.0, -1.0, 1.0):
+                offset_start, offset_end = piece.begin.copy(), piece.end.copy()
+                for end, lateral in ((offset_start, piece.lateral_begin), (offset_end, piece.lateral_end)):
+                    end[0] += side * lateral * dy / horizontal_length
+                    end[1] -= side * lateral * dx / horizontal_length
+                    end[2] -= piece.below
+                height, _ = segment_clearance(data.heights, data.to_pixel, offset_start, offset_end)
+                min_height = math.nan if math.isnan(height) or math.isnan(min_height) else min(min_height, height)
+            out[k].of_arc, out[k].number, out[k].height = piece.of_corner, piece.number, min_height
+            ends = data.start_buffer, data.destination_buffer
+            out[k].buffer = required_buffer(data, data.buffer, ends, piece.begin, piece.end)
+        return out
     leg_count = waypoints.shape[0] - 1
     radii = fly_by_radii(data, waypoints)
     pieces = np.zeros(leg_count + leg_count * _MAX_PIECES, dtype=CERTIFIED_PIECE)
@@ -311,35 +322,6 @@ def heights_above_ground(data: ProblemArrays, waypoints: Floats) -> Records:
             _measure_piece(data, arc[k], arc[min(k + 1, arc.shape[0] - 1)], True, i, pieces[piece_count])
             piece_count += 1
     return pieces[:piece_count]
-
-
-@inner
-def _tracked_heights(data: ProblemArrays, pieces: Records) -> Records:
-    """Measure the minimum heights above ground along pieces and to either side of them.
-
-    Return `CERTIFIED_PIECE` records. The height includes the tracking error below the piece, and is NaN over unknown
-    ground.
-
-    pieces: `TRACKED_PIECE` records.
-    """
-    out = np.zeros(pieces.size, dtype=CERTIFIED_PIECE)
-    for k in range(pieces.size):
-        piece = pieces[k]
-        dx, dy = piece.end[0] - piece.begin[0], piece.end[1] - piece.begin[1]
-        horizontal_length = max(1e-9, math.hypot(dx, dy))
-        min_height = math.inf
-        for side in (0.0, -1.0, 1.0):
-            offset_start, offset_end = piece.begin.copy(), piece.end.copy()
-            for end, lateral in ((offset_start, piece.lateral_begin), (offset_end, piece.lateral_end)):
-                end[0] += side * lateral * dy / horizontal_length
-                end[1] -= side * lateral * dx / horizontal_length
-                end[2] -= piece.below
-            height, _ = segment_clearance(data.heights, data.to_pixel, offset_start, offset_end)
-            min_height = math.nan if math.isnan(height) or math.isnan(min_height) else min(min_height, height)
-        out[k].of_arc, out[k].number, out[k].height = piece.of_corner, piece.number, min_height
-        ends = data.start_buffer, data.destination_buffer
-        out[k].buffer = required_buffer(data, data.buffer, ends, piece.begin, piece.end)
-    return out
 
 
 @inner

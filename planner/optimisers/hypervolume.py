@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from world.arrays import Floats, Ints
-from world.kernels import compiled, inner
+from world.kernels import compiled
 
 Marks = NDArray[np.uint8]
 
@@ -111,19 +111,13 @@ def _choose_rows_greedily(marks: Marks, first_rows: Ints, count: int) -> Ints:
     for position in range(count):
         row = first_rows[position] if position < first_rows.size else np.argmax(gains)
         while position >= first_rows.size and count_positions[row] < position:
-            gains[row], count_positions[row] = _count_common_marks(marks[row], uncovered), position
+            common_count = 0
+            for p in range(width):
+                common_count += marks[row, p] & uncovered[p]
+            gains[row], count_positions[row] = common_count, position
             row = np.argmax(gains)
         chosen_rows[position] = row
         gains[row] = -1
         for p in range(width):
             uncovered[p] &= 1 - marks[row, p]
     return chosen_rows
-
-
-@inner
-def _count_common_marks(marks: Marks, other_marks: Marks) -> int:
-    """Return the number of probes (p,) that are marked in both arrays."""
-    total = 0
-    for p in range(marks.size):
-        total += marks[p] & other_marks[p]
-    return total

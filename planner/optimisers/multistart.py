@@ -231,11 +231,19 @@ class Multistart(BoxSearch):
                 self._search.is_done
                 or self._search.evaluations - self._slice_start >= SLICE_EVALUATIONS * self.lower.size
             ):
-                # The next slice of evaluations continues this search, or goes to another one.
-                self._spent_evaluations[self._is_continued] += self._search.evaluations - self._slice_start
-                next_search = self._search if self._may_continue(self._search) else self._choose_search()
-                self._slice_start = next_search.evaluations
-                self._search = next_search
+                # The next slice of evaluations continues this search, or goes to another one, so that new and continued
+                # searches share the evaluations equally: the best waiting search, or a new search.
+                spent_evaluations = self._spent_evaluations
+                spent_evaluations[self._is_continued] += self._search.evaluations - self._slice_start
+                if not self._may_continue(self._search):
+                    waiting = [search for search in self._searches if search.curve and not search.is_done]
+                    self._is_continued = bool(waiting) and spent_evaluations[True] <= spent_evaluations[False]
+                    if self._is_continued:
+                        waiting_ranks = self._rank(np.stack([search.curve[-1][1] for search in waiting]))
+                        self._search = waiting[int(np.argmin(waiting_ranks))]
+                    else:
+                        self._search = self._start_search()
+                self._slice_start = self._search.evaluations
         self._draw_generation(self._search)
 
     def _draw_generation(self, search: Gaussian) -> None:
@@ -271,19 +279,6 @@ class Multistart(BoxSearch):
         equally_narrow_scores = [scores for scores in other_scores if scores is not None]
         ranks = self._rank(np.stack([search.best[1], *equally_narrow_scores]))
         return 2 * int((ranks[1:] < ranks[0]).sum()) <= len(equally_narrow_scores)
-
-    def _choose_search(self) -> Gaussian:
-        """Choose the search for the next slice, so that new and continued searches share the evaluations equally.
-
-        This is the best waiting search, or a new search.
-        """
-        waiting_searches = [search for search in self._searches if search.curve and not search.is_done]
-        self._is_continued = bool(waiting_searches) and self._spent_evaluations[True] <= self._spent_evaluations[False]
-        if self._is_continued:
-            return waiting_searches[
-                int(np.argmin(self._rank(np.stack([search.curve[-1][1] for search in waiting_searches]))))
-            ]
-        return self._start_search()
 
     def _start_search(self) -> Gaussian:
         """Start a search: the first one at the centre with a typical width, later ones with a random width."""

@@ -49,7 +49,20 @@ def run_path_generations(search: Search, population: int, generations: int, star
     starts: vectors (s, d) around which the first population is sampled.
     """
     encoding, algorithm = search.encoding, search.algorithm
-    levels, previous_evaluations = _preference_levels(search), search.evaluations
+    previous_evaluations = search.evaluations
+    # Paths are ranked with the goals of the scenario, if it states any.
+    goals = search.problem.scenario.planner.goals
+    length_goal = NO_GOAL if goals.length_ratio is None else goals.length_ratio
+    kill_goal = NO_GOAL if goals.kill_exposure is None else goals.kill_exposure
+    levels: tuple[Level, ...] = (
+        (CONSTRAINTS, Level((KILL,), (kill_goal,)), Level((LENGTH,), (length_goal,)))
+        if algorithm.graded
+        else (
+            CONSTRAINTS,
+            Level((LENGTH, KILL), (length_goal, kill_goal)),
+            Level((DETECTION, HEIGHT), (NO_GOAL, NO_GOAL)),
+        )
+    )
     initial = (
         first_samples(search.problem.space, encoding, population, starts, search.rng) if algorithm.smooth else None
     )
@@ -62,8 +75,13 @@ def run_path_generations(search: Search, population: int, generations: int, star
         if search.must_end() or search.first_safe_found():
             break
         max_fraction = SAFE_SEARCH_FRACTION if search.best_is_safe() else UNSAFE_SEARCH_FRACTION
+        is_stagnant = False
+        if len(best_scores) > STALLED_GENERATIONS:
+            earlier, latest = best_scores[-1 - STALLED_GENERATIONS], best_scores[-1]
+            has_same_violations = np.array_equal(earlier[:LENGTH], latest[:LENGTH]) and earlier[KILL] == latest[KILL]
+            is_stagnant = has_same_violations and earlier[LENGTH] - latest[LENGTH] < MIN_GAIN_FRACTION
         if algorithm.seeded and (
-            _is_stagnant(best_scores) or search.evaluations >= previous_evaluations + max_fraction * full_evaluations
+            is_stagnant or search.evaluations >= previous_evaluations + max_fraction * full_evaluations
         ):
             break
         optimiser.tell(search.evaluate(optimiser.ask()))
@@ -72,16 +90,6 @@ def run_path_generations(search: Search, population: int, generations: int, star
         search.done += 1
         search.report_progress(generations - generation - 1)
     return np.asarray(optimiser.samples[best_first(optimiser.scores)[0]])
-
-
-def _preference_levels(search: Search) -> tuple[Level, ...]:
-    """Return the preference levels that rank paths, with the goals of the scenario, if it states any."""
-    goals = search.problem.scenario.planner.goals
-    length_goal = NO_GOAL if goals.length_ratio is None else goals.length_ratio
-    kill_goal = NO_GOAL if goals.kill_exposure is None else goals.kill_exposure
-    if search.algorithm.graded:
-        return CONSTRAINTS, Level((KILL,), (kill_goal,)), Level((LENGTH,), (length_goal,))
-    return CONSTRAINTS, Level((LENGTH, KILL), (length_goal, kill_goal)), Level((DETECTION, HEIGHT), (NO_GOAL, NO_GOAL))
 
 
 def _best_row(scores: Floats) -> Floats:
@@ -107,15 +115,6 @@ def _make_optimiser(
         return MarkovChain(lower, upper, rank, population, search.rng, initial=initial)
     basis = bridge_basis(search.encoding.waypoints - 2) if search.algorithm.smooth else None
     return Umda(lower, upper, rank, population, search.rng, initial=initial, basis=basis)
-
-
-def _is_stagnant(best_scores: list[Floats]) -> bool:
-    """Return True if the last `STALLED_GENERATIONS` generations brought almost no improvement."""
-    if len(best_scores) <= STALLED_GENERATIONS:
-        return False
-    earlier, latest = best_scores[-1 - STALLED_GENERATIONS], best_scores[-1]
-    has_same_violations = np.array_equal(earlier[:LENGTH], latest[:LENGTH]) and earlier[KILL] == latest[KILL]
-    return bool(has_same_violations and earlier[LENGTH] - latest[LENGTH] < MIN_GAIN_FRACTION)
 
 
 # --- Single waypoints ---

@@ -283,18 +283,6 @@ def _distances_around_obstacles(data: ProblemArrays, frame: RotatedFrame, lattic
     return distances
 
 
-def _guiding_heuristic(data: ProblemArrays, frame: RotatedFrame, lattice: Lattice, layer_limits: Codes) -> Heuristic:
-    """Return the estimate of a guided search: around obstacles, and long enough to climb or descend.
-
-    layer_limits: (8, 2) maximum climb and descent of a step in layers.
-    """
-    step_lengths = lattice.step * np.hypot(_STEPS[:, 0], _STEPS[:, 1])
-    slopes = (layer_limits * lattice.layer_spacing / step_lengths[:, None]).max(axis=0)
-    climb_length, descent_length = (1.0 / slope if slope > 0.0 else 0.0 for slope in slopes)
-    distances = _distances_around_obstacles(data, frame, lattice)
-    return Heuristic(distances**2, climb_length, descent_length, GUIDED_WEIGHT)
-
-
 def begin_lattice_search(
     data: ProblemArrays, frame: RotatedFrame, lattice: Lattice, *, is_guided: bool = False
 ) -> LatticeSearch:
@@ -303,11 +291,15 @@ def begin_lattice_search(
     is_guided: True for an estimate of the remaining length that knows obstacles and slopes.
     """
     layer_limits = _climb_layers(data, frame, lattice)
-    heuristic = (
-        _guiding_heuristic(data, frame, lattice, layer_limits)
-        if is_guided
-        else Heuristic(_straight_distances(frame, lattice), 0.0, 0.0, 1.0)
-    )
+    if is_guided:
+        # The path is long enough to climb or descend.
+        step_lengths = lattice.step * np.hypot(_STEPS[:, 0], _STEPS[:, 1])
+        slopes = (layer_limits * lattice.layer_spacing / step_lengths[:, None]).max(axis=0)
+        climb_length, descent_length = (1.0 / slope if slope > 0.0 else 0.0 for slope in slopes)
+        distances = _distances_around_obstacles(data, frame, lattice)
+        heuristic = Heuristic(distances**2, climb_length, descent_length, GUIDED_WEIGHT)
+    else:
+        heuristic = Heuristic(_straight_distances(frame, lattice), 0.0, 0.0, 1.0)
     state_count = lattice.along * lattice.across * lattice.layers * 8
     width = int(layer_limits.max(axis=0).sum()) + 1
     # Large arrays of zeros from NumPy take memory only where they are written to, mostly a small part.
