@@ -90,7 +90,11 @@ def _expected_type(value: Any, annotation: Any) -> str | None:
     """
     classes, item_classes = _allowed_classes(annotation)
     if classes:
-        is_allowed = isinstance(value, classes) or _is_sequence_of(value, item_classes)
+        is_sequence = isinstance(value, Sequence) and not isinstance(value, str | bytes)
+        is_sequence_of_items = (
+            bool(item_classes) and is_sequence and all(isinstance(item, item_classes) for item in value)
+        )
+        is_allowed = isinstance(value, classes) or is_sequence_of_items
         return None if is_allowed else _classes_text(classes, item_classes) + _hint(value, classes)
     if isinstance(annotation, type) and is_dataclass(annotation):
         return None if isinstance(value, annotation) else f"a {annotation.__name__}"
@@ -112,12 +116,6 @@ def _hint(value: Any, classes: tuple[type, ...]) -> str:
     return (
         "; planfly.plan makes a plan of a scenario, and planfly.plan_then_fly flies it" if is_scenario_for_plan else ""
     )
-
-
-def _is_sequence_of(value: Any, classes: tuple[type, ...]) -> bool:
-    """Return True if a value is a sequence of instances of some classes, and is neither text nor bytes."""
-    is_sequence = isinstance(value, Sequence) and not isinstance(value, str | bytes)
-    return bool(classes) and is_sequence and all(isinstance(item, classes) for item in value)
 
 
 @functools.cache
