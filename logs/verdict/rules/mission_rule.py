@@ -521,8 +521,9 @@ def _check_first_distance(mission: Mission, origin: GeoOrigin) -> Iterator[_Rema
         )
 
 
-def _check_gates(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
-    """Yield a remark on each condition gate that is too close to the waypoint before or after the gate."""
+def _check_distances(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
+    """Yield remarks on gates close to a waypoint, and on a distance that older PX4 releases refuse."""
+    # Condition gates that are too close to the waypoint before or after the gate.
     flown_items = [
         item
         for item in mission.items
@@ -532,11 +533,6 @@ def _check_gates(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
         has_gate = C.CONDITION_GATE in (previous.command, following.command)
         if has_gate and _distance_between(previous, following, origin) < PX4_GATE_SPACING_M:
             yield REFUSED, following.seq, "the gate and the neighbouring waypoint are too close together"
-
-
-def _check_distances(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
-    """Yield remarks on gates close to a waypoint, and on a distance that older PX4 releases refuse."""
-    yield from _check_gates(mission, origin)
     flown_items = _flown_items(mission)
     if len(flown_items) < 2:
         return
