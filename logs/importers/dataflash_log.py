@@ -174,6 +174,11 @@ class _Reader:
             )
         commands = self._select_messages("CMD")
         command_times = self._compute_times(commands) if len(commands) else np.zeros(0)
+        messages = self._select_messages("PARM")
+        parameters: dict[str, float] = {}
+        if messages.has("Name", "Value"):
+            values = zip(messages.texts("Name"), messages.column("Value").tolist(), strict=True)
+            parameters = {name: value for name, value in values if name and math.isfinite(value)}
         return RawLog(
             source=self._source,
             format=FORMAT,
@@ -186,7 +191,7 @@ class _Reader:
             missions=tuple(
                 make_dataflash_missions(commands, command_times, self._select_messages("ORGN"), self._source)
             ),
-            parameters=self._read_parameters(),
+            parameters=parameters,
             events=tuple(self._read_events()),
             utc_start=self._find_utc_start(),
             clock_jumps=self._clock[2],
@@ -383,14 +388,6 @@ class _Reader:
         for time, number in zip(self._compute_times(messages).tolist(), messages.rows[column].tolist(), strict=True):
             name, automatic = describe_plane_mode(int(number))
             yield ModeChange(time, name, automatic)
-
-    def _read_parameters(self) -> dict[str, float]:
-        """Return the last finite value of each parameter."""
-        messages = self._select_messages("PARM")
-        if not messages.has("Name", "Value"):
-            return {}
-        values = zip(messages.texts("Name"), messages.column("Value").tolist(), strict=True)
-        return {name: value for name, value in values if name and math.isfinite(value)}
 
     def _read_events(self) -> Iterable[tuple[float, str]]:
         """Yield the time (s) and the text of each MSG message."""

@@ -184,8 +184,14 @@ def scenario_map(
     failing_threats: indices of the threats whose rule fails.
     """
     east, north = extent
+    edge_layers = []
+    if not scenario.external:
+        (west_edge, east_edge), (south_edge, north_edge) = scenario.bounds.tolist()
+        x = np.array([west_edge, east_edge, east_edge, west_edge, west_edge])
+        y = np.array([south_edge, south_edge, north_edge, north_edge, south_edge])
+        edge_layers = [Layer("line", "edge of the area", "area", x, y, quiet=True)]
     area_layers = [
-        *_make_area_edge_layers(scenario),
+        *edge_layers,
         *threat_circles(scenario.threats, route, failing_threats),
         *zone_shapes(scenario.zones),
     ]
@@ -248,19 +254,6 @@ def map_extent(scenario: Scenario, route: Floats | None, paths: Sequence[Floats]
     middle = 0.5 * (min_corner + max_corner)
     (west, south), (east, north) = (middle - 0.5 * size).tolist(), (middle + 0.5 * size).tolist()
     return (west, east), (south, north)
-
-
-def _make_area_edge_layers(scenario: Scenario) -> list[Layer]:
-    """Return the layer of the edge of the scenario's area; [] for a mission without a scenario.
-
-    The bounds that planfly makes around such a mission do not limit the flight.
-    """
-    if scenario.external:
-        return []
-    (west, east), (south, north) = scenario.bounds.tolist()
-    x = np.array([west, east, east, west, west])
-    y = np.array([south, south, north, north, south])
-    return [Layer("line", "edge of the area", "area", x, y, quiet=True)]
 
 
 def _make_track_layer(drawn_track: DrawnTrack) -> Layer:
