@@ -261,7 +261,8 @@ class _Reader:
         yield "wind", wind if wind is not None and np.any(wind.values) else None
         yield "airspeed", self._read_airspeed()
         yield "battery", self._read_battery()
-        yield "throttle", self._read_throttle()
+        throttles = (self._read_table("CTUN", (column,), 0.01) for column in ("ThO", "ThrOut"))
+        yield "throttle", next((series for series in throttles if series is not None and len(series.time)), None)
 
     def _read_first_table(self, choices: Iterable[tuple[str, tuple[str, ...]]], scale: float = 1.0) -> LogSeries | None:
         """Return the fields of the first of several messages that the log contains; None if it has none.
@@ -355,14 +356,6 @@ class _Reader:
             battery = self._read_table(name, ("Volt", "Curr"))
             if battery is not None and len(battery.time) and np.any(battery.values[:, 1]):
                 return with_used_energy(battery)
-        return None
-
-    def _read_throttle(self) -> LogSeries | None:
-        """Return the throttle, 0..1, (n, 1); None if not logged."""
-        for column in ("ThO", "ThrOut"):
-            throttle = self._read_table("CTUN", (column,), 0.01)
-            if throttle is not None and len(throttle.time):
-                return throttle
         return None
 
     def _read_heights(self) -> Iterable[HeightSource]:

@@ -353,10 +353,13 @@ class VehicleMessages:
             name = _decode_text(message.param_id)
             if name and math.isfinite(message.param_value):
                 parameters[name] = float(message.param_value)
+        # ArduPilot's start message names its version; other programs are named by their autopilot.
+        texts = (_decode_text(message.text) for _, message in self._named_messages.get("STATUSTEXT", []))
+        autopilot = _NAMES.get(heartbeats[0].autopilot, "")
         return RawLog(
             source=self._source,
             format=FORMAT,
-            program=self._find_program(heartbeats[0]),
+            program=next((text for text in texts if "Ardu" in text and " V" in text), autopilot),
             vehicle=_TYPES.get(heartbeats[0].type, "unknown"),
             series=series,
             heights=tuple(self._read_heights()),
@@ -530,14 +533,6 @@ class VehicleMessages:
         return any(
             heartbeat.autopilot == _PX4 for _, heartbeat in self._named_messages["HEARTBEAT"] if _is_vehicle(heartbeat)
         )
-
-    def _find_program(self, heartbeat: Any) -> str:
-        """Return ArduPilot's start message with its version, or the autopilot's name; "" if unknown."""
-        for _, message in self._named_messages.get("STATUSTEXT", []):
-            text = _decode_text(message.text)
-            if "Ardu" in text and " V" in text:
-                return text
-        return _NAMES.get(heartbeat.autopilot, "")
 
 
 def _decode_text(value: str | bytes) -> str:

@@ -145,7 +145,12 @@ def map_chart(
             )
         name = "route of the mission" if plan_waypoints is None or has_different_plan else "planned path"
         layers += [*path_layers, Layer("line", name, "planned", route[:, 0], route[:, 1], quiet=True)]
-    layers += [_make_track_layer(drawn_track) for drawn_track in tracks]
+    for drawn_track in tracks:
+        # A track is thinned to what a map can show.
+        count = len(drawn_track.track)
+        rows = np.union1d(np.arange(0, count, max(1, count // _MAX_POINTS)), [count - 1])
+        east, north, _ = drawn_track.track.position[rows].T
+        layers.append(Layer("line", drawn_track.label, drawn_track.role, east, north, flight=drawn_track.flight))
     for drawn_track in tracks if failed.threats else ():
         is_inside = find_rows_inside_threats(failed, scenario.threats, drawn_track.track)
         if is_inside.any():
@@ -254,14 +259,6 @@ def map_extent(scenario: Scenario, route: Floats | None, paths: Sequence[Floats]
     middle = 0.5 * (min_corner + max_corner)
     (west, south), (east, north) = (middle - 0.5 * size).tolist(), (middle + 0.5 * size).tolist()
     return (west, east), (south, north)
-
-
-def _make_track_layer(drawn_track: DrawnTrack) -> Layer:
-    """Make the layer of a flown track, thinned to what a map can show."""
-    count = len(drawn_track.track)
-    rows = np.union1d(np.arange(0, count, max(1, count // _MAX_POINTS)), [count - 1])
-    east, north, _ = drawn_track.track.position[rows].T
-    return Layer("line", drawn_track.label, drawn_track.role, east, north, flight=drawn_track.flight)
 
 
 def _make_waypoint_layers(

@@ -323,6 +323,12 @@ def _mission_parts(setup: FlightSetup) -> MissionParts:
             (math.hypot(*map(float, to_map(origin, point.lat_deg, point.lon_deg))) for point in mission.rally),
             default=math.inf,
         )
+    checks = setup.autopilot.checks
+    fence_at_home = ""
+    if mission.home is not None and mission.fences:
+        origin = GeoOrigin(mission.home.lat_deg, mission.home.lon_deg)
+        problem = fence_problem(mission.fences, origin, 0.0, 0.0, any_inclusion_suffices=checks.any_inclusion_suffices)
+        fence_at_home = "" if problem is None else problem[0]
     return MissionParts(
         returns=C.NAV_RETURN_TO_LAUNCH in commands or judges_return_after_last_item(setup),
         has_return_path=C.DO_RETURN_PATH_START in commands,
@@ -332,7 +338,7 @@ def _mission_parts(setup: FlightSetup) -> MissionParts:
             item.command == C.NAV_LOITER_TO_ALT and next_item.command in LANDINGS for item, next_item in pairs
         ),
         has_fence=bool(setup.mission.fences),
-        fence_at_home=_home_fence_violation(setup),
+        fence_at_home=fence_at_home,
         smallest_inclusion=min(
             (item.params[0] for item in setup.mission.fences if item.command == C.NAV_FENCE_CIRCLE_INCLUSION),
             default=math.inf,
@@ -351,16 +357,6 @@ def _mission_parts(setup: FlightSetup) -> MissionParts:
         commands=frozenset(commands),
         aircraft=aircraft,
     )
-
-
-def _home_fence_violation(setup: FlightSetup) -> str:
-    """Describe how home violates the fence, as "inside an exclusion polygon"; "" if it does not."""
-    mission, checks = setup.mission, setup.autopilot.checks
-    if mission.home is None or not mission.fences:
-        return ""
-    origin = GeoOrigin(mission.home.lat_deg, mission.home.lon_deg)
-    problem = fence_problem(mission.fences, origin, 0.0, 0.0, any_inclusion_suffices=checks.any_inclusion_suffices)
-    return "" if problem is None else problem[0]
 
 
 def _flown_items(mission: Mission) -> list[MissionItem]:
