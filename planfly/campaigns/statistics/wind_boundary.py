@@ -251,22 +251,12 @@ class Direction:
             evidence = np.array([sum(mode.log_evidence for mode in modes) for modes in modes_by_link])
             weights = np.exp(evidence - evidence.max())
             weights /= weights.sum()
-            self._fits = (
-                len(self.speeds),
-                tuple(
-                    self._make_fit(modes, float(weight)) for modes, weight in zip(modes_by_link, weights, strict=True)
-                ),
-            )
+            draws, fits = self.numbers.population, []
+            for modes, weight in zip(modes_by_link, weights.tolist(), strict=True):
+                speed = boundary_speed(modes, draws, 1.0 - self.target, self.max_speed)
+                fits.append(FailureFit(modes, weight, speed, boundary_slopes(modes, draws, speed)))
+            self._fits = (len(self.speeds), tuple(fits))
         return self._fits[1]
-
-    def _make_fit(self, modes: tuple[FailureMode, ...], weight: float) -> FailureFit:
-        """Return the fit of a link with its boundary and the boundary's derivatives.
-
-        weight: probability of the link function.
-        """
-        draws = self.numbers.population
-        speed = boundary_speed(modes, draws, 1.0 - self.target, self.max_speed)
-        return FailureFit(modes, weight, speed, boundary_slopes(modes, draws, speed))
 
     def boundary(self) -> WindBoundary:
         """Return the largest wind with the target probability: estimate and interval, m/s.
