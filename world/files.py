@@ -280,7 +280,12 @@ def write_atomically(path: Path, data: str | bytes) -> None:
     """
     content = data.encode("utf-8") if isinstance(data, str) else data
     try:
-        target = _resolve_link(path) if path.is_symlink() else path
+        target = path
+        if path.is_symlink():
+            try:
+                target = path.resolve()
+            except RuntimeError:
+                raise OSError(errno.ELOOP, os.strerror(errno.ELOOP)) from None
         # Limit the name by bytes: a file name has at most 255 bytes, and a letter takes up to four.
         name = target.name.encode()[:200].decode("utf-8", "ignore")
         temporary_path = target.with_name(f".{name}.{os.getpid()}-{os.urandom(4).hex()}")
@@ -327,14 +332,6 @@ def write_folder(path: Path, files: Mapping[str, bytes], kept_names: Iterable[st
                 temporary_path.rename(path)
     except OSError as error:
         raise OSError(error.errno, error.strerror, str(path)) from error
-
-
-def _resolve_link(link: Path) -> Path:
-    """Return the target of a link. Raises OSError for a link that refers to itself."""
-    try:
-        return link.resolve()
-    except RuntimeError:
-        raise OSError(errno.ELOOP, os.strerror(errno.ELOOP)) from None
 
 
 @contextlib.contextmanager

@@ -104,7 +104,7 @@ def open_npz(file: Path, name: str) -> RasterFile:
     """Open an .npz file of heights. Raises TerrainError for any other file.
 
     The file has `elevation` (rows from north to south) and xmin, xmax, ymin, ymax: pixel edges in degrees. The two
-    values of a pair may be in any order, except in the tile that planfly ships; see `open_npz`.
+    values of a pair may be in any order, except in the tile that planfly ships.
     """
     heights, edges = _read_npz(file, name)
     if heights.ndim != 2 or heights.dtype.kind not in "iuf":

@@ -31,7 +31,8 @@ def parse_scenario(text: str, source: str) -> ScenarioFile:
         data = toml_table(text)
     # ValueError includes TOMLDecodeError, numbers of thousands of digits, and deeply nested brackets.
     except ValueError as error:
-        raise ScenarioError(f"{source}: not valid TOML: {_first_line(error)}", file=source) from error
+        first_line = str(error).splitlines()[0]
+        raise ScenarioError(f"{source}: not valid TOML: {first_line}", file=source) from error
     terrain = data.get("terrain")
     if isinstance(terrain, dict) and terrain.get("kind") == "none":
         raise ScenarioError(
@@ -265,8 +266,3 @@ def _value_text(value: Any) -> str:
         return str(value)
     text = json.dumps(value, default=str)
     return text if len(text) <= 60 else text[:57] + "..."
-
-
-def _first_line(error: BaseException) -> str:
-    """Return the first line of an error's text."""
-    return str(error).splitlines()[0]

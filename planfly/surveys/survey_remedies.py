@@ -620,19 +620,9 @@ class _Trials:
         )
         lowest = math.ceil(min_speed * steps - 1e-6) / steps
         speeds = {lowest, *(round(2.0 * factor * self._uav.airspeed) / 2.0 for factor in AIRSPEED_FACTORS)}
-        max_speed = self._max_airspeed_for_photos()
-        if math.isfinite(max_speed):
-            speeds.add(math.floor(max_speed * steps + 1e-6) / steps)
-        for speed in sorted(speeds, reverse=True):
-            if lowest <= speed <= max(lowest, max_speed) and speed < self._uav.airspeed:
-                yield speed
-
-    def _max_airspeed_for_photos(self) -> float:
-        """Return the highest airspeed at which a slow camera takes photos with the required front overlap, m/s.
-
-        It follows from the ground speed flown at the place with the minimum overlap.  Infinity without such a camera.
-        """
-        speeds, autopilot = [math.inf], self._uav.autopilot
+        # Highest airspeed at which a slow camera takes photos with the required front overlap, from the ground speed
+        # flown at the place with the minimum overlap.
+        photo_speeds, autopilot = [math.inf], self._uav.autopilot
         altitude = float(self._setup.route.positions[self._surveys[0].first, 2])
         for measure in self._overlaps:
             if measure.is_camera_limited and measure.front is not None and measure.camera.front is not None:
@@ -640,8 +630,13 @@ class _Trials:
                 overlap = measure.camera.front - PHOTO_OVERLAP_TOLERANCE
                 needed_speed = (1.0 - overlap) * measure.camera.along * measure.height / measure.camera.interval
                 change = _GROUND_SPEED_RATIO * needed_speed - ground_speed
-                speeds.append(self._uav.airspeed + change / autopilot.speeds.true_airspeed_factor(altitude))
-        return min(speeds)
+                photo_speeds.append(self._uav.airspeed + change / autopilot.speeds.true_airspeed_factor(altitude))
+        max_speed = min(photo_speeds)
+        if math.isfinite(max_speed):
+            speeds.add(math.floor(max_speed * steps + 1e-6) / steps)
+        for speed in sorted(speeds, reverse=True):
+            if lowest <= speed <= max(lowest, max_speed) and speed < self._uav.airspeed:
+                yield speed
 
 
 def missing_height(measure: OverlapMeasure) -> float:

@@ -115,7 +115,14 @@ def _geojson_zone(feature: Any, location: str, index: int, source: str) -> tuple
             coordinates, geometry_type = [coordinates], "MultiPolygon"
         if geometry_type == "MultiPolygon":
             parts = [[[_parse_corner(corner) for corner in ring] for ring in part] for part in coordinates]
-            _check_holes(parts, f"{source}: {label}")
+            place = f"{source}: {label}"
+            try:
+                is_inside = all(are_holes_inside(part) for part in parts if part)
+            except ValueError as error:
+                raise ScenarioError(f"{place}: coordinates: {error}", file=place, field="coordinates") from error
+            if not is_inside:
+                fault = f"{place}: coordinates: a hole lies outside its outline"
+                raise ScenarioError(fault, file=place, field="coordinates")
             rings = [[list(corner) for corner in ring] for part in parts for ring in part]
             return label, entries | {"rings_deg": rings}
     except (TypeError, ValueError, IndexError) as error:
@@ -125,20 +132,6 @@ def _geojson_zone(feature: Any, location: str, index: int, source: str) -> tuple
     allowed = "expected a Polygon, MultiPolygon or Point"
     message = f"{source}: {label}: geometry {json.dumps(geometry_type)[:40]}: {allowed}"
     raise ScenarioError(message, file=source, field="geometry", value=geometry_type, allowed=allowed)
-
-
-def _check_holes(parts: list[list[list[tuple[float, float]]]], source: str) -> None:
-    """Raise ScenarioError if a hole of a polygon lies outside its outline.
-
-    parts: polygons, each as rings of (latitude, longitude), the outline first.
-    """
-    try:
-        is_inside = all(are_holes_inside(part) for part in parts if part)
-    except ValueError as error:
-        raise ScenarioError(f"{source}: coordinates: {error}", file=source, field="coordinates") from error
-    if not is_inside:
-        message = f"{source}: coordinates: a hole lies outside its outline"
-        raise ScenarioError(message, file=source, field="coordinates")
 
 
 def _parse_corner(coordinates: Any) -> tuple[float, float]:

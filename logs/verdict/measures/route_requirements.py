@@ -506,7 +506,14 @@ def route_requirements(setup: FlightSetup, *, envelope: bool = True) -> RouteReq
     certain_climb, certain_dive = climb, dive
     if certain_limits.envelope is not limits.envelope:
         certain_climb, certain_dive, _ = _leg_limits(route, leg_performance(certain_limits, winds), points, courses)
-    possible_turns, possible_bank = turns, _possible_bank(setup)
+    # The largest bank limit that may apply, rad: more than the setup's only if that is a guess.
+    setup_envelope, stated_bank = setup.envelope, setup.scenario.flight.max_bank_deg
+    if not setup_envelope.bank_guessed or setup.max_bank < setup_envelope.max_bank:
+        possible_bank = setup.max_bank
+    else:
+        other_limit = math.inf if stated_bank is None else math.radians(stated_bank)
+        possible_bank = min(POSSIBLE_BANK_RAD, setup.autopilot.turns.max_bank, other_limit)
+    possible_turns = turns
     if possible_bank > limits.max_bank:
         possible_limits = replace(limits, max_bank=possible_bank)
         possible_turns = turn_requirements(route, leg_performance(possible_limits, winds))
@@ -542,15 +549,6 @@ def route_requirements(setup: FlightSetup, *, envelope: bool = True) -> RouteReq
         airspace=judged_airspace(setup),
         surveys=judged_surveys(setup),
     )
-
-
-def _possible_bank(setup: FlightSetup) -> float:
-    """Return the largest bank limit that may apply, rad: more than the setup's only if that is a guess."""
-    envelope, stated_bank = setup.envelope, setup.scenario.flight.max_bank_deg
-    if not envelope.bank_guessed or setup.max_bank < envelope.max_bank:
-        return setup.max_bank
-    other_limit = math.inf if stated_bank is None else math.radians(stated_bank)
-    return min(POSSIBLE_BANK_RAD, setup.autopilot.turns.max_bank, other_limit)
 
 
 # Setups whose surveys were searched last, and these surveys, which several parts of one verdict need.

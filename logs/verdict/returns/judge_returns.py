@@ -19,7 +19,7 @@ import numpy as np
 from aircraft.catalog import Aircraft, find_logged_aircraft
 from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
-from flight.autopilots.autopilot import Autopilot, Parameters
+from flight.autopilots.autopilot import Autopilot
 from flight.autopilots.parts import Cause, ReturnMission
 from flight.autopilots.point_mass import PointMass, make_point_mass
 from flight.autopilots.px4.parameters import FROM_ARDUPILOT, Px4Parameters
@@ -530,22 +530,17 @@ def without_engine_world(world: ReturnWorld) -> ReturnWorld:
     if world.autopilot.returns.flies_without_engine:
         return world
     aircraft = find_logged_aircraft(world.setup.aircraft, world.scenario.flight.aircraft)
-    parameters = _with_px4_airspeeds(ArduPilotParameters.load(aircraft), world.autopilot.parameters)
+    # ArduPlane's parameters, with the airspeeds of the user's PX4 parameter file.
+    own_parameters = ArduPilotParameters.load(aircraft)
+    user_parameters = world.autopilot.parameters
+    parameters = own_parameters
+    if isinstance(user_parameters, Px4Parameters):
+        file_parameters = user_parameters.by_origin("file")
+        names = {name: FROM_ARDUPILOT[name][0] for name in ("AIRSPEED_MIN", "AIRSPEED_CRUISE", "AIRSPEED_MAX")}
+        parameters = own_parameters.changed(
+            **{name: file_parameters[px4_name] for name, px4_name in names.items() if px4_name in file_parameters}
+        )
     return make_return_world(world.setup, ArduPlane(parameters))
-
-
-def _with_px4_airspeeds(parameters: ArduPilotParameters, user_parameters: Parameters | None) -> ArduPilotParameters:
-    """Return ArduPlane's parameters with the airspeeds of the user's PX4 parameter file.
-
-    user_parameters: the user's parameters; without PX4 parameters, the result is unchanged.
-    """
-    if not isinstance(user_parameters, Px4Parameters):
-        return parameters
-    file_parameters = user_parameters.by_origin("file")
-    names = {name: FROM_ARDUPILOT[name][0] for name in ("AIRSPEED_MIN", "AIRSPEED_CRUISE", "AIRSPEED_MAX")}
-    return parameters.changed(
-        **{name: file_parameters[px4_name] for name, px4_name in names.items() if px4_name in file_parameters}
-    )
 
 
 # Function that flies a return in JSBSim and returns the minimum height above ground and the minimum distance outside a

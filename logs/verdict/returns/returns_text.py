@@ -334,18 +334,6 @@ def _height_text(ret: SimulatedReturn, limit: float) -> str:
     return f"{text} above ground (required: {quantity_text(limit, 'm')}, with a tolerance of {tolerance_text})"
 
 
-def _energy_outcome_text(ret: SimulatedReturn, returns: Returns) -> str:
-    """Describe the energy that a return leaves, compared with the required reserve."""
-    if ret.kind == "used":
-        return "the energy used before is unknown"
-    if ret.energy_left < 0.0:
-        return f"ends with an empty battery, as {quantity_text(ret.energy_used, 'Wh')} are used before it"
-    left_text = quantity_text(ret.energy_left, "Wh")
-    reserve_text = quantity_text(returns.reserve, "Wh")
-    uncertain_text = ", but the power is uncertain" if ret.kind == "power" else ""
-    return f"leaves {left_text} of the required {reserve_text}{uncertain_text}"
-
-
 def _range_outcome_text(worst_return: SimulatedReturn, returns: Returns, scenario: Scenario) -> str:
     """Describe the outcome of the worst return of a time range, with its position, height or energy."""
     east, north, up = worst_return.lowest_position
@@ -366,7 +354,18 @@ def _range_outcome_text(worst_return: SimulatedReturn, returns: Returns, scenari
             return f"does not reach its {end_text} at {worst_return.target.position[2]:.0f} m AMSL"
         case "energy" | "power" | "used":
             taken_text = quantity_text(worst_return.energy, "Wh")
-            return f"takes {taken_text} and {_energy_outcome_text(worst_return, returns)}"
+            if worst_return.kind == "used":
+                energy_outcome = "the energy used before is unknown"
+            elif worst_return.energy_left < 0.0:
+                energy_outcome = (
+                    f"ends with an empty battery, as {quantity_text(worst_return.energy_used, 'Wh')} are used before it"
+                )
+            else:
+                left_text = quantity_text(worst_return.energy_left, "Wh")
+                reserve_text = quantity_text(returns.reserve, "Wh")
+                uncertain_text = ", but the power is uncertain" if worst_return.kind == "power" else ""
+                energy_outcome = f"leaves {left_text} of the required {reserve_text}{uncertain_text}"
+            return f"takes {taken_text} and {energy_outcome}"
         case "unknown":
             return "flies where the terrain is unknown"
         case "unsure":

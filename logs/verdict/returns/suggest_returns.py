@@ -379,7 +379,21 @@ def _rally_candidates(
     # PX4 ends its return at this height above a rally point, which lies on the ground.  ArduPlane ends at the point.
     end_height = world.autopilot.returns.rules.rally_height
     for grid_east, grid_north in grid.tolist():
-        min_altitude = _highest_ground(world, grid_east, grid_north) + world.limit + MARGIN
+        # Highest ground below a loiter around the point, m AMSL; NaN if any of the ground is unknown.
+        if world.scenario.terrain is None:
+            highest_ground = world.home.up
+        else:
+            # The center, and 16 points on each of three circles.
+            angles = np.arange(16) * (math.pi / 8.0)
+            radii = np.concatenate(
+                [np.zeros(1), *(np.full(16, fraction * _LOITER_RADIUS_M) for fraction in (0.33, 0.67, 1.0))]
+            )
+            directions = np.concatenate([np.zeros(1), angles, angles, angles])
+            heights = world.scenario.terrain.height(
+                grid_east + radii * np.cos(directions), grid_north + radii * np.sin(directions)
+            )
+            highest_ground = float(np.max(heights))
+        min_altitude = highest_ground + world.limit + MARGIN
         for altitude in (min_altitude, min_altitude + 200.0):
             if (
                 math.isfinite(altitude)
@@ -395,21 +409,6 @@ def _rally_candidates(
                 height = math.ceil(point_altitude - world.home.up)
                 candidates.append(ReturnPoint(grid_east, grid_north, world.home.up + height, world.home.up))
     return [place._replace(number=k) for k, place in enumerate(candidates, 1)]
-
-
-def _highest_ground(world: ReturnWorld, east: float, north: float) -> float:
-    """Return the altitude of the highest ground below a loiter around a point, m AMSL.
-
-    Without terrain it is the altitude of home.  It is NaN if any of the ground below the loiter is unknown.
-    """
-    if world.scenario.terrain is None:
-        return world.home.up
-    # The center, and 16 points on each of three circles.
-    angles = np.arange(16) * (math.pi / 8.0)
-    radii = np.concatenate([np.zeros(1), *(np.full(16, fraction * _LOITER_RADIUS_M) for fraction in (0.33, 0.67, 1.0))])
-    directions = np.concatenate([np.zeros(1), angles, angles, angles])
-    heights = world.scenario.terrain.height(east + radii * np.cos(directions), north + radii * np.sin(directions))
-    return float(np.max(heights))
 
 
 def _sphere_clearance(world: ReturnWorld, position: tuple[float, float, float]) -> float:

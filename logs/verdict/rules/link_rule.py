@@ -80,9 +80,15 @@ def judge_link(
     terrain = setup.scenario.terrain
     antenna = None if terrain is None else station_antenna(setup, link, terrain)
     if terrain is None or antenna is None:
-        return JudgedLink(
-            make_finding("link", FLIGHT, ok=None, reason=_unknown_station_text(whole_requirements, link), unit="s")
-        )
+        if setup.scenario.terrain is None:
+            reason = "no terrain was given"
+        else:
+            reason = (
+                "neither the station's position nor a home is known"
+                if link.station is None and setup.mission.home is None
+                else "the ground at the station is unknown"
+            )
+        return JudgedLink(make_finding("link", FLIGHT, ok=None, reason=reason, unit="s"))
     path = whole_requirements.path
     planned = link_along_path(link, terrain, antenna, path.times, path.points)
     track, judged_link = None, planned
@@ -115,16 +121,6 @@ def judge_link(
         link, (planned, judged_link), outages, reactions, (text, reaction_text), geometric=geometric
     )
     return JudgedLink(finding, judged_link, antenna, leg, returns)
-
-
-def _unknown_station_text(requirements: RouteRequirements, link: RadioLink) -> str:
-    """Explain why the position of the station's antenna is unknown."""
-    setup = requirements.setup
-    if setup.scenario.terrain is None:
-        return "no terrain was given"
-    if link.station is None and setup.mission.home is None:
-        return "neither the station's position nor a home is known"
-    return "the ground at the station is unknown"
 
 
 # ----------------------------------------------------------------------

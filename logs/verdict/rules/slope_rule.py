@@ -145,7 +145,25 @@ def _flown_messages(
     need_text = "" if is_planned_steep else f"; the leg needs {math.degrees(planned_slope):.1f}°"
     performance_faults = [message(f"{fault.brief}{need_text if fault is faults[0] else ''}") for fault in faults]
     flown_faults = _flown_faults(requirements, leg, measure, limit, performance_faults)
-    facts = [text for name, text in _flown_facts(requirements, leg, measure) if name not in flown_faults]
+    named_facts = []
+    if measure.slope is not None:
+        named_facts.append(("slope", f"flown {math.degrees(measure.slope.value):+.2f}°"))
+    if measure.height_error is not None:
+        line = "the leg's height above ground" if follows_ground(requirements, leg) else "the leg"
+        named_facts.append(("height", f"altitude within {abs(measure.height_error):.1f} m of {line}"))
+    named_facts += [
+        (name, f"{_throttle_text(requirements, name)} for {duration:.0f} s")
+        for name, duration, _, _ in _throttle_times(measure)
+        if duration >= 1.0
+    ]
+    if measure.pitch_limit_time >= SATURATED_TIME_S:
+        limit_name = requirements.setup.autopilot.speeds.max_pitch_name
+        named_facts.append(("pitch", f"pitch at its limit {limit_name} for {measure.pitch_limit_time:.0f} s"))
+    arc = steep_arc(requirements, leg)
+    if arc is not None and _is_arc_within_tolerance(arc, measure):
+        place = place_text(requirements.waypoint(leg + 1))
+        named_facts.append(("arc", f"the arc at {place} misses its height by only {arc.missing_height:.1f} m"))
+    facts = [text for name, text in named_facts if name not in flown_faults]
     if requirements.envelope:
         return performance_faults, facts + [fault.brief for fault in flown_faults.values()]
     return [*flown_faults.values(), *performance_faults], facts
@@ -423,29 +441,6 @@ def _throttle_times(measure: SlopeMeasure) -> tuple[tuple[str, float, float, str
         ("full", measure.full_throttle_time, measure.speed_loss, "slow"),
         ("idle", measure.idle_throttle_time, measure.speed_gain, "fast"),
     )
-
-
-def _flown_facts(requirements: RouteRequirements, leg: int, measure: SlopeMeasure) -> list[tuple[str, str]]:
-    """Describe how a leg was flown, as pairs of a quantity's name and a text."""
-    facts = []
-    if measure.slope is not None:
-        facts.append(("slope", f"flown {math.degrees(measure.slope.value):+.2f}°"))
-    if measure.height_error is not None:
-        line = "the leg's height above ground" if follows_ground(requirements, leg) else "the leg"
-        facts.append(("height", f"altitude within {abs(measure.height_error):.1f} m of {line}"))
-    facts += [
-        (name, f"{_throttle_text(requirements, name)} for {duration:.0f} s")
-        for name, duration, _, _ in _throttle_times(measure)
-        if duration >= 1.0
-    ]
-    if measure.pitch_limit_time >= SATURATED_TIME_S:
-        limit_name = requirements.setup.autopilot.speeds.max_pitch_name
-        facts.append(("pitch", f"pitch at its limit {limit_name} for {measure.pitch_limit_time:.0f} s"))
-    arc = steep_arc(requirements, leg)
-    if arc is not None and _is_arc_within_tolerance(arc, measure):
-        place = place_text(requirements.waypoint(leg + 1))
-        facts.append(("arc", f"the arc at {place} misses its height by only {arc.missing_height:.1f} m"))
-    return facts
 
 
 def _measured_facts(requirements: RouteRequirements, leg: int, measure: SlopeMeasure | None) -> list[Fact]:

@@ -237,7 +237,19 @@ def _planned_finding(
     tolerance = max(MIN_PHOTO_HEIGHT_ERROR_M, PHOTO_HEIGHT_FRACTION * height)
     off_altitude = _off_altitude_length(requirements, before, line.first, line.last, tolerance)
     cut_in = max(turn_in, off_altitude)
-    cut_out = _clip_to_length(_turn_lead(requirements, line) - lead_out, length)
+    # Distance before the waypoint at the line's end at which the turn begins.
+    setup, last = requirements.setup, line.ends
+    if setup.autopilot.turns.follows_path or not 0 < last < requirements.legs:
+        turn_lead = float(requirements.length_before[last])
+    elif setup.autopilot.turns.radii_at is not None:
+        turn_lead = float(setup.autopilot.turns.radii_at(requirements.ground_speed[last - 1 : last])[0])
+    else:
+        turn = abs(float(requirements.turns[last]))
+        mission_radius = (
+            float(setup.route.points["acceptance_radius"][last]) if setup.autopilot.turns.reads_acceptance else 0.0
+        )
+        turn_lead = mission_radius or setup.autopilot.turns.distance(turn, float(requirements.points[last, 2]))
+    cut_out = _clip_to_length(turn_lead - lead_out, length)
     straight_fraction = max(0.0, length - cut_in - cut_out) / length
     # Fraction of the line whose height above ground is unknown.
     axis = LineAxis(requirements.points[line.first : line.last + 1])
@@ -272,20 +284,6 @@ def _unknown_ground_message(requirements: RouteRequirements, fraction: float, le
     terrain = requirements.setup.scenario.terrain
     source_text = "the terrain data" if terrain is None else f"the data of {terrain.source}"
     return message(f"{name}: {100.0 * fraction:.0f} % of its {length:.0f} m lies outside {source_text}")
-
-
-def _turn_lead(requirements: RouteRequirements, line: PhotoLine) -> float:
-    """Return the distance before the waypoint at a photo line's end at which the turn begins, m."""
-    setup, last = requirements.setup, line.ends
-    if setup.autopilot.turns.follows_path or not 0 < last < requirements.legs:
-        return float(requirements.length_before[last])
-    if setup.autopilot.turns.radii_at is not None:
-        return float(setup.autopilot.turns.radii_at(requirements.ground_speed[last - 1 : last])[0])
-    turn = abs(float(requirements.turns[last]))
-    mission_radius = (
-        float(setup.route.points["acceptance_radius"][last]) if setup.autopilot.turns.reads_acceptance else 0.0
-    )
-    return mission_radius or setup.autopilot.turns.distance(turn, float(requirements.points[last, 2]))
 
 
 def _clip_to_length(distance: float, length: float) -> float:
