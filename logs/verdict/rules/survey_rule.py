@@ -27,6 +27,7 @@ from logs.verdict.measures.photo_lines import (
     is_covered,
     measure_line,
     measure_overlap,
+    planned_switch_radius,
 )
 from logs.verdict.measures.route_requirements import RouteRequirements, slope_limits, turn_limit
 from logs.verdict.measures.track_alignment import AlignedTrack
@@ -237,7 +238,9 @@ def _planned_finding(
     tolerance = max(MIN_PHOTO_HEIGHT_ERROR_M, PHOTO_HEIGHT_FRACTION * height)
     off_altitude = _off_altitude_length(requirements, before, line.first, line.last, tolerance)
     cut_in = max(turn_in, off_altitude)
-    cut_out = _clip_to_length(_turn_lead(requirements, line) - lead_out, length)
+    turn_out = _clip_to_length(_turn_lead(requirements, line) - lead_out, length)
+    camera_out = _planned_camera_cut(requirements, line, length)
+    cut_out = max(turn_out, camera_out)
     straight_fraction = max(0.0, length - cut_in - cut_out) / length
     unknown_fraction = min(_unknown_ground_fraction(requirements, line), straight_fraction)
     ok = is_covered(straight_fraction - unknown_fraction, unknown_fraction)
@@ -249,6 +252,8 @@ def _planned_finding(
         cause, usable_state = ("the turns at its ends leave", "straight")
         if off_altitude > turn_in:
             cause, usable_state = ("the climb or descent before it leaves", "at its planned height above ground")
+        elif camera_out > max(cut_in, turn_out):
+            cause, usable_state = ("the camera, which is switched off before its end, leaves", "with photos")
         faults.append(
             message(
                 f"{name}: {cause} only {100.0 * straight_fraction:.0f} % of its {length:.0f} m {usable_state}",
@@ -288,6 +293,18 @@ def _turn_lead(requirements: RouteRequirements, line: PhotoLine) -> float:
         float(setup.route.points["acceptance_radius"][last]) if setup.autopilot.turns.reads_acceptance else 0.0
     )
     return mission_radius or setup.autopilot.turns.distance(turn, float(requirements.points[last, 2]))
+
+
+def _planned_camera_cut(requirements: RouteRequirements, line: PhotoLine, length: float) -> float:
+    """Return the length at the end of a planned photo line on which the camera is already switched off, m.
+
+    The autopilot switches it off where it counts the waypoint as reached.
+    """
+    off = line.camera_off_at
+    if off < 0:
+        return 0.0
+    beyond_end = float(requirements.runs[line.last : off].sum()) - float(requirements.runs[off : line.last].sum())
+    return _clip_to_length(planned_switch_radius(requirements, off) - beyond_end, length)
 
 
 def _clip_to_length(distance: float, length: float) -> float:
