@@ -129,8 +129,8 @@ def _add_shared_options(parser: CommandParser) -> None:
     parser.add_argument(
         "--resume",
         action="store_true",
-        help="continue the campaign in --out, with its options unless they are given; an option that contradicts them "
-        "is refused",
+        help="continue the campaign in --out with the options of its flights; an option that contradicts them is "
+        "refused",
     )
     add_result_options(
         parser,

@@ -266,6 +266,17 @@ def _switch_radii(
     return acceptance_condition(requirements, waypoint).radius
 
 
+def planned_switch_radius(requirements: RouteRequirements, waypoint: int) -> float:
+    """Return the distance before a waypoint at which the items after it switch the camera on the planned path, m."""
+    turns = requirements.setup.autopilot.turns
+    if turns.follows_path or _is_gate(requirements, waypoint):
+        return 0.0
+    if turns.radii_at is not None:
+        leg = max(0, waypoint - 1)
+        return float(turns.radii_at(requirements.ground_speed[leg : leg + 1])[0])
+    return acceptance_condition(requirements, waypoint).radius
+
+
 def _is_gate(requirements: RouteRequirements, waypoint: int) -> bool:
     """Return True if a waypoint of the route is a gate (CONDITION_GATE)."""
     seq = int(requirements.setup.route.items[waypoint])

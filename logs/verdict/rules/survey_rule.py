@@ -27,6 +27,7 @@ from logs.verdict.measures.photo_lines import (
     is_covered,
     measure_line,
     measure_overlap,
+    planned_switch_radius,
 )
 from logs.verdict.measures.route_requirements import RouteRequirements, slope_limits, turn_limit
 from logs.verdict.measures.track_alignment import AlignedTrack
@@ -249,7 +250,9 @@ def _planned_finding(
             float(setup.route.points["acceptance_radius"][last]) if setup.autopilot.turns.reads_acceptance else 0.0
         )
         turn_lead = mission_radius or setup.autopilot.turns.distance(turn, float(requirements.points[last, 2]))
-    cut_out = _clip_to_length(turn_lead - lead_out, length)
+    turn_out = _clip_to_length(turn_lead - lead_out, length)
+    camera_out = _planned_camera_cut(requirements, line, length)
+    cut_out = max(turn_out, camera_out)
     straight_fraction = max(0.0, length - cut_in - cut_out) / length
     # Fraction of the line whose height above ground is unknown.
     axis = LineAxis(requirements.points[line.first : line.last + 1])
@@ -266,6 +269,8 @@ def _planned_finding(
         cause, usable_state = ("the turns at its ends leave", "straight")
         if off_altitude > turn_in:
             cause, usable_state = ("the climb or descent before it leaves", "at its planned height above ground")
+        elif camera_out > max(cut_in, turn_out):
+            cause, usable_state = ("the camera, which is switched off before its end, leaves", "with photos")
         faults.append(
             message(
                 f"{name}: {cause} only {100.0 * straight_fraction:.0f} % of its {length:.0f} m {usable_state}",
@@ -284,6 +289,18 @@ def _unknown_ground_message(requirements: RouteRequirements, fraction: float, le
     terrain = requirements.setup.scenario.terrain
     source_text = "the terrain data" if terrain is None else f"the data of {terrain.source}"
     return message(f"{name}: {100.0 * fraction:.0f} % of its {length:.0f} m lies outside {source_text}")
+
+
+def _planned_camera_cut(requirements: RouteRequirements, line: PhotoLine, length: float) -> float:
+    """Return the length at the end of a planned photo line on which the camera is already switched off, m.
+
+    The autopilot switches it off where it counts the waypoint as reached.
+    """
+    off = line.camera_off_at
+    if off < 0:
+        return 0.0
+    beyond_end = float(requirements.runs[line.last : off].sum()) - float(requirements.runs[off : line.last].sum())
+    return _clip_to_length(planned_switch_radius(requirements, off) - beyond_end, length)
 
 
 def _clip_to_length(distance: float, length: float) -> float:
