@@ -364,7 +364,7 @@ def _problems_with_radars(task: FrontTask) -> Iterator[ProblemArrays]:
 
 
 def _list_routes(data: ProblemArrays, frame: RotatedFrame, default: Floats) -> list[Floats]:
-    """Return routes (w, 3) on different sides of missile spheres and zones, up to the longest length of a plan."""
+    """Return routes (w, 3) past missile spheres and zones on different sides; `default` is the default path."""
     count, bound = len(default), MAX_LENGTH_RATIO * float(path_length(default))
     span = (-0.5 * bound, 0.5 * bound)
     if is_limited(data.airspace):
