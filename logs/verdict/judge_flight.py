@@ -19,7 +19,6 @@ from logs.verdict.places import AirframeAnswer, Disagreement, LevelAnswer, Refer
 from logs.verdict.rule_words import FRONT_OVERLAP, GROUND_RULES, SIDE_OVERLAP
 from logs.verdict.rules.registry import (
     blocking_item_findings,
-    geometric_findings,
     run_rules,
     with_passing_suggestions,
     with_suggestions,
@@ -115,7 +114,8 @@ def _level_answers(
     """
     levels, notes = [], setup_notes(requirements.setup, flight_findings)
     if requirements.envelope:
-        geometric = (*blocking_item_findings(requirements.setup), *geometric_findings(requirements, flight_findings))
+        route_findings = run_rules(requirements, None, geometric=True, flight_findings=flight_findings)
+        geometric = (*blocking_item_findings(requirements.setup), *route_findings)
         has_failed = any(finding.ok is False for finding in geometric)
         passes = not has_failed and not undecided_findings(geometric)
         disagreements = _disagreements("geometry", geometric, flight_findings)

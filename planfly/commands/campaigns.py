@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from planfly.commands.registry import call_api
 from planfly.terminal.arguments import complete_mission_or_scenario, file_completer, number_parser, with_completer
 from planfly.terminal.command_parser import CommandParser, LineParser
 from planfly.terminal.exit_codes import FLYABLE, INCOMPLETE, NOT_FLYABLE
@@ -17,6 +16,7 @@ from planfly.terminal.options import (
     add_result_options,
     add_steering_options,
     add_world_options,
+    call_api,
 )
 from planfly.terminal.output import write_error_if_requested, write_json_if_requested, write_suite_if_requested
 from planfly.workflow.output_paths import RESULTS

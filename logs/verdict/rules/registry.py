@@ -102,17 +102,6 @@ def blocking_item_findings(setup: FlightSetup) -> list[Finding]:
     return [finding for finding in findings if finding.ok is False or undecided_findings([finding])]
 
 
-def geometric_findings(
-    requirements: RouteRequirements, flight_findings: Sequence[Finding] | None = None
-) -> tuple[Finding, ...]:
-    """Return the findings on a route's geometry, compared with the aircraft's envelope.
-
-    flight_findings: findings on a flight of the route.  Findings of rules with `Rule.is_same_for_plan` are copied from
-        them; None to run these rules, too.
-    """
-    return run_rules(requirements, None, geometric=True, flight_findings=flight_findings)
-
-
 def run_rules(
     requirements: RouteRequirements,
     aligned: AlignedTrack | None,
@@ -130,7 +119,8 @@ def run_rules(
     log_complete: True if the log is not cut off.
     includes_whole_flight: True to include rules that judge the whole flight, and to keep only the worst findings of
         each stop; False for only the findings on legs, corners, threats and zones.
-    flight_findings: as in `geometric_findings`.
+    flight_findings: findings on a flight of a route that is judged by its geometry.  Findings of rules with
+        `Rule.is_same_for_plan` are copied from them; None to run these rules, too.
     """
     findings: list[Finding] = []
     for rule in RULES.values():
