@@ -55,7 +55,7 @@ class SetupModel(BaseModel):
 
     @classmethod
     def from_dataclass(cls, value: object) -> Self:
-        """Make the table of a dataclass from the dataclass's fields."""
+        """Make a table from an object of the dataclass that it stores."""
         return cls.model_validate(value, from_attributes=True, by_alias=False, by_name=True)
 
     def fault(self, file: str, field: str, message: str) -> LogError:
