@@ -114,7 +114,8 @@ _CHECK_INTERVAL_NS = 200_000_000
 class FlightEvents:
     """Converter of flight events to Log messages.
 
-    It remembers the last leg and the threats in range, so that the events do not depend on how rows are split into blocks.
+    It remembers the last leg and the threats in range, so that the events do not depend on how the rows are split into
+    blocks.
     """
 
     def __init__(self, setup: FlightSetup, channel: int) -> None:

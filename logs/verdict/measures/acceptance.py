@@ -88,6 +88,7 @@ def corner_depths(requirements: RouteRequirements, leg: int) -> Floats:
 def corridor_limit(requirements: RouteRequirements, leg: int) -> tuple[float, str]:
     """Return the half width (m) of the corridor along a leg, and the name of its source.
 
+    The source is "scenario", "circle" (a loiter), "fly-by path" (the planned turns), "default" or "autopilot".
     Without a corridor in the scenario, the half width allows the planned turns at the leg's ends.  If the autopilot
     steers to the center of a loiter at the leg's end, the corridor includes the whole loiter and a turn back next to
     it.
@@ -152,10 +153,11 @@ def farthest_from_legs(points: Floats, legs: Floats) -> tuple[float, int]:
 
 
 def negligible_kink_distance(requirements: RouteRequirements, waypoint: int) -> float | None:
-    """Return the largest distance of a flyable shortcut from the waypoints that it omits, m.
+    """Return how far a shortcut past a waypoint passes from the waypoints that it omits, m.
 
-    The shortcut omits the waypoint and up to `KINK_WAYPOINT_COUNT` - 1 of its neighbours.  Return None if there is no
-    such shortcut.
+    An aircraft that cannot fly the corner at the waypoint as drawn can fly the shortcut instead.  The shortcut omits
+    the waypoint and up to `KINK_WAYPOINT_COUNT` - 1 of its neighbours; the distance is that of the farthest of them.
+    Return None if no shortcut is flyable.
     """
     for count in range(1, KINK_WAYPOINT_COUNT + 1):
         for first in range(max(1, waypoint - count + 1), min(waypoint, requirements.legs - count) + 1):

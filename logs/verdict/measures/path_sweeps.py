@@ -130,7 +130,7 @@ def _sphere_visits(points: Floats, time: Floats, centres: Floats, radii: Floats,
 
 @inner
 def _block_boxes(points: Floats) -> _Boxes:
-    """Return the bounding boxes of all blocks of segments."""
+    """Return the bounding box of each block of `_BLOCK_SEGMENTS` successive segments of a path (n, 3)."""
     segments = max(0, points.shape[0] - 1)
     count = -(-segments // _BLOCK_SEGMENTS)
     boxes = _Boxes(np.empty((count, 3)), np.empty((count, 3)), np.empty(count))

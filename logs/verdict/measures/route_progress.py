@@ -200,9 +200,10 @@ def rtl_arrival_circle(route: Route) -> tuple[Floats, float] | None:
 def _match_rows(track: Floats, samples: Floats, radii: Floats, capture: float, anywhere: bool) -> Numbers:
     """Match the rows of a track to the samples of a route, both in order, at the lowest total cost.
 
-    The cost of a row is min(distance, capture)^2.  The cost of a skipped sample is `_SKIP_FRACTION` of this cost plus
-    `_SKIP_DISTANCE_M`^2.  If several ends have the same cost, the earliest is taken.
-    A start at a later sample costs `_LATE_START_M`^2 for each sample before it.
+    By dynamic programming: the cheapest match of the first i rows that ends at sample j is one of four moves longer
+    than a match of fewer rows or samples.  The cost of a row is min(distance, capture)^2.  The cost of a skipped sample
+    is `_SKIP_FRACTION` of this cost plus `_SKIP_DISTANCE_M`^2.  If several ends have the same cost, the earliest is
+    taken. A start at a later sample costs `_LATE_START_M`^2 for each sample before it.
 
     track: positions, m, (n, 2).
     samples, radii: route samples, m, (m, 2), and the radii within which they are reached, m, (m,).

@@ -359,8 +359,9 @@ class RouteRequirements:
     blend: (w,) m of leg beyond each turn on which the slope still changes.
     fly_by_offset: (w,) m by which the fly-by passes the waypoint.
     turn_limit: (w,) rad, as `TurnRequirements.limit`; inf if the envelope is omitted.
-    climb, dive: (w - 1,) rad over the ground, the minimum along the leg; inf if the envelope is omitted.
-    certain_climb, certain_dive: (w - 1,) the certain part of these limits if the aircraft model is uncertain.
+    climb, dive: (w - 1,) steepest climb and descent over the ground that the aircraft can fly everywhere on the leg,
+        rad; inf if the envelope is omitted.
+    certain_climb, certain_dive: (w - 1,) the same, lowered by the uncertainty of the aircraft's model.
     ground_speed: (w - 1,) m/s, NaN if the wind leaves no ground speed.
     possible_bank: largest bank limit that the aircraft may have, rad; the setup's bank limit unless it is a guess.
     possible_turn_limit, possible_min_radius: (w,) as `turn_limit` and `min_radius`, with this bank limit.
@@ -744,7 +745,7 @@ class GroundSlopeLimit(NamedTuple):
     """Limit on the slope between the ground and a waypoint.
 
     limit: rad, positive.
-    certain: the certain part of the limit if the aircraft's model is uncertain, rad.
+    certain: the limit lowered by the uncertainty of the aircraft's model, rad.
     source: "scenario" or "aircraft".
     airspeed: true airspeed to which the limit applies, m/s.
     """

@@ -227,10 +227,10 @@ def _advance_last_leg(
     centers: Floats,
     arrival_radius: Floats,
 ) -> None:
-    """Move the start of the last leg in `rows` to the row in which the track entered the arrival circle.
+    """Move the row of the last passed waypoint back to the entry into its arrival circle, in place.
 
-    `rows` changes only if the track ends before the last passed waypoint, but inside its arrival circle.  The autopilot
-    is then already on the next leg.
+    This is done only if the track ends inside this circle, before the waypoint itself.  The autopilot is then already
+    on the next leg.
     """
     last_passed = int(np.flatnonzero(passed)[-1]) if passed.any() else 0
     if (

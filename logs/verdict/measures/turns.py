@@ -153,7 +153,10 @@ class TurnMeasure:
 
 
 def measure_turns(requirements: RouteRequirements, aligned: AlignedTrack) -> list[TurnMeasure]:
-    """Measure the turn at every inner waypoint, in order."""
+    """Measure the turn at every inner waypoint, in order.
+
+    In an imported flight, overshoot and minimum distance are those of the corner (`CornerPass`).
+    """
     measures = [measure_turn(requirements, aligned, waypoint) for waypoint in range(1, requirements.legs)]
     if requirements.setup.imported_log is None:
         return measures

@@ -1,6 +1,6 @@
 """Find the legs on which a plan violates a threat, a zone or the area, or passes a missile's sphere closely.
 
-Findings name only the object.
+A finding names only the threat, the zone or the area, not the legs.
 """
 
 import math

@@ -102,7 +102,8 @@ def depth_bounds(
     """Return lower and upper bounds of the depth of a violation along one part of a move, m.
 
     The depth is the distance into an exclusion zone, or out of an inclusion zone; it is negative for a compliant point.
-
+    A distance changes by at most the length that is flown.  Along the part it is therefore at most half of (sum of the
+    distances at both ends + length), and at least half of (this sum - length).
     length: length of the part, m.
     height_change: largest change of the part's height relative to the zone's altitude band, m.
     max_distance: upper bound of the depth relative to the zone's outline alone, m.
@@ -412,7 +413,7 @@ def _bisect_move(
 
 @inner
 def _is_unknown(exclusion: bool, part: Record) -> bool:
-    """Return True if the violation depth at both ends of a part of a move is unknown (NaN), as is the ground."""
+    """Return True if the violation depth is unknown (NaN) at both ends of a part, because the ground is unknown."""
     start_depth = violation_depth(exclusion, part.outline_distance, part.band_distance)
     end_depth = violation_depth(exclusion, part.end_outline_distance, part.end_band_distance)
     return start_depth != start_depth and end_depth != end_depth
@@ -434,7 +435,11 @@ def _update_depth(move: Record, part: Record, exclusion: bool, visit: Record) ->
 
 @inner
 def _add_part(move: Record, part: Record, exclusion: bool, visit: Record) -> None:
-    """Add the violation in a part of a move to a visit.  The part crosses the zone's limit at most once."""
+    """Add the violation in a part of a move to a visit.
+
+    The part crosses the zone's limit at most once; the crossing is interpolated linearly between the depths at its
+    ends.
+    """
     start_depth = violation_depth(exclusion, part.outline_distance, part.band_distance)
     end_depth = violation_depth(exclusion, part.end_outline_distance, part.end_band_distance)
     if not (start_depth > 0.0 or end_depth > 0.0):
