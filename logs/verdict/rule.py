@@ -32,7 +32,8 @@ class Judge(Protocol):
 ItemsJudge = Callable[[FlightSetup], list[Finding]]
 # Function that judges how a flight ended (reason for its end) and whether its log is complete.
 EndJudge = Callable[[RouteRequirements, AlignedTrack | None, str, bool], list[Finding]]
-# Function that judges all stretches of an imported flight together, and whether planfly's own log is complete.
+# Function that judges together all parts of an imported flight that followed the mission, and whether planfly's own log
+# is complete.
 ImportedEndJudge = Callable[[FlightSetup, Sequence[FlownLegs], bool], Finding]
 # Function that replaces findings of other rules, or adds to their reasons, after all rules have judged.
 Merge = Callable[[RouteRequirements, AlignedTrack | None, Sequence[Finding]], tuple[Finding, ...]]

@@ -421,8 +421,9 @@ def _level_speeds(requirements: RouteRequirements, altitude: float, current_spee
 
 
 def _slope_speed(requirements: RouteRequirements, leg: int, slope: float) -> float | None:
-    """Return the nearest other commanded airspeed at which the aircraft holds a slope, m/s, or None.
+    """Return the commanded airspeed closest to the present one at which the aircraft holds a slope, m/s.
 
+    Return None if it certainly holds the slope at no other airspeed.
     slope: absolute value of the slope, rad.
     """
     course = float(requirements.courses[leg])
@@ -485,7 +486,7 @@ def _round_to_meter(length: float) -> float:
 def suggest_wider_berth(
     requirements: RouteRequirements, aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
-    """Suggest passing a missile at a greater distance, outside its sphere; return () if none applies."""
+    """Suggest passing a missile at a greater distance, outside its sphere; return () for any other place."""
     missile = finding.place.index
     if missile is None or finding.place.kind != "missile":
         return ()
@@ -580,7 +581,7 @@ def _suggest_other_frame(setup: FlightSetup, frame: Frame) -> tuple[Suggestion, 
 
 
 def _suggest_lower_reading(setup: FlightSetup) -> tuple[Suggestion, ...]:
-    """Suggest two corrections that lower a path: home set on the ground, and heights above home read as AMSL."""
+    """Suggest setting home on the ground, and reading heights above home as AMSL, if these lower the path."""
     home_on_ground = _suggest_home_on_ground(setup) if home_height(setup) > 0.0 else ()
     return (*home_on_ground, *_suggest_other_frame(setup, Frame.GLOBAL))
 

@@ -68,6 +68,7 @@ def altitude_error(requirements: RouteRequirements, leg: int, position: Floats) 
     """Return the altitude error of a position on a leg, m, positive above.
 
     The demanded altitude lies on the straight line of the leg, or above the ground on a leg that follows the ground.
+
     position: east, north and up, m, (3,).
     """
     if follows_ground(requirements, leg):

@@ -314,6 +314,7 @@ def _photo_spacing(mission: Mission, photo_spacing: float, speeds: Floats) -> Fl
     """Return the distance between photos that the camera achieves at each ground speed, m, (n,).
 
     It is longer than the stated distance if the camera needs more time between two photos.
+
     photo_spacing: distance between photos that the items state, m.
     speeds: m/s, (n,).
     """
@@ -579,6 +580,7 @@ def _with_side_overlap(
 
     All lines are projected onto the first line and divided into the same steps along it.  From one side of the survey
     to the other, each line is compared at every step with the line that was last seen there.
+
     Two lines are neighbours if they run side by side, no other line lies between them (even one that was lost), and
     their distance is close to the survey's spacing.  A much larger distance spans a notch in the survey's area.
     """

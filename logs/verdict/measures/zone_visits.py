@@ -104,6 +104,7 @@ def depth_bounds(
     The depth is the distance into an exclusion zone, or out of an inclusion zone; it is negative for a compliant point.
     A distance changes by at most the length that is flown.  Along the part it is therefore at most half of (sum of the
     distances at both ends + length), and at least half of (this sum - length).
+
     length: length of the part, m.
     height_change: largest change of the part's height relative to the zone's altitude band, m.
     max_distance: upper bound of the depth relative to the zone's outline alone, m.

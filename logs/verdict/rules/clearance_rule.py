@@ -208,7 +208,7 @@ class _Landing(NamedTuple):
     leg: number of the final approach.
     item: number of the mission item.
     point: landing point (east, north), m.
-    is_judged_here: True if the final approach is judged by this rule, because the landing is flown and judged as such.
+    is_judged_here: True if this rule judges the final approach, because the flight continues down to the ground.
     """
 
     leg: int
@@ -240,7 +240,7 @@ def _find_landing(requirements: RouteRequirements) -> _Landing | None:
 def _fields_by_leg(
     requirements: RouteRequirements, landing: _Landing | None
 ) -> dict[int, tuple[tuple[float, float], ...]]:
-    """Return, by leg number, the home or landing positions near which the leg may be lower.
+    """Return the places near which each leg may be lower, by leg number: home or the landing point.
 
     A position is (east, north), m.  The legs of a flown or logged take-off have the position of home.  The final
     approach has the landing point.  So have earlier legs of the landing, from the last waypoint that keeps the full

@@ -91,7 +91,10 @@ _RETURN_MODE = "RTL"
 
 
 def imported_completion_finding(setup: FlightSetup, stretches: Sequence[FlownLegs], log_complete: bool) -> Finding:
-    """Judge whether an imported flight completed its mission; undecided if the log may lack a part of it."""
+    """Judge whether an imported flight completed its mission; undecided if the log may lack a part of it.
+
+    stretches: the legs that were flown in each part of the log that followed the mission, in order of time.
+    """
     last_leg, faults, unknown_texts, notes = setup.route.legs - 1, [], [], []
     flown_legs = {leg for legs in stretches for leg in range(legs.first, legs.last - legs.partial)}
     leg_count = len(set(setup.route.leg_numbers.tolist()))
@@ -215,19 +218,19 @@ def _missing_items_text(missing: MissingItems) -> str:
 
 
 def _ends_in_return(setup: FlightSetup, legs: FlownLegs) -> bool:
-    """Return True if a stretch ended in the return mode and the mission's next item is a return to launch."""
+    """Return True if a part of the log ended in mode RTL and the mission's next item is a return to launch."""
     item = int(setup.route.items[_next_waypoint(setup, legs)])
     commands = {mission_item.seq: mission_item.command for mission_item in setup.mission.items}
     return legs.stretch.next_mode == _RETURN_MODE and commands.get(item) == Command.NAV_RETURN_TO_LAUNCH
 
 
 def _next_waypoint(setup: FlightSetup, legs: FlownLegs) -> int:
-    """Return the waypoint to which a stretch was flying when it ended."""
+    """Return the waypoint to which the aircraft was flying when a part of the log ended."""
     return min(setup.route.legs, legs.last if legs.partial else legs.last + 1)
 
 
 def _next_waypoint_text(setup: FlightSetup, legs: FlownLegs) -> str:
-    """Name the waypoint to which a stretch was flying when it ended."""
+    """Name the waypoint to which the aircraft was flying when a part of the log ended."""
     waypoint = _next_waypoint(setup, legs)
     item = int(setup.route.items[waypoint])
     return f"waypoint {setup.route.stops[waypoint]}" + (f" (item {item})" if item >= 0 else "")

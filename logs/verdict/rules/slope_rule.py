@@ -269,7 +269,7 @@ def _limit_deviation(requirements: RouteRequirements, leg: int, limit: float, ce
 
 
 def _ability_text(requirements: RouteRequirements, leg: int, limit: float, source: str, *, has_failed: bool) -> str:
-    """Explain how the aircraft's uncertainty leaves a slope undecided, or how it limits the suggestions.
+    """Explain the effect of an uncertain aircraft model: an undecided slope, or a limit of the suggestions.
 
     Return "" for an aircraft without uncertainty.  Return "" also for a planned slope above the limit, because its own
     message states the limit.
@@ -283,7 +283,7 @@ def _ability_text(requirements: RouteRequirements, leg: int, limit: float, sourc
 
 
 def _certain_limit_text(requirements: RouteRequirements, leg: int, limit: float, source: str) -> str:
-    """State the certain part of a slope limit; suggested slopes stay within this part.
+    """State which slope an aircraft with an uncertain model can fly for certain; suggestions stay within it.
 
     Return "" if the whole limit is certain, or if the limit does not come from the aircraft.
     limit, source: limit of the slope, rad, and its source.
@@ -546,7 +546,7 @@ def _height_error_limit(measure: SlopeMeasure) -> float:
 
 
 def _rate_limit_slope(requirements: RouteRequirements, leg: int, *, is_climb: bool) -> tuple[float, str]:
-    """Return the slope over the ground at the autopilot's climb or sink rate limit, and its name.
+    """Return the slope over the ground at the autopilot's climb or sink rate limit, rad, and the limit's name.
 
     The slope is inf without a limit, and for an imported flight whose log does not contain the parameter.
     """

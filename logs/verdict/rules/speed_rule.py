@@ -69,7 +69,10 @@ def speed_findings(
 def _speed_finding(
     requirements: RouteRequirements, aligned: AlignedTrack | None, leg: int, demanded: float, *, geometric: bool
 ) -> Finding:
-    """Judge the commanded and the flown airspeed on a leg; `demanded`: the mission's, true or equivalent, m/s."""
+    """Judge the commanded and the flown airspeed on a leg.
+
+    demanded: airspeed as the mission states it, m/s; the autopilot treats it as true or as equivalent airspeed.
+    """
     commanded = float(requirements.route.leg_airspeeds[leg])
     min_speed, max_speed, faults = _level_speed_range(requirements, leg, commanded)
     notes = [*_speed_range_notes(requirements, leg), _command_text(demanded, commanded, min_speed, max_speed)]
@@ -131,7 +134,7 @@ def _speed_finding(
 def _command_text(demanded: float, commanded: float, min_speed: float, max_speed: float) -> str:
     """Describe the commanded airspeed on a leg, and the range of airspeeds in level flight, m/s.
 
-    demanded: commanded equivalent airspeed, m/s.
+    demanded: airspeed as the mission states it, m/s: true airspeed, or equivalent airspeed for some autopilots.
     commanded: the commanded airspeed as true airspeed, m/s; the text states it only if it differs.
     """
     true_speed_text = "" if demanded == commanded else f" of equivalent airspeed, {commanded:.1f} m/s of true airspeed,"
@@ -305,8 +308,9 @@ def _level_speed_range(
 def _measure_airspeed(
     requirements: RouteRequirements, aligned: AlignedTrack, leg: int
 ) -> tuple[float, float, float] | None:
-    """Return a leg's mean airspeed, its tolerance and its minimum one-second mean, m/s, or None.
+    """Return a leg's mean airspeed, its tolerance and its minimum one-second mean, m/s.
 
+    Return None if the leg was flown steadily for too short a time.
     The tolerance allows for gusts and for a change of slope at the start of the leg.
     """
     rows = steady_rows(requirements, aligned, leg)
