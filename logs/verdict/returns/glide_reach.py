@@ -110,7 +110,12 @@ def _fill_altitudes_left(
     altitude_left: Floats,
     reached_cells: Codes,
 ) -> None:
-    """Fill `altitude_left` (m) and `reached_cells` for each start, by simulating a left and a right turn to a glide."""
+    """Fill `altitude_left` (m) and `reached_cells` for each start.
+
+    After the reaction time the aircraft turns left or right, in steps of `_TURN_STEP_RAD`, until it heads along the
+    path that the glide map stores for its cell.  Its altitude there, less the minimum altitude of the cell, is the
+    altitude left; the better of the two turns counts.
+    """
     state_array = np.zeros(1, _TURN_STATE)
     state = state_array[0]
     max_speed = aircraft.first_airspeed + (excess_table.shape[1] - 1) * aircraft.airspeed_step

@@ -188,9 +188,10 @@ class _ReturnTrial:
 
 
 def suggest_parameters(world: ReturnWorld, starts: ReturnStarts) -> list[Remedy]:
-    """Suggest the lowest return height that clears the ground or is safe, or another change of parameters.
+    """Suggest return heights, or else other parameters, with which every return is safe.
 
-    Return [] if the returns already keep all limits with the present parameters.
+    Up to two heights are suggested: the lowest with which all returns clear the ground, and the lowest with which all
+    are safe.  Return [] if the returns already keep all limits with the present parameters.
     Heights are tried one by one, because a higher return may lead through a sphere and need not be safer.
     """
     limits = _return_limits(world, starts)
@@ -253,7 +254,7 @@ class _AltitudeSearch:
         return {name: altitude for name, present in self._present_values.items() if altitude > present}
 
     def lowest(self, min_altitude: float, criterion: Criterion, trial: _ReturnTrial) -> float | None:
-        """Return the lowest height, at least `min_altitude` (m), with which all returns pass, or None."""
+        """Return the lowest height (at least `min_altitude`, m) with which all returns pass; None if none does."""
         return first_that_passes(
             (altitude for altitude in self._candidates if altitude >= min_altitude),
             lambda altitude: trial.passes(self._world.with_parameters(**self.values(altitude)), criterion),
