@@ -49,7 +49,8 @@ class AcceptanceCondition:
 def acceptance_condition(requirements: RouteRequirements, waypoint: int) -> AcceptanceCondition:
     """Return the distance within which a waypoint is reached, and its source.
 
-    The radius of the mission item applies, or else the autopilot's radius.  ArduPlane turns to the next leg at
+    The radius of the mission item applies, or else the autopilot's radius, or for an autopilot that follows the path
+    the distance at which the path itself passes.  ArduPlane turns to the next leg at
     WP_RADIUS before a corner of 90 degrees or more, and at a fraction of WP_RADIUS before a gentler corner.  The full
     WP_RADIUS is allowed at the mission's end and where a return to launch begins.
     """
@@ -170,9 +171,8 @@ def negligible_kink_distance(requirements: RouteRequirements, waypoint: int) -> 
 
 
 def shortcut_distance(requirements: RouteRequirements, first: int, last: int) -> float | None:
-    """Return the distance of waypoints `first` to `last` from a straight path without them, m.
+    """Return the largest distance of waypoints `first` to `last` from the straight leg that would replace them, m.
 
-    The distance is the largest one of these waypoints.
     Return None if the distance exceeds `KINK_FRACTION` of the corridor's half width, if a waypoint belongs to a loiter,
     if the path is vertical, or if there is no room for the turns at its ends.
     """
@@ -228,7 +228,7 @@ def _gap_has_room(requirements: RouteRequirements, first: int, last: int) -> boo
 
 
 def _turn_fits_alone(requirements: RouteRequirements, before: int, corner: int, after: int) -> bool:
-    """Return True if a turn between straight legs from and to two other waypoints fits these legs.
+    """Return True if the turn at `corner` fits the straight legs from `before` and to `after`.
 
     Neighbouring turns are ignored.  This necessary condition is ten times faster than the full check of
     `_gap_has_room`.  The first and the last waypoint of the route have no turn.
@@ -258,7 +258,7 @@ def _turn_fits_alone(requirements: RouteRequirements, before: int, corner: int, 
 
 
 def step_height(requirements: RouteRequirements, leg: int) -> float | None:
-    """Return the altitude change of a leg steeper than its limit, m, if it is negligible; otherwise None.
+    """Return the altitude change of a leg that is too steep, m, if the change is negligible; otherwise None.
 
     The change is positive for a climb and for a descent.
     A change up to `NEGLIGIBLE_STEP_M` is negligible.  If a sequence of legs around the leg is too steep overall, the

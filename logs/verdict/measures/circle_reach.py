@@ -114,10 +114,10 @@ def _ground_hazards(
 def _missile_hazards(
     requirements: RouteRequirements, center: Floats, min_altitude: float, max_altitude: float, reach: float
 ) -> list[str]:
-    """Describe the missiles whose sphere overlaps a disc between two altitudes (m AMSL).
+    """Describe the missiles whose range a flight around a center may enter.
 
-    The disc has the radius `reach`, m.
-    Return [] for a mission without a scenario, because its threats are unknown.
+    The flight may be anywhere within `reach` (m) of the center, between the two altitudes (m AMSL).  Return [] for a
+    mission without a scenario, because its threats are unknown.
     center: east and north, m, (2,).
     """
     scenario = requirements.setup.scenario

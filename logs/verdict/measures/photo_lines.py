@@ -148,8 +148,8 @@ def measure_line(
 ) -> LineMeasure | None:
     """Measure a photo line on a flown track; return None if it was not reached or has only one row.
 
-    The conditions of a usable photo are applied one after another.  A step of the line is lost by the first condition
-    that it does not meet.
+    The line is divided into steps of about `PHOTO_STEP_M`.  The conditions of a usable photo are applied to each step
+    one after another; the first condition that a step fails is the cause of its loss.
     """
     rows = _line_rows(requirements, aligned, survey, line)
     if rows is None:

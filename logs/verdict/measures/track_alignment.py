@@ -363,10 +363,11 @@ def airspeed_gain_in_rising_air(time: Floats, airspeed: Singles, vertical_wind: 
 def _match_chords(
     position: Floats, marks: Floats, first: RowNumbers, last: RowNumbers, step: int, capture: float
 ) -> tuple[RowNumbers, NDArray[np.bool_]]:
-    """Assign each mark to a chord of the track, which spans `step` rows; the chords are in order of time.
+    """Assign each mark, such as a waypoint, to the chord of the track that passes it; chords are in order of time.
 
-    The assignment minimizes the sum of min(distance, capture)^2 by dynamic programming.  The earliest of equally good
-    assignments is taken.  Only the chords from `first` to `last` can capture a mark.
+    A chord is the straight line from a row of the track to the row `step` rows later.  The assignment minimizes the sum
+    of min(distance, capture)^2 by dynamic programming.  The earliest of equally good assignments is taken.  Only the
+    chords from `first` to `last` can capture a mark.
     position: positions of the track, m, (t, 3).
     marks: positions of the marks, m, (n, 3).
     first, last: first and last chord that can capture each mark, (n,).
@@ -466,7 +467,7 @@ _END_DELAY_S = 2.0
 
 
 def flown_phases(whole_requirements: RouteRequirements, track: Track) -> tuple[RouteRequirements, AlignedTrack | None]:
-    """Return requirements and aligned track of a flight's part between take-off and landing.
+    """Return requirements and aligned track of the airborne part of a flight, between take-off and landing.
 
     The track is None if it has fewer than two usable rows.
     whole_requirements: requirements of the whole route, returned unchanged for a flight without ground phases.

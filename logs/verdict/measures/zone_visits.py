@@ -46,7 +46,7 @@ PART = record_dtype(
 def distances_outside_zone(
     records: ZoneRecords, z: int, heights: Heights, to_pixel: PolyMapRecord, east: float, north: float, up: float
 ) -> tuple[float, float, int]:
-    """Return a position's distances outside zone `z`'s outline and altitude band, m, and the closest edge.
+    """Return how far a position is outside the outline and the altitude band of zone `z`, m, and the nearest edge.
 
     heights, to_pixel: terrain heights, m, and map from positions to their pixels.
     east, north, up: the position, m.
@@ -66,7 +66,9 @@ def violation_depth(exclusion: bool, outline_distance: float, band_distance: flo
 
     The depth is the shortest distance to the zone's limit, horizontally or vertically.  It is NaN if it depends on
     unknown ground.
-    outline_distance, band_distance: from `distances_outside_zone`.
+
+    exclusion: True for an exclusion zone, False for an inclusion zone.    outline_distance, band_distance: from
+    `distances_outside_zone`.
     """
     if band_distance != band_distance:
         # A position outside the zone's outline is outside the zone whatever the height of the ground.
@@ -130,6 +132,8 @@ def max_violation_bound(records: ZoneRecords, z: int, move: Record, part: Record
     The bound is inf if the part turns by more than a radian.  It uses the edges nearest to the part's ends: on a
     straight line, the distance from an edge, or from the centre of a circle, is largest at an end.  An arc of less than
     a radian deviates from its chord by at most curvature x length^2 / 8.
+
+    length: length of the part, m.
     """
     zone = records.zones[z]
     chord_deviation: float = 0.125 * abs(move.curvature) * length * length
@@ -195,7 +199,7 @@ _MERGE_TIME_S = 1e-6
 
 
 def path_zones(moves: Records, records: ZoneRecords, terrain: Terrain | None) -> Records:
-    """Return the visits of a path to z zones, (z,) of dtype `VISIT`.
+    """Measure where and how deep a path violates each of z zones; return (z,) of dtype `VISIT`.
 
     moves: the path, (m,) of dtype `logs.verdict.measures.path_moves.MOVE`.
     terrain: None if unknown.
