@@ -118,9 +118,9 @@ def _geographic_text(requirements: RouteRequirements, east: float, north: float)
 
 
 def _below_home_findings(requirements: RouteRequirements) -> list[Finding]:
-    """Report a route with a waypoint clearly below home as undecided; otherwise return [].
+    """Return an undecided finding if a waypoint is clearly below home, otherwise [].
 
-    Call this without terrain data: the ground is then assumed to be at home's altitude.
+    Call this without terrain data: nothing then shows that the ground is lower than home.
     """
     home = requirements.setup.mission.home
     if home is None:
@@ -138,7 +138,7 @@ def _below_home_findings(requirements: RouteRequirements) -> list[Finding]:
 
 
 def _home_above_ground_findings(requirements: RouteRequirements, leg_findings: list[Finding]) -> list[Finding]:
-    """Report a home above the ground as undecided if a leg would be too low with home on the ground.
+    """Return an undecided finding if home is above the ground and a leg would be too low with home on the ground.
 
     When an autopilot is armed, it sets home to its own position on the ground.  All heights above home are then lower
     by the height of the mission's home above the ground.  Return [] if no leg would be too low, or if the height of
@@ -303,7 +303,7 @@ def _limit_source(requirements: RouteRequirements, limit: float) -> str:
 
 
 def _terrain_error_text(clearance: float, limit: float, error: float | None) -> str:
-    """Describe the clearance that remains after the terrain's error is subtracted; "" without one.
+    """Describe the clearance that remains after the terrain's error is subtracted; "" if no error is stated.
 
     clearance, limit, error: minimum height above ground, required height and vertical error of the terrain data, m.
     """
@@ -363,6 +363,7 @@ def _flown_finding(
 ) -> Finding:
     """Judge the minimum height above ground on a flown leg; the planned height is only reported.
 
+    planned_height: minimum known height of the leg's planned path above ground, m.
     is_planned_short: True if the planned path is lower than required.
     """
     min_clearance, ok, reason, limit = math.nan, None, "the leg was not flown", requirement.limit

@@ -117,7 +117,7 @@ class _GoAround(NamedTuple):
     min_climb_height: minimum height above ground in the climb beyond the landing point, m; inf without a climb.
     impact_time: time from the abort to ground impact, s; NaN without impact.
     entered_hazard: sphere or zone that the go-around enters, "" if it enters none.
-    is_lost: True if the go-around does not return to the line-up.
+    is_lost: True if the go-around does not get back to the start of an approach.
     unknown_part_text: text on the unknown part of the path, "" if all is known.
     """
 

@@ -223,8 +223,8 @@ def with_suggestions(
 ) -> tuple[Finding, ...]:
     """Add ``suggestions`` to the failed or undecided findings that a change could fix.
 
-    On the legs of a return to launch only findings on clearance get suggestions, because the autopilot chooses the path
-    of a return, of which the mission decides the start and a parameter the altitude.
+    On the legs of a return to launch only findings on clearance get suggestions: the autopilot chooses the path of a
+    return, and the mission and a parameter decide only its start and its altitude.
     If more than `MAX_SUGGESTED_FINDINGS` findings need suggestions, no finding gets any.
     """
     return_legs = {requirements.leg(i) for i in requirements.setup.route.rtl_legs}

@@ -164,7 +164,8 @@ def _find_held_speed(
 
     The airspeed is the mean over the second half of the leg's steady rows, because the aircraft may still change its
     speed in the first half.  Return None also for a leg that is too steep, because the slope rule reports it.  Return
-    None for an imported flight, because its airspeed sensor may have the same error.
+    None for an imported flight, because its airspeed sensor may have the same error, and for an airspeed that was
+    raised to keep a minimum ground speed.
     """
     if abs(float(requirements.slopes[leg])) > slope_limit(requirements, leg)[0] + PLAN_TOLERANCE_RAD:
         return None
@@ -194,7 +195,7 @@ def _find_held_speed(
 def _uncertainty_text(requirements: RouteRequirements, leg: int, commanded: float, max_speed: float) -> str:
     """Compare a commanded airspeed with the maximum airspeed and its standard deviation, as text.
 
-    Returns "" if the commanded airspeed is below the maximum even after a margin for this uncertainty.
+    Return "" if the commanded airspeed is below the maximum even after a margin for this uncertainty.
     """
     envelope = requirements.setup.envelope
     if not envelope.fastest_sd:
@@ -221,7 +222,7 @@ def _speed_range_notes(requirements: RouteRequirements, leg: int) -> list[str]:
 def _short_leg_notes(requirements: RouteRequirements, leg: int, commanded: float) -> list[str]:
     """Return a note if a leg is too short to reach its airspeed; otherwise [].
 
-    The acceleration is `MAX_STEADY_ACCELERATION_MPS2`.
+    The aircraft is assumed to accelerate at `MAX_STEADY_ACCELERATION_MPS2`.
     """
     previous_speed = float(requirements.route.leg_airspeeds[leg - 1]) if leg else commanded
     change, leg_length = commanded - previous_speed, float(requirements.runs[leg])

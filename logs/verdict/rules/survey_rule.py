@@ -57,8 +57,8 @@ def survey_findings(
 ) -> list[Finding]:
     """Judge each photo line and the overlap of each survey's photos.
 
-    If ``geometric``, judge a line by the part outside the turns at its ends and outside the climb or descent before it.
-    Also report turnarounds that cannot be flown as drawn.
+    If ``geometric``, judge a line by the part outside the turns at its ends and outside the climb or descent before it,
+    and report turnarounds that cannot be flown as drawn.
     """
     findings = []
     for survey in requirements.surveys:
@@ -275,7 +275,7 @@ def _unknown_ground_message(requirements: RouteRequirements, fraction: float, le
 
 
 def _turn_lead(requirements: RouteRequirements, line: PhotoLine) -> float:
-    """Return the distance before the waypoint at a photo line's end at which the turn begins, m."""
+    """Return how far before the waypoint at the end of a photo line its turn begins, m."""
     setup, last = requirements.setup, line.ends
     if setup.autopilot.turns.follows_path or not 0 < last < requirements.legs:
         return float(requirements.length_before[last])
