@@ -309,7 +309,7 @@ def zones_scene(time_ns: int, scenario: Scenario, waypoints: Floats) -> bytes:
 
 
 def returns_scene(time_ns: int, drawn_returns: DrawnReturns, terrain: Terrain | None) -> bytes:
-    """Encode the judged returns: the path coloured by their outcome, the worst returns, and the glide footprint.
+    """Encode judged returns: the path coloured by their outcome, the worst returns, the glide footprint.
 
     The coloured line is drawn below the path, so that plan and track stay visible.
     """

@@ -243,7 +243,7 @@ class Recorder:
         self._close_file()
 
     def _write_setup(self, attachments: dict[str, bytes], setup: FlightSetup) -> None:
-        """Write the attachments, register all channels, and write the static scenes and point clouds of the setup."""
+        """Write the attachments, all channels, and the static scenes and point clouds of the setup."""
         for name, data in attachments.items():
             self._write_attachment(name, data, EPOCH_NS)
         self._channels[STATE_TOPIC] = self._writer.add_channel(STATE_TOPIC, STATE_NAME, state_schema())

@@ -142,7 +142,7 @@ class MissionTable(SetupModel):
 
 
 class RouteTable(SetupModel):
-    """A `Route` as a table: one column per field of its points, one value per waypoint (airspeed: leg)."""
+    """A `Route` as a table, with a column for each field of its points."""
 
     name = "route"
     position: Annotated[list[_Position], Field(min_length=2, alias="waypoints_east_north_amsl_m"), _LISTED]

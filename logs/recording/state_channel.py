@@ -314,7 +314,7 @@ class RowMatcher:
         self._expected = sample.view(np.uint8)[self._columns]
 
     def match(self, data: bytes, offset: int) -> StateRecords:
-        """Return the records from byte `offset` on, up to the first without the expected layout, (n,) of `RECORD`."""
+        """Return the records from byte `offset` on that have the expected layout, (n,) of `RECORD`."""
         count = (len(data) - offset) // RECORD.itemsize
         raw = np.frombuffer(data, np.uint8, count * RECORD.itemsize, offset).reshape(count, RECORD.itemsize)
         matching_count = _count_matching(raw, self._columns, self._expected)

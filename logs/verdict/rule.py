@@ -69,8 +69,8 @@ class Rule:
     tolerances: names of the constants in `logs.verdict.tolerances` that the rule and its measures use.
 
     Judging functions, each None if the rule has none:
-    judge: judges the planned path and the flown track, and an imported flight stretch by stretch, as far as the log
-        meets ``log``.
+    judge: judges the planned path, the flown track, and each part of an imported flight that followed the mission, as
+        far as the log contains the data that ``log`` names.
     judge_items, judge_end, judge_imported_end, merge, suggest: see their types.
 
     log: data that the rule needs from an imported log.

@@ -255,7 +255,7 @@ def suggest_gentler_landing(
 def _gentler_arc(requirements: RouteRequirements, leg: int) -> tuple[Suggestion, ...]:
     """Suggest gentler legs around a fly-by arc that is too steep at a leg's end.
 
-    Return () if no arc at the leg is too steep, or if no leg has the arc's slope direction.
+    Return () if no arc at the leg is too steep, or if neither leg climbs or descends like the arc.
     """
     arc = steep_arc(requirements, leg)
     if arc is None:
@@ -342,7 +342,7 @@ def suggest_larger_loiter(
 
 
 def _longer_legs(requirements: RouteRequirements, corner: int) -> list[_SizedSuggestion]:
-    """Suggest legs at a corner that are long enough for its and the neighbouring turns; [] if all fit."""
+    """Suggest longer legs at a corner, with room for its turn and the neighbouring turns; [] if all fit."""
     needed_before = (
         requirements.length_before[corner]
         + requirements.length_after[corner - 1]
@@ -636,7 +636,7 @@ RTL_ALTITUDE_STEP_M = 5.0
 
 
 def _suggest_higher_return(requirements: RouteRequirements, shortfall: float) -> tuple[Suggestion, ...]:
-    """Suggest a higher altitude of an RTL, by the autopilot's parameters, a higher start of it, or both.
+    """Suggest flying an RTL higher: by a parameter, by raising the waypoint where it begins, or by both.
 
     shortfall: missing height above ground, m; each change alone may need more.
     """
@@ -763,7 +763,7 @@ def _suggest_landing_against_wind(
 def suggest_staying_inside(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
-    """Suggest lower altitudes, then a path further inside the area; return () for a path that stays inside."""
+    """Suggest lower altitudes, then a path further inside the area; () for a path that stays inside."""
     if finding.margin is None or not finding.margin < 0.0:
         return ()
     inset = _round_to_meter(-finding.margin + SUGGESTION_LENGTH_MARGIN_M)

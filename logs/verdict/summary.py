@@ -229,7 +229,7 @@ def _near_miss_notes(findings: Sequence[Finding]) -> list[str]:
 
 
 def _altitude_notes(findings: Sequence[Finding]) -> list[str]:
-    """Return notes on the worst altitude errors among the passed checks of waypoints and of ground-following legs."""
+    """Return notes on the worst altitude errors at passed waypoints and on ground-following legs."""
     waypoint_errors = _passing_errors(findings, "waypoint", "height error")
     # The slope rule judges how well a leg follows the ground, because its slope is the slope of the ground.
     leg_errors = _passing_errors(findings, "slope", GROUND_FOLLOWING_ERROR)

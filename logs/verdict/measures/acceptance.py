@@ -171,7 +171,7 @@ def negligible_kink_distance(requirements: RouteRequirements, waypoint: int) -> 
 
 
 def shortcut_distance(requirements: RouteRequirements, first: int, last: int) -> float | None:
-    """Return the largest distance of waypoints `first` to `last` from the straight leg that would replace them, m.
+    """Return the largest distance of waypoints `first` to `last` from a straight leg instead of them, m.
 
     Return None if the distance exceeds `KINK_FRACTION` of the corridor's half width, if a waypoint belongs to a loiter,
     if the path is vertical, or if there is no room for the turns at its ends.
@@ -258,7 +258,7 @@ def _turn_fits_alone(requirements: RouteRequirements, before: int, corner: int, 
 
 
 def step_height(requirements: RouteRequirements, leg: int) -> float | None:
-    """Return the altitude change of a leg that is too steep, m, if the change is negligible; otherwise None.
+    """Return the altitude change of a too steep leg, m, if the change is negligible; otherwise None.
 
     The change is positive for a climb and for a descent.
     A change up to `NEGLIGIBLE_STEP_M` is negligible.  If a sequence of legs around the leg is too steep overall, the

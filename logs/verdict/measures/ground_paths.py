@@ -139,7 +139,7 @@ def landing_item(setup: FlightSetup) -> tuple[int, MissionItem] | None:
 
 
 def first_landing_leg(setup: FlightSetup, landing: int, final_leg: int) -> int:
-    """Return the first leg of a landing sequence: from DO_LAND_START, or else the leg before the final approach.
+    """Return the first leg of a landing: from DO_LAND_START, or else the leg before the final approach.
 
     landing: number of the landing's item.
     final_leg: leg of the final approach.

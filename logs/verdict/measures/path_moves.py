@@ -67,7 +67,7 @@ def planned_moves(requirements: RouteRequirements, first: int = 0, last: int | N
 
 
 def path_moves(path: FlyByPath, speeds: Floats, first_leg: int, last_leg: int) -> Records:
-    """Return the moves of all pieces of a fly-by path that touch some legs; the first move starts at time 0.
+    """Return the moves of all pieces of a fly-by path that touch some legs; they start at time 0.
 
     A piece may also cover part of a neighbouring leg.
 

@@ -700,7 +700,7 @@ class SteepArc:
 
 
 def turn_limit(requirements: RouteRequirements, waypoint: int) -> tuple[float, str]:
-    """Return the turn limit at a waypoint (rad), the lower of the scenario's and the aircraft's, and its source."""
+    """Return the lower turn limit at a waypoint, the scenario's or the aircraft's (rad), and its source."""
     return tighter_turn_limit(requirements, waypoint, float(requirements.turn_limit[waypoint]))
 
 
@@ -721,7 +721,7 @@ def tighter_turn_limit(requirements: RouteRequirements, waypoint: int, aircraft_
 
 
 def slope_limits(requirements: RouteRequirements, leg: int) -> tuple[float, float]:
-    """Return the limits on climb and dive along a leg, rad: the lower of the scenario's and the aircraft's."""
+    """Return the lower of the scenario's and the aircraft's limits on climb and dive along a leg, rad."""
     return (
         slope_limit(requirements, leg, is_climb=True)[0],
         slope_limit(requirements, leg, is_climb=False)[0],

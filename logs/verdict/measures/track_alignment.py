@@ -363,9 +363,10 @@ def airspeed_gain_in_rising_air(time: Floats, airspeed: Singles, vertical_wind: 
 def _match_chords(
     position: Floats, marks: Floats, first: RowNumbers, last: RowNumbers, step: int, capture: float
 ) -> tuple[RowNumbers, NDArray[np.bool_]]:
-    """Assign each mark, such as a waypoint, to the chord of the track that passes it; chords are in order of time.
+    """Assign each mark, such as a waypoint, to a chord of the track, in order of time.
 
-    A chord is the straight line from a row of the track to the row `step` rows later.  The assignment minimizes the sum
+    A mark is assigned to the chord that passes it: the straight line from a row of the track to the row `step` rows
+    later.  The assignment minimizes the sum
     of min(distance, capture)^2 by dynamic programming.  The earliest of equally good assignments is taken.  Only the
     chords from `first` to `last` can capture a mark.
     position: positions of the track, m, (t, 3).
@@ -467,7 +468,7 @@ _END_DELAY_S = 2.0
 
 
 def flown_phases(whole_requirements: RouteRequirements, track: Track) -> tuple[RouteRequirements, AlignedTrack | None]:
-    """Return requirements and aligned track of the airborne part of a flight, between take-off and landing.
+    """Return requirements and aligned track of the part of a flight between take-off and landing.
 
     The track is None if it has fewer than two usable rows.
     whole_requirements: requirements of the whole route, returned unchanged for a flight without ground phases.
@@ -500,7 +501,7 @@ def _takeoff_end_row(track: Track, procedures: GroundPhases) -> int:
 
 
 def takeoff_and_approach_rows(track: Track, procedures: GroundPhases) -> Flags:
-    """Return a mask (t,): True for the rows of the take-off, and for all rows from the start of the approach leg.
+    """Return a mask (t,): True for the rows of the take-off, and from the start of the approach leg on.
 
     A take-off or an approach that the flight does not simulate has no rows. The example's flight has neither:
 

@@ -46,7 +46,7 @@ PART = record_dtype(
 def distances_outside_zone(
     records: ZoneRecords, z: int, heights: Heights, to_pixel: PolyMapRecord, east: float, north: float, up: float
 ) -> tuple[float, float, int]:
-    """Return how far a position is outside the outline and the altitude band of zone `z`, m, and the nearest edge.
+    """Return how far a position is outside outline and altitude band of zone `z`, m, and the nearest edge.
 
     heights, to_pixel: terrain heights, m, and map from positions to their pixels.
     east, north, up: the position, m.
@@ -217,7 +217,7 @@ def path_zones(moves: Records, records: ZoneRecords, terrain: Terrain | None) ->
 def _visit_zones(
     moves: Records, records: ZoneRecords, heights: Heights, to_pixel: PolyMapRecord, spacing: float
 ) -> Records:
-    """Return the visits of a path to all zones, (z,) of dtype `VISIT`, computed for the nearest zone first.
+    """Return the visits of a path to all zones, (z,) of dtype `VISIT`; the nearest zone is visited first.
 
     For a zone that is certainly further away than the nearest zone, the depth is only an upper bound.
 
@@ -418,7 +418,7 @@ def _bisect_move(
 
 @inner
 def _is_unknown(exclusion: bool, part: Record) -> bool:
-    """Return True if the violation depth is unknown (NaN) at both ends of a part, because the ground is unknown."""
+    """Return True if the violation depth is NaN at both ends of a part, because the ground is unknown."""
     start_depth = violation_depth(exclusion, part.outline_distance, part.band_distance)
     end_depth = violation_depth(exclusion, part.end_outline_distance, part.end_band_distance)
     return start_depth != start_depth and end_depth != end_depth

@@ -528,7 +528,7 @@ def make_return_world(setup: FlightSetup, rtl_autopilot: Autopilot | None = None
 
 
 def without_engine_world(world: ReturnWorld) -> ReturnWorld:
-    """Return the world for returns without an engine, with ArduPlane if the autopilot has no such return.
+    """Return a world for returns without an engine; ArduPlane returns if the autopilot has no such return.
 
     ArduPlane then has the aircraft's parameters, and the airspeeds of the user's PX4 parameter file.
     """
@@ -568,7 +568,7 @@ def judge_returns(
     max_flights: int = MAX_JSBSIM_FLIGHTS,
     advance: Callable[[float, float], None] = lambda done, total: None,
 ) -> Returns:
-    """Simulate and judge the return from each start, once for each ending (loiter or landing) to be judged.
+    """Simulate and judge the return from each start, once for each of its endings (loiter or landing).
 
     A return from a low start that only sinks to the ground is left out, but counted in `omitted_count`.
 
@@ -639,9 +639,10 @@ def _no_returns(world: ReturnWorld, starts: ReturnStarts, interval: float) -> Re
 
 
 def sinks_to_ground(ret: SimulatedReturn, height: float) -> bool:
-    """Return True if an RTL from a low start in a take-off or landing sinks to the ground before it can return.
+    """Return True if an RTL from a low start sinks to the ground before the aircraft can return.
 
-    The path of the return is then not at fault.  Returns that fly into rising ground or hit a hill later do not count.
+    Low starts are those in a take-off or a landing.  The path of the return is then not at fault.  Returns that fly
+    into rising ground or hit a hill later do not count.
     height: height of the start above ground, m.  Above `MIN_JUDGED_HEIGHT_M`, the return must also lose half of this
         height.
     """
@@ -662,7 +663,7 @@ def simulate_judged_returns(
     min_heights: Floats,
     min_sphere_distances: Floats | None = None,
 ) -> tuple[Records, tuple[Floats, ...]]:
-    """Simulate returns for judging, without the clearance on approaches to a landing.
+    """Simulate returns for judging; their clearance excludes the approach to a landing.
 
     After the first item of a landing sequence, a return flies the mission's approach, which descends to the landing.
     The clearance of a return that becomes too low on the approach is therefore measured only up to the first item.

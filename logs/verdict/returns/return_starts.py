@@ -159,7 +159,8 @@ def _ground_phase_starts(
 def _low_and_slow_rows(setup: FlightSetup, track: Track, rows: NDArray[np.intp]) -> tuple[Flags, Flags]:
     """Return masks of low rows of a take-off or landing, and of low rows too slow to fly, (n,).
 
-    Without terrain, both masks contain all rows of the take-off and the landing.
+    A row is low if its height above ground is less than the required clearance plus `SINK_HEIGHT_LOSS_M`.  Without
+    terrain, both masks contain all rows of the take-off and the landing.
     rows: rows of the track, (n,).
     """
     procedures, terrain = setup.ground_phases, setup.scenario.terrain
@@ -222,7 +223,7 @@ def planned_starts(setup: FlightSetup, interval: float, requirements: RouteRequi
 
 
 def planned_positions(setup: FlightSetup, interval: float) -> tuple[Floats, Floats]:
-    """Return times, s, (t,), and positions, m, (t, 3), on the planned path up to the mission's return to launch.
+    """Return times, s, (t,), and positions, m, (t, 3), on the planned path up to the mission's RTL.
 
     interval: time between samples, s.
     """
@@ -296,7 +297,7 @@ def planned_end(requirements: RouteRequirements) -> ReturnStarts:
 
 
 def _ground_speeds(setup: FlightSetup) -> Floats:
-    """Return the ground speed on each leg in the mean wind, or the airspeed if the wind is too strong, m/s.
+    """Return the ground speed on each leg in the mean wind, m/s; the airspeed if the wind is too strong.
 
     With a forecast, the wind is taken in the middle of the leg, at the time when the aircraft is there.
     """

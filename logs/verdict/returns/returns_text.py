@@ -321,7 +321,7 @@ def range_text(return_range: ReturnRange, returns: Returns, scenario: Scenario) 
 
 
 def _height_text(ret: SimulatedReturn, limit: float) -> str:
-    """Return the lowest height of a return above ground as text, with more digits near the required height.
+    """Return the lowest height of a return as text, with more digits near the required height.
 
     Near the limit, the text also states the limit and its tolerance.
     """

@@ -138,7 +138,7 @@ def _below_home_findings(requirements: RouteRequirements) -> list[Finding]:
 
 
 def _home_above_ground_findings(requirements: RouteRequirements, leg_findings: list[Finding]) -> list[Finding]:
-    """Return an undecided finding if home is above the ground and a leg would be too low with home on the ground.
+    """Return an undecided finding if home is above ground, and a leg would be too low with home on it.
 
     When an autopilot is armed, it sets home to its own position on the ground.  All heights above home are then lower
     by the height of the mission's home above the ground.  Return [] if no leg would be too low, or if the height of
@@ -303,7 +303,7 @@ def _limit_source(requirements: RouteRequirements, limit: float) -> str:
 
 
 def _terrain_error_text(clearance: float, limit: float, error: float | None) -> str:
-    """Describe the clearance that remains after the terrain's error is subtracted; "" if no error is stated.
+    """Describe the clearance less the terrain's stated error; return "" if no error is stated.
 
     clearance, limit, error: minimum height above ground, required height and vertical error of the terrain data, m.
     """

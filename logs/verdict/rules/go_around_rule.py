@@ -484,7 +484,7 @@ def _required_heights(terrain: Terrain, destination: LandingStart, points: Float
 def _next_sufficient_height(
     requirements: RouteRequirements, terrain: Terrain, world: ReturnWorld, landing: _Landing, worst_distance: float
 ) -> float:
-    """Find the next higher climb height above home at which all go-arounds are clear, m; NaN if there is none.
+    """Find the next higher climb height above home with which all go-arounds are clear, m; NaN for none.
 
     Heights are tried in steps of `_HEIGHT_STEP_M` up to `_MAX_HEIGHT_M`.
     worst_distance: abort point to try first, as a distance before the landing point, m.

@@ -230,7 +230,7 @@ def with_suggestions(
     return_legs = {requirements.leg(i) for i in requirements.setup.route.rtl_legs}
 
     def is_open(finding: Finding) -> bool:
-        """Return True for an undecided finding that a change may decide: on the aircraft, or on home's altitude."""
+        """Return True for an undecided finding on the aircraft or on home's altitude, which a change decides."""
         is_on_home = finding.rule == "clearance" and finding.check == GROUND_PATH
         return finding.ok is None and (finding.check == UNKNOWN_AIRCRAFT or is_on_home)
 

@@ -269,7 +269,7 @@ def _limit_deviation(requirements: RouteRequirements, leg: int, limit: float, ce
 
 
 def _ability_text(requirements: RouteRequirements, leg: int, limit: float, source: str, *, has_failed: bool) -> str:
-    """Explain the effect of an uncertain aircraft model: an undecided slope, or a limit of the suggestions.
+    """Explain what an uncertain aircraft model does: it leaves a slope undecided or limits suggestions.
 
     Return "" for an aircraft without uncertainty.  Return "" also for a planned slope above the limit, because its own
     message states the limit.
@@ -283,9 +283,10 @@ def _ability_text(requirements: RouteRequirements, leg: int, limit: float, sourc
 
 
 def _certain_limit_text(requirements: RouteRequirements, leg: int, limit: float, source: str) -> str:
-    """State which slope an aircraft with an uncertain model can fly for certain; suggestions stay within it.
+    """State the slope that an aircraft with an uncertain model can certainly fly, for suggestions.
 
-    Return "" if the whole limit is certain, or if the limit does not come from the aircraft.
+    Suggested slopes stay within it.  Return "" if the whole limit is certain, or if the limit does not come from the
+    aircraft.
     limit, source: limit of the slope, rad, and its source.
     """
     envelope, is_climb = requirements.setup.envelope, float(requirements.slopes[leg]) >= 0.0
@@ -409,7 +410,7 @@ def _distance_text(distance: float) -> str:
 
 
 def _throttle_text(requirements: RouteRequirements, name: str) -> str:
-    """Describe a throttle limit: "throttle at full", or "throttle at its limit" with the name of the parameter.
+    """Describe a throttle limit: "throttle at full", or "throttle at its limit" and the parameter.
 
     name: "full" or "idle".
     """
@@ -546,7 +547,7 @@ def _height_error_limit(measure: SlopeMeasure) -> float:
 
 
 def _rate_limit_slope(requirements: RouteRequirements, leg: int, *, is_climb: bool) -> tuple[float, str]:
-    """Return the slope over the ground at the autopilot's climb or sink rate limit, rad, and the limit's name.
+    """Return the slope over the ground at the autopilot's rate limit, rad, and the limit's name.
 
     The slope is inf without a limit, and for an imported flight whose log does not contain the parameter.
     """
@@ -564,7 +565,7 @@ def _rate_limit_slope(requirements: RouteRequirements, leg: int, *, is_climb: bo
 
 
 def _rate_limit_faults(requirements: RouteRequirements, leg: int, measure: SlopeMeasure) -> list[Message]:
-    """Return a fault if the limit on the climb or sink rate kept the aircraft from the altitude of the leg."""
+    """Return a fault if a climb or sink rate limit kept the aircraft from the altitude of the leg."""
     planned_slope = float(requirements.slopes[leg])
     sign = 1.0 if planned_slope >= 0.0 else -1.0
     slope, name = _rate_limit_slope(requirements, leg, is_climb=planned_slope >= 0.0)

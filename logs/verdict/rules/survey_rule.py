@@ -75,7 +75,7 @@ def survey_findings(
 
 
 def _overlap_findings(requirements: RouteRequirements, aligned: AlignedTrack | None, survey: Survey) -> list[Finding]:
-    """Judge the smallest measured front and side overlap of a survey's photos against the required overlaps.
+    """Judge the smallest front and side overlap of a survey's photos against the required overlaps.
 
     An overlap that is not measured or not required has no finding.  Return [] if the survey's camera is unknown.
     """

@@ -115,7 +115,7 @@ def _short_strip_findings(place: Place, approach: Approach) -> list[Finding]:
 def _measure_landing(
     requirements: RouteRequirements, track: Track, terrain: Terrain, approach: Approach, touchdown_row: int
 ) -> _Landing:
-    """Measure a landing: positions of touchdown and stop, sink rates, and lowest clearance of the approach.
+    """Measure a landing: touchdown, stop, sink rates, and lowest clearance of the final approach.
 
     touchdown_row: row of the track in which the aircraft touches down.
     The result's `point_height` is not set and remains NaN.
