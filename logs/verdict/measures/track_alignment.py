@@ -365,14 +365,11 @@ def _match_chords(
 ) -> tuple[RowNumbers, NDArray[np.bool_]]:
     """Assign each mark, such as a waypoint, to a chord of the track, in order of time.
 
-    A mark is assigned to the chord that passes it: the straight line from a row of the track to the row `step` rows
-    later.  The assignment minimizes the sum
-    of min(distance, capture)^2 by dynamic programming.  The earliest of equally good assignments is taken.  Only the
-    chords from `first` to `last` can capture a mark.
-    position: positions of the track, m, (t, 3).
-    marks: positions of the marks, m, (n, 3).
+    A chord is the straight line from a row of the track to the row `step` rows later.  Dynamic programming minimizes
+    the sum of min(distance, capture)^2.  The earliest of equally good assignments is taken.
+
+    position, marks: positions of the track, m, (t, 3), and of the marks, m, (n, 3).
     first, last: first and last chord that can capture each mark, (n,).
-    step: number of rows from one chord to the next.
     capture: distance within which a mark is captured, m.
 
     Return the chord of each mark, and a mask: True for each mark that is farther than `capture` from all rows of its

@@ -361,9 +361,8 @@ def _flown_finding(
     *,
     is_planned_short: bool,
 ) -> Finding:
-    """Judge the minimum height above ground on a flown leg; the planned height is only reported.
+    """Judge the minimum height above ground on a flown leg; `planned_height` (m) is only reported.
 
-    planned_height: minimum known height of the leg's planned path above ground, m.
     is_planned_short: True if the planned path is lower than required.
     """
     min_clearance, ok, reason, limit = math.nan, None, "the leg was not flown", requirement.limit

@@ -91,10 +91,7 @@ _RETURN_MODE = "RTL"
 
 
 def imported_completion_finding(setup: FlightSetup, stretches: Sequence[FlownLegs], log_complete: bool) -> Finding:
-    """Judge whether an imported flight completed its mission; undecided if the log may lack a part of it.
-
-    stretches: the legs that were flown in each part of the log that followed the mission, in order of time.
-    """
+    """Judge whether an imported flight completed its mission; undecided if the log may lack a part of it."""
     last_leg, faults, unknown_texts, notes = setup.route.legs - 1, [], [], []
     flown_legs = {leg for legs in stretches for leg in range(legs.first, legs.last - legs.partial)}
     leg_count = len(set(setup.route.leg_numbers.tolist()))

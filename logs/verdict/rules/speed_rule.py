@@ -69,10 +69,7 @@ def speed_findings(
 def _speed_finding(
     requirements: RouteRequirements, aligned: AlignedTrack | None, leg: int, demanded: float, *, geometric: bool
 ) -> Finding:
-    """Judge the commanded and the flown airspeed on a leg.
-
-    demanded: airspeed as the mission states it, m/s; the autopilot treats it as true or as equivalent airspeed.
-    """
+    """Judge the flown airspeed and the airspeed that the mission commands on a leg (`demanded`, m/s)."""
     commanded = float(requirements.route.leg_airspeeds[leg])
     min_speed, max_speed, faults = _level_speed_range(requirements, leg, commanded)
     notes = [*_speed_range_notes(requirements, leg), _command_text(demanded, commanded, min_speed, max_speed)]
