@@ -230,7 +230,7 @@ class Recorder:
                 self._append_rows(recorded_rows)
 
     def _append_rows(self, rows: Rows) -> None:
-        """Add rows to the rows to be written, and write all complete batches."""
+        """Queue rows, and write the complete seconds of the queue whenever a batch is full."""
         self._pending_rows.append(rows)
         previous_ns, self._last_ns = self._last_ns, round(rows["time"][-1] * 1e9) + EPOCH_NS
         if self._last_ns // self._batch_ns > previous_ns // self._batch_ns:
@@ -308,7 +308,7 @@ class Recorder:
         self._is_open = True
 
     def _write_setup(self, attachments: dict[str, bytes], setup: FlightSetup) -> None:
-        """Write the attachments, register all channels, and write the static scenes and point clouds of the setup."""
+        """Write the attachments, all channels, and the static scenes and point clouds of the setup."""
         for name, data in attachments.items():
             self._write_attachment(name, data, EPOCH_NS)
         self._channels[STATE_TOPIC] = self._writer.add_channel(STATE_TOPIC, STATE_NAME, state_schema())
@@ -341,7 +341,7 @@ class Recorder:
         return self._channels[topic]
 
     def _add_scene(self, topic: str, update: bytes) -> None:
-        """Write a scene that is known only at the end of the flight, but is shown from the start."""
+        """Write a scene with the log time of the start, so that viewers show it during the whole flight."""
         self._write_messages([single_record(self._add_scene_channel(topic), EPOCH_NS, update)])
         self._writer.flush()
 
@@ -353,7 +353,7 @@ class Recorder:
             self._writer.write_end()
 
     def _write_attachment(self, name: str, data: bytes, log_time: int) -> None:
-        """Write an attachment with the media type of its name."""
+        """Write an attachment; the suffix of its name determines its media type."""
         self._writer.write_attachment(name, media_type(name), data, log_time)
 
     def _write_pending(self, end_ns: int | None) -> None:
@@ -391,7 +391,7 @@ class Recorder:
 
 
 def _chunk_contents(layout: Layout) -> Iterator[ChunkContent]:
-    """Yield the content of each chunk of a layout."""
+    """Cut the bytes of a layout into its chunks, and yield each chunk with its message indexes."""
     records, index = memoryview(layout.records), layout.index.tobytes()  # type: ignore[arg-type]  # an array is a buffer
     # Lists are faster than arrays here: reading a field of one chunk from an array takes a microsecond.
     bounds = {name: layout.chunks[name].tolist() for name in CHUNK.names or ()}

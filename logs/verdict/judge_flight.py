@@ -88,7 +88,7 @@ def judge_flight(
 
 
 def with_reference(verdict: Verdict, requirements: RouteRequirements, reference: ReferenceFlights) -> Verdict:
-    """Add the results of reference flights to a verdict: the airframe's answer and the suggestions that passed.
+    """Add the airframe's answer and the suggestions that passed, from reference flights, to a verdict.
 
     A verdict on a flight that never began is returned unchanged.
     """
@@ -155,7 +155,7 @@ def _airframe_level(airframe: AirframeAnswer, flight_findings: tuple[Finding, ..
 def _disagreements(
     level: str, level_findings: Sequence[Finding], flight_findings: Sequence[Finding]
 ) -> tuple[Disagreement, ...]:
-    """Return the findings that a level and the flight judge differently, in the order of the level's findings.
+    """Return the findings that a level and the flight judge differently, in the level's order.
 
     A flown landing is judged by the rule of `FLOWN_COUNTERPARTS`.
 

@@ -116,7 +116,7 @@ _EXCEEDED_TEXTS = {
 
 
 def judge_plan_only(plan: Plan, conditions: Conditions | None = None) -> Verdict:
-    """Judge a search that found no feasible plan by the certificate of its best path.
+    """Judge a search that found no feasible plan by the margins in the certificate of its best path.
 
     The verdict's level is "plan", and the verdict is never complete, because nothing was flown.
 

@@ -322,12 +322,6 @@ def _pauses_text(flown_stretches: Sequence[FlownLegs]) -> str:
     return f"not judged from {start:.1f} s to {end:.1f} s{others_text}, because the log has no rows there"
 
 
-def _stretch_times(legs: FlownLegs) -> tuple[float, float]:
-    """Return the times of the first and the last row on a stretch's legs, s."""
-    time = legs.aligned.track.time
-    return float(time[0]), float(time[-1])
-
-
 def _stretch_findings(setup: FlightSetup, legs: FlownLegs) -> list[Finding]:
     """Judge one stretch; its findings number legs and waypoints as in the whole route."""
     findings = []

@@ -34,7 +34,9 @@ _MAX_LEVELS = 12
 def find_hazards(
     requirements: RouteRequirements, center: Floats, min_altitude: float, max_altitude: float, reach: float
 ) -> list[str]:
-    """Describe ground, missiles, zones and area edges within a distance of a center; [] without hazards.
+    """Describe the ground, missiles, zones and area edges that a flight around a center may meet.
+
+    Return [] if there are none.
 
     center: east and north, m, (2,).
     min_altitude, max_altitude: minimum and maximum altitude of the flight, m AMSL.

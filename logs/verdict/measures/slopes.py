@@ -325,7 +325,8 @@ def _saturation_times(
 def _rows_at_limits(requirements: RouteRequirements, aligned: AlignedTrack, rows: slice) -> tuple[Flags, Flags]:
     """Return masks of the rows with full throttle and of the rows with idle throttle, (n,) each.
 
-    Full throttle means the autopilot's upper throttle limit.
+    Full throttle means the autopilot's upper throttle limit.  If the aircraft's motor does not brake, rows without
+    motor current also have idle throttle.
     """
     track = aligned.track
     throttle = track.controls[rows, THROTTLE]

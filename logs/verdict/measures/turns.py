@@ -99,7 +99,8 @@ def _corner_overshoot(
 ) -> tuple[float | None, float]:
     """Return the overshoot at a waypoint (m) and the overrun (m), as in `CornerPass`.
 
-    The overshoot is None if the aircraft was already beyond the next leg at the start; only then is there an overrun.
+    If the aircraft was already beyond the end of the next leg at time `start`, the overshoot is None, and the overrun
+    is its distance from that end.  Otherwise the overrun is 0.
 
     start, end: times of the closest approach to this waypoint and to the next waypoint, s.
     """
@@ -153,7 +154,10 @@ class TurnMeasure:
 
 
 def measure_turns(requirements: RouteRequirements, aligned: AlignedTrack) -> list[TurnMeasure]:
-    """Measure the turn at every inner waypoint, in order."""
+    """Measure the turn at every inner waypoint, in order.
+
+    In an imported flight, overshoot and minimum distance are those of the corner (`CornerPass`).
+    """
     measures = [measure_turn(requirements, aligned, waypoint) for waypoint in range(1, requirements.legs)]
     if requirements.setup.imported_log is None:
         return measures

@@ -216,7 +216,7 @@ def planned_starts(setup: FlightSetup, interval: float, requirements: RouteRequi
 
 
 def planned_positions(setup: FlightSetup, interval: float) -> tuple[Floats, Floats]:
-    """Return times, s, (t,), and positions, m, (t, 3), on the planned path up to the mission's return to launch.
+    """Return times, s, (t,), and positions, m, (t, 3), on the planned path up to the mission's RTL.
 
     interval: time between samples, s.
     """
@@ -290,7 +290,7 @@ def planned_end(requirements: RouteRequirements) -> ReturnStarts:
 
 
 def _ground_speeds(setup: FlightSetup) -> Floats:
-    """Return the ground speed on each leg in the mean wind, or the airspeed if the wind is too strong, m/s.
+    """Return the ground speed on each leg in the mean wind, m/s; the airspeed if the wind is too strong.
 
     With a forecast, the wind is taken in the middle of the leg, at the time when the aircraft is there.
     """

@@ -44,7 +44,7 @@ _PLURAL_TEXTS: dict[Kind, str] = {
     "energy": "use more energy than allowed",
     "unknown": "fly where the terrain is unknown",
     "power": "may use more energy than allowed, because the aircraft's power is uncertain",
-    "used": "cannot be judged by energy, because the energy used before it is unknown",
+    "used": "cannot be judged by energy, because the energy used before them is unknown",
     "unsure": "cannot be judged because the point mass and JSBSim disagree",
     "low": "descend below {limit:.0f} m above ground",
 }
@@ -298,7 +298,7 @@ def describe_landing(returns: Returns) -> list[str]:
 
 
 def range_text(return_range: ReturnRange, returns: Returns, scenario: Scenario) -> str:
-    """Describe a time range: are its returns safe, their destination, and the worst return."""
+    """Describe the returns of a time range: the judgement, the destination and the worst return."""
     worst_return = return_range.worst
     time_text = (
         f"{return_range.first:.0f} s"
@@ -321,7 +321,7 @@ def range_text(return_range: ReturnRange, returns: Returns, scenario: Scenario) 
 
 
 def _height_text(ret: SimulatedReturn, limit: float) -> str:
-    """Return the lowest height of a return above ground, near the required height with the digits that decide.
+    """Return the lowest height of a return as text, with more digits near the required height.
 
     Near the limit, the text also states the limit and its tolerance.
     """

@@ -86,7 +86,7 @@ class _ReturnLimits:
 
 
 def _return_limits(world: ReturnWorld, starts: ReturnStarts, margin: float = MARGIN) -> _ReturnLimits:
-    """Return each return's required height above ground and distance from kill spheres.
+    """Return the required height above ground and distance from kill spheres for each return.
 
     If the start itself is lower or closer to a sphere, only its own value minus the height lost in the turn is
     required.
@@ -188,9 +188,10 @@ class _ReturnTrial:
 
 
 def suggest_parameters(world: ReturnWorld, starts: ReturnStarts) -> list[Remedy]:
-    """Suggest the lowest return height that clears the ground or is safe, or another change of parameters.
+    """Suggest return heights, or else other parameters, with which every return is safe.
 
-    Return [] if the returns already keep all limits with the present parameters.
+    Up to two heights are suggested: the lowest with which all returns clear the ground, and the lowest with which all
+    are safe.  Return [] if the returns already keep all limits with the present parameters.
     Heights are tried one by one, because a higher return may lead through a sphere and need not be safer.
     """
     limits = _return_limits(world, starts)
@@ -253,7 +254,7 @@ class _AltitudeSearch:
         return {name: altitude for name, present in self._present_values.items() if altitude > present}
 
     def lowest(self, min_altitude: float, criterion: Criterion, trial: _ReturnTrial) -> float | None:
-        """Return the lowest height, at least `min_altitude` (m), with which all returns pass, or None."""
+        """Return the lowest height from `min_altitude` (m) on with which all returns pass; None for none."""
         return first_that_passes(
             (altitude for altitude in self._candidates if altitude >= min_altitude),
             lambda altitude: trial.passes(self._world.with_parameters(**self.values(altitude)), criterion),
@@ -356,7 +357,7 @@ def _search_in_rounds(
 def _rally_candidates(
     world: ReturnWorld, starts: ReturnStarts, spacing: float, max_distance: float
 ) -> list[ReturnPoint]:
-    """Return candidate rally points on a grid near the path, at two altitudes 200 m apart, clear of spheres.
+    """Return candidate rally points on a grid near the path, at two altitudes, clear of kill spheres.
 
     spacing: grid spacing, m, increased if there are too many candidates.
     max_distance: maximum distance from the path, m.
@@ -420,7 +421,7 @@ def _sphere_clearance(world: ReturnWorld, position: tuple[float, float, float]) 
 class _RallySearch:
     """Search for rally points, based on which returns to each candidate meet the requirements.
 
-    Returns to the candidates are simulated when first needed.
+    A return is good if it keeps all limits.  Returns to the candidates are simulated when first needed.
     """
 
     def __init__(

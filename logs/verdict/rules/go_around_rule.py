@@ -117,7 +117,7 @@ class _GoAround(NamedTuple):
     min_climb_height: minimum height above ground in the climb beyond the landing point, m; inf without a climb.
     impact_time: time from the abort to ground impact, s; NaN without impact.
     entered_hazard: sphere or zone that the go-around enters, "" if it enters none.
-    is_lost: True if the go-around does not return to the line-up.
+    is_lost: True if the go-around does not get back to the start of an approach.
     unknown_part_text: text on the unknown part of the path, "" if all is known.
     """
 
@@ -479,7 +479,7 @@ def _required_heights(terrain: Terrain, destination: LandingStart, points: Float
 def _next_sufficient_height(
     requirements: RouteRequirements, terrain: Terrain, world: ReturnWorld, landing: _Landing, worst_distance: float
 ) -> float:
-    """Find the next higher climb height above home at which all go-arounds are clear, m; NaN if there is none.
+    """Find the next higher climb height above home with which all go-arounds are clear, m; NaN for none.
 
     Heights are tried in steps of `_HEIGHT_STEP_M` up to `_MAX_HEIGHT_M`.
     worst_distance: abort point to try first, as a distance before the landing point, m.

@@ -72,7 +72,8 @@ def judge_link(
 ) -> JudgedLink:
     """Judge a radio link along the planned path if `geometric`, otherwise along the whole flown track.
 
-    fly_again: function that flies an uncertain return again in JSBSim, as for `judge_returns`; None not to do so.
+    fly_again: function that flies an uncertain return again in JSBSim, as for `judge_returns`; None for no such
+    flights.
     """
     phases = requirements.ground_phases
     whole_requirements = requirements if phases is None else phases.whole_route
@@ -128,7 +129,7 @@ def judge_link(
 
 
 def _end_of_reactions(requirements: RouteRequirements, aligned: AlignedTrack | None) -> float:
-    """Return the time from which the autopilot ignores a loss of the link, s; inf without one.
+    """Return the time from which the autopilot ignores a loss of the link, s; inf if it never does.
 
     From then on, the aircraft is returning anyway, or ArduPlane is in a landing sequence
     (`Plane::failsafe_in_landing_sequence`).

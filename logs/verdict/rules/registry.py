@@ -148,8 +148,9 @@ _POSITION_RULES = ("clearance", "threat", "fence")
 
 
 def _other_side_findings(requirements: RouteRequirements, findings: Sequence[Finding]) -> list[Finding]:
-    """Return undecided findings on places that fail only for one direction of a turn at a course reversal.
+    """Return an undecided finding for each place that fails on only one side of a course reversal.
 
+    At a corner of 180 degrees the autopilot may turn left or right, so the route is judged for both directions.
     A flight shows only one direction, which depends on its navigation error: of 12 ArduPlane flights through a turn of
     180 degrees, 4 turned left.  Return [] for an imported flight, and for a route without a course reversal.
     """
@@ -212,14 +213,14 @@ def with_suggestions(
 ) -> tuple[Finding, ...]:
     """Add ``suggestions`` to the failed or undecided findings that a change could fix.
 
-    On the legs of a return to launch only findings on clearance get suggestions, because the autopilot chooses the path
-    of a return, of which the mission decides the start and a parameter the altitude.
+    On the legs of a return to launch only findings on clearance get suggestions: the autopilot chooses the path of a
+    return, and the mission and a parameter decide only its start and its altitude.
     If more than `MAX_SUGGESTED_FINDINGS` findings need suggestions, no finding gets any.
     """
     return_legs = {requirements.leg(i) for i in requirements.setup.route.rtl_legs}
 
     def is_open(finding: Finding) -> bool:
-        """Return True for an undecided finding on the aircraft or on the altitude of home."""
+        """Return True for an undecided finding on the aircraft or on home's altitude, which a change decides."""
         is_on_home = finding.rule == "clearance" and finding.check == GROUND_PATH
         return finding.ok is None and (finding.check == UNKNOWN_AIRCRAFT or is_on_home)
 
@@ -240,7 +241,7 @@ def with_suggestions(
 def with_passing_suggestions(
     findings: tuple[Finding, ...], trials: Sequence[TriedSuggestions] | None
 ) -> tuple[Finding, ...]:
-    """Remove the suggestions that passed no trial from failed findings.
+    """Replace the suggestions of each failed finding by those that passed their trials.
 
     trials: suggestions that passed their trials; None to keep all suggestions.
 

@@ -58,8 +58,8 @@ def survey_findings(
 ) -> list[Finding]:
     """Judge each photo line and the overlap of each survey's photos.
 
-    If ``geometric``, judge a line by the part outside the turns at its ends and outside the climb or descent before it.
-    Also report turnarounds that cannot be flown as drawn.
+    If ``geometric``, judge a line by the part outside the turns at its ends and outside the climb or descent before it,
+    and report turnarounds that cannot be flown as drawn.
     """
     findings = []
     for survey in requirements.surveys:
@@ -76,7 +76,7 @@ def survey_findings(
 
 
 def _overlap_findings(requirements: RouteRequirements, aligned: AlignedTrack | None, survey: Survey) -> list[Finding]:
-    """Judge the smallest measured front and side overlap of a survey's photos against the required overlaps.
+    """Judge the smallest front and side overlap of a survey's photos against the required overlaps.
 
     An overlap that is not measured or not required has no finding.  Return [] if the survey's camera is unknown.
     """

@@ -1,6 +1,6 @@
 """The touchdown rule: judge a flown landing, from the last waypoint to the stop.
 
-The rule judges the height of the final above ground, the hazards that the final enters, and the points on the
+The rule judges the height of the final approach above ground, the hazards that it enters, and the points on the
 scenario's strip where the aircraft touches down and stops.  It only reports the sink rate towards the ground, which may
 slope upwards, because the simulated ArduPlane is accurate down to the flare but less accurate in the last metres
 (`docs/measured.md`).  A sink rate beyond all measured ones therefore leaves the landing undecided, and no sink rate
@@ -48,7 +48,7 @@ class _Landing(NamedTuple):
     touchdown, stop: positions on the strip, each as distance beyond the strip's center and to the right of it, m.
     strip_left: length of strip remaining beyond the stop, m.
     sink, ground_sink: sink rate at the touchdown, vertical and relative to the sloping ground, m/s.
-    final_clearance: minimum height of the final above ground, m; inf without a final, NaN if unknown.
+    final_clearance: minimum height of the final approach above ground, m; inf without one, NaN if unknown.
     point_height: height of the landing point above the ground, m.
     """
 
@@ -124,7 +124,7 @@ def _short_strip_findings(place: Place, approach: Approach) -> list[Finding]:
 def _measure_landing(
     requirements: RouteRequirements, track: Track, terrain: Terrain, approach: Approach, touchdown_row: int
 ) -> _Landing:
-    """Measure a landing: positions of touchdown and stop, sink rates, and lowest clearance of the approach.
+    """Measure a landing: touchdown, stop, sink rates, and lowest clearance of the final approach.
 
     touchdown_row: row of the track in which the aircraft touches down.
     The result's `point_height` is not set and remains NaN.
