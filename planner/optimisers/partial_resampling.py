@@ -138,7 +138,7 @@ class PartialResampling(BoxSearch):
         return points[order], scores[order]
 
     def _update_gaussian(self, gaussian: Gaussian, scores: Floats) -> None:
-        """Update the refining Gaussian with scores (n, c), or start again if it has converged."""
+        """Update the refining Gaussian with scores (n, c); if it has converged, draw a new, larger population."""
         points = (self._pending_samples - self.lower) / (self.upper - self.lower)
         gaussian.update(points, scores, self._rank, self._rng.random(len(scores)))
         self._store(*self._sort(self._pending_samples, scores))
@@ -186,7 +186,11 @@ class PartialResampling(BoxSearch):
         self.scores = np.concatenate([self._best[1][None], scores])
 
     def _draw(self) -> None:
-        """Draw a sample for each member of the population, which is sorted."""
+        """Draw a new sample for each member of the population, which is sorted.
+
+        The sample keeps a part of the variables of its member. The others are redrawn around one of the best members: it is
+        moved by the difference of two random members, times a width.
+        """
         count = len(self._points)
         points = (self._points - self.lower) / (self.upper - self.lower)
         self._fractions = np.clip(
