@@ -105,9 +105,13 @@ def tracked_pieces(data: ProblemArrays, waypoints: Floats) -> Records:
 
 @inner
 def _piece_ends(decay: float, horizontal_length: float) -> Floats:
-    """Return the ends of the pieces of a leg, as increasing fractions of the leg; the last is 1.
+    """Return where to cut a leg: the ends of its pieces as increasing fractions; the last is 1.
+
+    A leg is cut where its height lag has decayed by some steps, and at `END_DISTANCE_M` from both ends, where the
+    lateral deviation changes. Ends may coincide.
 
     decay: length of the leg, in multiples of the lag length.
+    horizontal_length: length of the leg, m.
     """
     fractions = np.ones(len(_CUTS) + 3)
     for k in range(len(_CUTS)):
@@ -147,7 +151,7 @@ def _set_deviations(lag: Record, begin_fraction: float, end_fraction: float, pie
 def _lateral_deviation(data: ProblemArrays, position: Floats, across: float) -> float:
     """Return the lateral deviation of the flight at a position on the path, m.
 
-    The deviation is smaller near the fixed ends.
+    It grows from 0 at the start and the destination to `across` at the distance `END_DISTANCE_M`.
     """
     end_distance = min(
         math.hypot(position[0] - data.start[0], position[1] - data.start[1]),
@@ -194,9 +198,9 @@ def missile_distance(data: ProblemArrays, waypoints: Floats) -> float:
 
 @inner
 def _segment_distance(threats: Records, start: Floats, end: Floats, min_distance: float) -> float:
-    """Return the distance from a segment to the nearest missile sphere, m, if it is below `min_distance`.
+    """Return the distance from a segment to the nearest missile sphere, m; at most `min_distance`.
 
-    Otherwise return `min_distance`. The distance is negative inside a sphere.
+    The distance is negative inside a sphere.
 
     threats: records of the threats; those without a kill radius are ignored.
     start, end: (3,) ends of the segment, m.
@@ -247,7 +251,7 @@ def with_end_course_points(data: ProblemArrays, path: Floats) -> Floats:
 
 @compiled
 def turn_and_roll_lengths(data: ProblemArrays, waypoints: Floats) -> tuple[Floats, Floats]:  # pragma: no cover
-    """Return the lengths that each leg needs for its turns, and for rolling from one bank to the next.
+    """Return the lengths that each leg needs for its turns, and for rolling between opposite banks.
 
     waypoints: (w, 3) m.
 
@@ -315,10 +319,10 @@ def heights_above_ground(data: ProblemArrays, waypoints: Floats) -> Records:
 
 @inner
 def _tracked_heights(data: ProblemArrays, pieces: Records) -> Records:
-    """Measure the minimum heights above ground along pieces and to either side of them.
+    """Measure the minimum height above ground of a flight along each piece and to either side of it.
 
-    Return `CERTIFIED_PIECE` records. The height includes the tracking error below the piece, and is NaN over unknown
-    ground.
+    Returns `CERTIFIED_PIECE` records. The flight can be below the piece by the tracking error, which is subtracted from
+    the height. The height is NaN over unknown ground.
 
     pieces: `TRACKED_PIECE` records.
     """
@@ -362,9 +366,10 @@ def required_buffer(
 
     buffer: additional height away from the ends, m.
     end_buffers: additional heights at the start and the destination, m.
+    a, b: (3,) ends of the piece, m.
 
-    The buffer grows half as fast as in a search. The difference allows for the ground between the samples of the
-    search.
+    From an end with a smaller buffer the required height grows with the distance, up to `buffer`. It grows half as fast
+    as in a search: the difference allows for the ground between the samples of the search.
     """
     for end, end_buffer in ((data.start, end_buffers[0]), (data.destination, end_buffers[1])):
         if end_buffer < buffer:

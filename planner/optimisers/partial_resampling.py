@@ -188,8 +188,8 @@ class PartialResampling(BoxSearch):
     def _draw(self) -> None:
         """Draw a new sample for each member of the population, which is sorted.
 
-        The sample keeps a part of the variables of its member. The others are redrawn around one of the best members: it is
-        moved by the difference of two random members, times a width.
+        The sample keeps a part of the variables of its member. The others are redrawn around one of the best members,
+        which is moved by the difference of two random members, times a width.
         """
         count = len(self._points)
         points = (self._points - self.lower) / (self.upper - self.lower)

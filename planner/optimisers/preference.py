@@ -28,7 +28,6 @@ TREE_THRESHOLD = 4000
 class Level:
     """Priority level: the columns of the scores that it compares, and a goal for each.
 
-
     All scores are minimised. Scores at or below the goal are equally good; the goal `NO_GOAL` is never reached.
     """
 
