@@ -158,7 +158,8 @@ def _take_sample(
 ) -> tuple[float, float]:
     """Return the height of a point above the required clearance, and the step to the next point.
 
-    The points lie on a line. The higher the point, the longer the step, because the ground rises by no more than its steepest slope.
+    The points lie on a line. The higher the point, the longer the step, because the ground rises by no more than its
+    steepest slope.
 
     heights: ground heights by pixel, m.
     tiles, tile_side: upper bound on the ground's slope (m per m) within `tile_side` m of each tile of the raster.
