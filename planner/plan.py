@@ -230,8 +230,8 @@ class Plan:
     def unmet_margins(self) -> tuple[str, ...]:
         """Margins of the planner that given waypoints do not meet; empty for a plan that was searched.
 
-        A problem of a departure or an approach is not among them. A verdict on given waypoints judges the flight itself, which may
-        be flyable without these margins.
+        A problem of a departure or an approach is not among them. A verdict on given waypoints judges the flight
+        itself, which may be flyable without these margins.
         """
         if self.algorithm != GIVEN_WAYPOINTS:
             return ()

@@ -43,7 +43,7 @@ class ClimbOut:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Descent:
-    """Approach: waypoints from the plan's end to the line-up, a level leg, and a glide to the landing point.
+    """Approach: waypoints from the plan's end to the line-up, a level leg, and a glide to the ground.
 
     waypoints: (n, 3) m, before the line-up.
     final_waypoints: (2, 3) m, two points at one altitude on the landing course; the glide begins at the second.

@@ -113,7 +113,8 @@ class TurnLengths(NamedTuple):
     def lengths(self, turn: float) -> tuple[float, float]:
         """Return the lengths that a turn (rad) takes up before and after its corner, m.
 
-        They are interpolated in the table. For a turn beyond the end of the table, they are about those of the table's sharpest turn.
+        They are interpolated in the table. For a turn beyond the end of the table, they are about those of the table's
+        sharpest turn.
         """
         # Just before the last entry, so that an entry follows.
         position = min(turn / TURN_STEP_RAD, len(self.before) - 1.001)
