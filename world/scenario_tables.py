@@ -787,7 +787,7 @@ class ScenarioFile(ScenarioTable):
     def _check_area(self) -> "ScenarioFile":
         """Raise ValueError if the area is missing and there is no elevation file to take it from."""
         if self.area is None and self.terrain.kind != "dem":
-            raise ValueError(f'area: missing; terrain kind "{self.terrain.kind}" implies none')
+            raise ValueError(f'area: missing; terrain of kind "{self.terrain.kind}" does not imply an area')
         return self
 
     @model_validator(mode="after")

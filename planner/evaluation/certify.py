@@ -115,7 +115,7 @@ def _summarise_faults(faults: list[_Fault]) -> list[str]:
         return []
     (_, place, problem), *others = sorted(faults, key=lambda fault: fault[0])
     other_places = ", ".join(name for _, name, _ in others[:_MAX_NAMED_PLACES])
-    remainder = f", {len(others) - _MAX_NAMED_PLACES} more" if len(others) > _MAX_NAMED_PLACES else ""
+    remainder = f" and {len(others) - _MAX_NAMED_PLACES} more" if len(others) > _MAX_NAMED_PLACES else ""
     return [f"{place}: {problem}" + (f" (also {other_places}{remainder})" if others else "")]
 
 
