@@ -84,16 +84,16 @@ class Certificate:
     violates the limit.  The limits include the margins that a plan keeps, as the lines of ``problems`` state them.
 
     For algorithms with graded violations, as the default, clearance, kill_distance, zone_distance and headroom are
-    measured at the worst position that is predicted for the autopilot: to the side of a leg by its lateral deviation,
-    navigation error and excursion at corners, and above or below it by its lag in altitude on slopes.  Its vertical
-    deviation on a level leg is part of the required margins.  For bounds all deviations are subtracted.  For other
-    algorithms, such as "umda" and "de-paper", nothing is subtracted: the margins are those of the legs and fly-by arcs.
-    For given waypoints the algorithm of the scenario decides.
+    measured at the worst position that is predicted for the autopilot.  To the side of a leg this is by its lateral
+    deviation, navigation error and excursion at corners; above or below the leg by its lag in altitude on slopes.  Its
+    vertical deviation on a level leg is part of the required margins.  For bounds all deviations are subtracted.  For
+    other algorithms, such as "umda" and "de-paper", nothing is subtracted: the margins are those of the legs and fly-by
+    arcs.  For given waypoints the algorithm of the scenario decides.
 
     turn: margin to the greatest course change, rad: the scenario's limit less 0.5 degrees, or 150 degrees for
     ``max_turn_deg = "aircraft"``, which limits turns by the lengths of their legs.
-    available_length: smallest length of a leg minus the length that its turns, the roll between them and their settling
-    need, or minus 5 m for a leg that need not contain its turns, m.
+    available_length: smallest length that is left of a leg, m, after its turns, the roll between them and settling; or
+    after 5 m for a leg that need not contain its turns.
     slope: margin to the limits of climb and dive less 0.5 degrees, rad.
     clearance: smallest height above ground minus the required clearance and its margin, m; NaN off the terrain.
     bounds: margin to map, floor and ceiling, m.

@@ -33,7 +33,7 @@ UNKNOWN_HEIGHT_BOUND = 9000.0
 
 
 class AltitudeBand(NamedTuple):
-    """Range of altitudes (AMSL) and range of heights (above the ground below it) of a part of a path, m."""
+    """Vertical range of a part of a path, m: altitudes are AMSL, heights are above the ground below it."""
 
     min_altitude: float
     max_altitude: float
@@ -55,13 +55,12 @@ def zone_penetration(
 ) -> float:
     """Return how much the leg a-b violates zones and their margins: depth times length, m·km.
 
-    For an exclusion this is the smaller of the horizontal and the vertical depth, times the length inside it; for an
-    inclusion both the horizontal and the vertical excess are added.
+    In an exclusion the depth is the smaller one of the horizontal and the vertical depth. For an inclusion both the
+    horizontal and the vertical distance outside are added.
 
     heights, to_pixel: ground heights, m, and the map from positions to their pixels.
     sample_spacing: spacing of the ground samples for zone levels that are stated above ground, m.
-    a, b: ends of the leg, (3,) m.
-    lateral_error, error_below, error_above: tracking error to the side, below and above the leg, m.
+    a, b: (3,) ends of the leg, m. lateral_error, error_below, error_above: tracking error to the side, below and above.
     """
     line = segment_between(a[0], a[1], b[0], b[1])
     total, required, records = 0.0, zones.required, zones.records
@@ -176,7 +175,7 @@ def _sampled_altitude_band(
     error_below: float,
     error_above: float,
 ) -> AltitudeBand:
-    """Return the ranges of altitudes and of heights above ground of a part of the line a-b.
+    """Return the vertical range of a part of the line a-b: its altitudes, and its heights above ground.
 
     heights, to_pixel: ground heights, m, and the map from positions to their pixels.
     sample_spacing: spacing of the ground samples, m.
@@ -210,8 +209,8 @@ def _sampled_altitude_band(
 def vertical_distance(zone: Record, band: AltitudeBand) -> float:
     """Return how far a range of altitudes is below a zone's floor or above its ceiling, m.
 
-    The distance is negative between floor and ceiling. For an exclusion it is the distance of the altitude that is
-    deepest inside, for an inclusion that of the altitude that is furthest outside.
+    The distance is negative between floor and ceiling. For an exclusion the altitude with the smallest distance counts,
+    because no altitude may be inside. For an inclusion the largest distance counts, because all must be inside.
     """
     floor_min, floor_max = band.min_altitude, band.max_altitude
     if zone.floor_above_ground:
@@ -250,13 +249,9 @@ def measure_zone_margin(
 ) -> None:
     """Measure the margins of a straight piece a-b of a path to all zones; fill its `ZONE_MARGIN` record.
 
-    A zone is first tested with the whole piece. If it may be near, the piece is cut into short parts, so that the
-    height of a part belongs to its position.
-
     heights, depths, to_pixel: ground heights, m, the same with the opposite sign, and the map from positions to pixels.
-    a, b: (3,) ends of the piece, m.
-    lateral_error: (2,) lateral tracking error at a and b, m.
-    error_below, error_above: vertical tracking error, m.
+    a, b: (3,) ends of the piece, m. lateral_error: (2,) lateral tracking error at a and b, m.
+    error_below, error_above: vertical tracking error, m. margin: the record to fill.
     """
     margin.nearest, margin.excess, margin.zone = math.inf, math.inf, -1
     records, max_lateral_error = zones.records, max(lateral_error[0], lateral_error[1])
@@ -364,7 +359,7 @@ def _exact_altitude_band(
     error_below: float,
     error_above: float,
 ) -> AltitudeBand:
-    """Return the ranges of altitudes and of heights above ground of the line a-b, without sampling.
+    """Return the vertical range of the line a-b, with the exact range of its heights above ground.
 
     heights, depths, to_pixel: ground heights, m, the same with the opposite sign, and the map from positions to pixels.
     a, b: (3,) ends of the line, m.

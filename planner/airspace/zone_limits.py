@@ -238,6 +238,9 @@ def view_shape(records: ZoneRecords, z: int, line: MapSegment, max_distance: flo
     """Measure the shape of zone z as seen from a line: its distance, and its extent across and along.
 
     max_distance: m; a larger distance may be returned as inf.
+
+    The line is taken as an axis. The corners and edges of the shape are measured along it from its start, and across it
+    to the left. A line starts inside if the shape's edges cross the axis an odd number of times ahead of its start.
     """
     zone = records.zones[z]
     if zone.round:

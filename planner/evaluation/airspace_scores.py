@@ -45,7 +45,9 @@ _MAX_PIECES = math.ceil(math.pi / ARC_STEP) + 2
 def airspace_pieces(data: ProblemArrays, waypoints: Floats) -> Records:
     """Measure the distance to zones and the height above ground of each piece of a path (w, 3).
 
-    Return `AIRSPACE_PIECE` records, first of its legs, then of its corners.
+    Returns `AIRSPACE_PIECE` records, first of its legs, then of its corners.
+
+    The pieces are those of `tracked_pieces` for an autopilot with tracking error, and otherwise legs and chords.
     """
     pieces = (
         tracked_pieces(data, waypoints) if data.tracking.has_error else _pieces_without_tracking_error(data, waypoints)
@@ -158,8 +160,7 @@ def add_airspace_violations(
 ) -> None:
     """Add a path's violations of zones and of the maximum height to a `VIOLATIONS` record, m·km.
 
-    path: (w, 3) m.
-    legs, lags: `LEG` and `HEIGHT_LAG` records of the legs.
+    path: (w, 3) m. legs, lags: `LEG` and `HEIGHT_LAG` records of the legs.
     corners, flown_corners: `CORNER` and `FLOWN_CORNER` records of the corners, as planned and as flown.
 
     Zone penetration is added to the field `bounds`, and height above the maximum height to the field `terrain`.

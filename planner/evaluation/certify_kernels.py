@@ -58,7 +58,9 @@ END_DISTANCE_M = 100.0
 def tracked_pieces(data: ProblemArrays, waypoints: Floats) -> Records:
     """Cut a path (w, 3) into straight pieces with bounds on the tracking error of the flight.
 
-    Return `TRACKED_PIECE` records, first of its legs, then of its corners.
+    Returns `TRACKED_PIECE` records, first of its legs, then of its corners. A leg is cut where its altitude lag has
+    decayed and near the fixed ends. A corner gives two pieces, a part of the leg before it and a part of the leg after
+    it, with the excursion of the flight there as an additional lateral deviation.
     """
     count = waypoints.shape[0]
     legs, corners = np.zeros(count - 1, dtype=LEG), np.zeros(count, dtype=CORNER)
@@ -299,7 +301,7 @@ def leg_slope_limits(data: ProblemArrays, waypoints: Floats) -> tuple[Floats, Fl
 def heights_above_ground(data: ProblemArrays, waypoints: Floats) -> Records:
     """Measure the smallest height above ground and the required buffer of each piece of a path (w, 3).
 
-    Return `CERTIFIED_PIECE` records, first of its legs, then of its arcs or corners.
+    Returns `CERTIFIED_PIECE` records, first of its legs, then of its arcs or corners.
     """
     if data.tracking.has_error:
         return _tracked_heights(data, tracked_pieces(data, waypoints))
@@ -350,8 +352,10 @@ def _tracked_heights(data: ProblemArrays, pieces: Records) -> Records:
 def _measure_piece(data: ProblemArrays, start: Floats, end: Floats, of_arc: bool, number: int, out: Record) -> None:
     """Fill the `CERTIFIED_PIECE` record for a straight piece from `start` to `end`.
 
+    start, end: (3,) ends of the piece, m.
     of_arc: True for a piece of an arc, False for a piece of a leg.
     number: number of the leg or arc.
+    out: the record to fill.
     """
     height, _ = segment_clearance(data.heights, data.to_pixel, start, end)
     out.of_arc, out.number, out.height = of_arc, number, height

@@ -146,6 +146,7 @@ def settling_length(turn_lengths: float, horizontal_length: float) -> float:
     """Return the straight length that a leg needs between its two turns, where the aircraft settles, m.
 
     turn_lengths: sum of the lengths that both turns take up, m.
+    horizontal_length: length of the leg, m.
     """
     return SETTLING_FRACTION * horizontal_length + min(SETTLING_LENGTH_M, turn_lengths)
 
@@ -200,6 +201,8 @@ def half_blend_length(aircraft: PerformanceTable, amsl: float) -> float:
 
     For a change of slope of 0.1 the parabola begins 0.1 times this length before the corner, and ends as far after it.
     A full tailwind is assumed.
+
+    amsl: altitude of the corner, m.
     """
     speed = true_airspeed(aircraft, amsl) + wind_speed_at(aircraft, amsl)
     return speed * speed / (2.0 * BLEND_ACCELERATION)
@@ -227,10 +230,10 @@ def blended_vertices(blend: float, previous: Floats, waypoint: Floats, next_wayp
     blend: half length of the parabola that blends two slopes (`half_blend_length`), m per unit of the slope's change.
     previous, waypoint, next_waypoint: (3,) m. radius: radius of the fly-by arc, m; 0 for none.
 
-    The vertices are the point on the leg where the blend of slopes begins, points along the arc between its tangent
-    points, and the point on the next leg where the blend ends. The height changes linearly along the arc. Where the
-    slope decreases, the flight cuts the crest by (slope change) x (half length of the blend) / 4, and the vertices are
-    lowered by this amount. Without a radius, or if a leg is shorter than the tangent, the arc is the waypoint.
+    The first vertex is where the blend of slopes begins on the leg, the last one is where it ends on the next leg. The
+    points between lie on the arc, and their height changes linearly. Where the slope decreases, the flight cuts the
+    crest by (slope change) x (half length of the blend) / 4, and the vertices are lowered by this amount. Without a
+    radius, or if a leg is shorter than the tangent, the arc is the waypoint.
     """
     length_before = math.hypot(waypoint[0] - previous[0], waypoint[1] - previous[1])
     length_after = math.hypot(next_waypoint[0] - waypoint[0], next_waypoint[1] - waypoint[1])

@@ -263,9 +263,11 @@ def graded_scores(data: ProblemArrays, paths: Floats) -> tuple[Floats, Floats]:
 
     The legs and the flown corners are scored along their whole length. The columns of the violations are those of
     `planner.plan.Violation`: turns (rad, plus missing leg lengths in units of 100 m), slopes (m per m), terrain (m x
-    km) and bounds (m). The columns of the objectives are those of `planner.plan.Objective`. The kill exposure is the
-    mean density along the path times the paper's number of points, which makes it comparable with the paper's sum.
-    Detection and height stay 0, because they would only decide between paths of exactly the same length.
+    km) and bounds (m). The columns of the objectives are those of `planner.plan.Objective`.
+
+    The kill exposure is the mean density along the path times the paper's number of points, which makes it comparable
+    with the paper's sum. Detection and height stay 0, because they would only decide between paths of exactly the same
+    length.
     """
     violations, objectives = np.zeros(len(paths), dtype=VIOLATIONS), np.zeros(len(paths), dtype=OBJECTIVES)
     # A plan's own path is read-only, which would compile another kernel.
@@ -291,9 +293,9 @@ def _score_paths(data: ProblemArrays, paths: Floats, violations: Records, object
 def _arc_radius(legs_hold_turns: bool, legs: Records, corners: Records, i: int) -> float:
     """Return the radius of the arc at waypoint i, m.
 
-    The radius is 0 for a turn that cannot be flown. If legs need not contain their turns (only the angle of a turn is
-    limited), it is also 0 next to a leg that is too short for its two turns. `planner.evaluation.corners.fly_by_radii`
-    gives the radii of a whole path.
+    The radius is 0 for a turn that cannot be flown. It is also 0 next to a leg that is too short for its two turns;
+    such legs are allowed if only the angle of turns is limited. `planner.evaluation.corners.fly_by_radii` gives the
+    radii of a whole path.
 
     legs_hold_turns: True if legs must be as long as their turns, so that none is too short.
     legs, corners: filled `LEG` records (w - 1,) and `CORNER` records (w,) of the path.

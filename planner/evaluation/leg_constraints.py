@@ -201,7 +201,11 @@ class PrecomputedLimits(NamedTuple):
 
 @inner
 def precompute_limits(data: ProblemArrays) -> PrecomputedLimits:
-    """Return limits that are the same for all paths of a problem."""
+    """Return the limits that are the same for all paths of a problem, computed once for all of them.
+
+    Where the aircraft limits slopes, the smallest limit on any course and at any altitude is taken: a leg within it
+    needs no further check.
+    """
     climb, dive = data.max_climb, data.max_dive
     slopes_by_aircraft = math.isnan(climb) or math.isnan(dive)
     if math.isnan(climb):

@@ -70,7 +70,11 @@ def _score_paths(
     """Fill the `VIOLATIONS` and `OBJECTIVES` records (n,) of paths (n, w, 3).
 
     scratch: a `BLOCK_SCRATCH` record (1,).
-    legs, corners: scratch records of one path.
+    legs, corners: working memory for one path.
+    violations, objectives: records to fill.
+
+    Paths are scored in blocks. Turns, slopes and bounds are counted in the blocks, too, if their limits are constants;
+    otherwise they are counted path by path.
     """
     path_count, block = paths.shape[0], scratch[0]
     limits = precompute_limits(data)
@@ -211,8 +215,8 @@ def _find_nearby_units(threat_cells: ThreatCells, size: int, block: Record) -> N
 
     threat_cells: for each cell of a grid, the part of one long list that holds the threats near this cell.
     size: number of paths in the block.
-    block: one point of each path. `first` and `count` are set to the first entry and the length of this part; `count`
-        is 0 if the point is below or above the altitudes that the threats reach.
+    block: one point of each path. `first` and `count` are set to the first entry and the length of this part. `count`
+        is 0 for a point below or above the altitudes that the threats reach.
     """
     # A cell is not bounded in height; it stores the heights that its units reach.
     west, south, per_metre = threat_cells.west, threat_cells.south, 1.0 / threat_cells.side

@@ -294,7 +294,7 @@ HEIGHT_MARGIN_M = 4.0
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """What a search has to solve: a scenario, the limits of the UAV, and both as arrays for compiled code.
+    """Task of a search: a scenario, the limits of the UAV, and both as arrays for compiled code.
 
     search: arrays with the margins that a search aims for.
     certified: arrays with the margins that the certificate requires.
@@ -313,7 +313,7 @@ def make_problem(scenario: Scenario, limits: Limits, attempt: int = 0) -> Proble
 
     attempt: number of searches that have already failed; each failure increases the clearance of the next search.
 
-    Raises ScenarioError if no path can be planned in the scenario.
+    Raises ScenarioError without terrain, or for a turn or slope limit within the margin that a plan keeps to it.
     """
     terrain = scenario.terrain
     if terrain is None:
@@ -367,7 +367,10 @@ def make_problem(scenario: Scenario, limits: Limits, attempt: int = 0) -> Proble
 
 
 def _certified_arrays(scenario: Scenario, limits: Limits, terrain: Terrain) -> ProblemArrays:
-    """Return the arrays of a problem with the margins of the certificate."""
+    """Return the arrays of a problem with the margins of the certificate.
+
+    The margins cover the errors of a flight, the autopilot's tracking error and the reserves that `limits` state.
+    """
     threats = threat_records(scenario.threats)
     radius = np.maximum(scenario.threats.kill_radius, scenario.threats.detection_radius)
     tracking = zero_tracking_error() if limits.tracking is None else limits.tracking.record

@@ -106,7 +106,10 @@ def compute_height_lags(
 
 @inlined
 def lag_at(lag: Record, fraction: float) -> float:
-    """Return the distance of the aircraft below a leg at a fraction of the leg, m; negative above the leg."""
+    """Return the distance of the aircraft below a leg at a fraction of the leg, m; negative above the leg.
+
+    lag: `HEIGHT_LAG` record of the leg.
+    """
     return lag.steady + lag.slant * (1.0 - fraction) + lag.transient * _remaining_fraction(fraction * lag.decay)
 
 
@@ -291,12 +294,12 @@ def sample_terrain(
 ) -> None:
     """Fill the `TERRAIN_LEG` record of each leg of a path (w, 3): its depth and its smallest heights.
 
-    legs, lags: filled `LEG` and `HEIGHT_LAG` records (w - 1,) of the path.
-    extents, unfinished: (w,) distance within which a point is near a waypoint, m, and (w - 1,) scratch.
+    legs, lags: filled `LEG` and `HEIGHT_LAG` records (w - 1,) of the path. terrain_legs: (w - 1,) records to fill.
+    extents: (w,) distance within which a point is near a waypoint, m. unfinished: (w - 1,) working memory.
 
     Depths and heights are measured from the required clearance. The smallest heights are exact up to
-    `NEAR_GROUND_HEIGHT_M`, and lower bounds above it. The legs are sampled in turn, one sample of each leg at a time:
-    the place of a leg's next sample depends on its last one, and the processor can work on the other legs meanwhile.
+    `NEAR_GROUND_HEIGHT_M`, and lower bounds above it. The legs are sampled in turn, one sample of each at a time,
+    because the next sample of a leg depends on its last one; the processor can work on several legs at once.
     """
     count = legs.shape[0]
     _start_sampling(to_pixel, required.sample_spacing, path, legs, extents, terrain_legs)
@@ -351,7 +354,7 @@ def sample_terrain(
 
 @inlined
 def segment_pixels(to_pixel: PolyMapRecord, ax: float, ay: float, bx: float, by: float) -> Pixels:  # pragma: no cover
-    """Return the raster columns and rows of both ends of a segment: column and row of a, then of b.
+    """Return the pixel coordinates of the ends of a segment: column and row of a, then of b.
 
     to_pixel: map from east and north to column and row.
     ax, ay, bx, by: east and north of the two ends, m.

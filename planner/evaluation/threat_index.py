@@ -89,7 +89,7 @@ def make_threat_cells(position: Floats, radius: Floats, bounds: Floats) -> Threa
 
 @compiled
 def _fill_cells(first: Int32s, units: Int32s, min_altitudes: Int32s, max_altitudes: Int32s, cells: Records) -> None:
-    """Fill the records of the cells: their part of the list of units, and the altitude range of these units.
+    """Fill the record of each cell: its part of the list of units, and the altitudes of these units.
 
     first: (cells + 1,) cell k has the entries first[k] to first[k + 1] - 1 of the list.
     units: the list: first the units of cell 0, then those of cell 1.
@@ -200,7 +200,7 @@ class MissileIndex(NamedTuple):
 
 
 def make_missile_index(threats: Records, side: float | None = None) -> MissileIndex:
-    """Make the spatial index of missiles.
+    """Make the spatial index of missiles: sort them by class, and within a class by the cells of its grid.
 
     threats: records with the fields east, north, up, kill_radius and kill_scale, m; threats without a kill radius are
         ignored.
@@ -255,9 +255,7 @@ def kill_density(
 ) -> tuple[float, float, float]:
     """Return the mean kill density over the segment a-b, and the distances to spheres near its ends, m.
 
-    Only missiles in the cells near the segment are tested: class by class, and in each class row by row of its grid.
-
-    index: missiles in classes of similar radii, each with its own grid of cells.
+    index: missiles in classes of similar radii, each with its own grid; only missiles in cells near a-b are tested.
     margin: distance that is added to the radii, m.
     max_distance: a returned distance is exact if it is below this, m; otherwise it may be inf.
     ax, ay, az, bx, by, bz: east, north and altitude of the two ends, m.

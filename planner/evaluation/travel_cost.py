@@ -403,9 +403,9 @@ def model_leg(travel: TravelCost, table: PerformanceTable, start: Floats, finish
     start, finish: (3,) ends of the leg, m.
     model: the derivatives to fill.
 
-    The cost is finite even if the leg cannot be flown. The second derivative is the sum of those of the length, of the
-    time at each height, and of the power, which are all convex. The coupling of height and course is omitted, so the
-    matrix has no negative eigenvalue. Time and energy are integrated along the leg by Simpson's rule with three points.
+    The cost is finite even if the leg cannot be flown. Its second derivative has three parts: length, time at each
+    height, and power. All are convex, and the coupling of height and course is omitted, so the matrix has no negative
+    eigenvalue. Time and energy are integrated along the leg by Simpson's rule with three points.
     """
     slopes, curvature = model.slopes, model.curvature
     slopes[:], curvature[:] = 0.0, 0.0
@@ -499,7 +499,12 @@ def _add_place_model(
 
 @inner
 def _fill_length_hessian(hessian: Floats, displacement: tuple[float, float, float], length: float) -> Floats:
-    """Fill and return the second derivatives (3, 3) of a leg's length with respect to its vector."""
+    """Fill and return the second derivatives (3, 3) of a leg's length with respect to its vector.
+
+    hessian: (3, 3) array to fill.
+    displacement: vector of the leg: east, north and up, m.
+    length: its length, m.
+    """
     for axis in range(3):
         for other_axis in range(3):
             identity = 1.0 if axis == other_axis else 0.0

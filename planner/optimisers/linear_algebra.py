@@ -88,8 +88,8 @@ def _add_multiple(values: Floats, factor: float, out: Floats) -> None:
 def band_cholesky(matrix: Floats, out: Floats) -> None:
     """Fill `out` with the lower Cholesky factor of a positive definite band matrix.
 
-    Both have d rows and are stored as (d, b): column 0 is the main diagonal, column 1 the diagonal below it, and so on;
-    entry [i, k] belongs to row i and column i - k of the matrix. A pivot is at least 1e-12 times the diagonal entry.
+    Both are stored as (d, b): column 0 is the main diagonal, column 1 the diagonal below it, and so on. Entry [i, k]
+    belongs to row i and column i - k of the matrix. A pivot is at least 1e-12 times the diagonal entry.
     """
     size, width = matrix.shape
     for i in range(size):

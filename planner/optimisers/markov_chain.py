@@ -61,8 +61,8 @@ def fit_chain(rows: Floats, size: int, ridge: float) -> tuple[Floats, Floats]:
     size: number of variables of a group.
     ridge: value added to each variance, as a fraction of the mean variance of the group.
 
-    Returns two arrays (g, size, size) with a matrix for each of the g groups: its regression on the previous group
-    (zeros for the first group), and the Cholesky factor of the covariance of its residuals.
+    Returns two arrays (g, size, size), with a matrix for each of the g groups. The first has the regressions on the
+    previous group, zeros for group 0. The second has the Cholesky factors of the residuals' covariances.
     """
     group_count = rows.shape[1] // size
     regressions, residual_factors = np.zeros((group_count, size, size)), np.zeros((group_count, size, size))

@@ -104,8 +104,8 @@ class Gaussian:
         rank: function that ranks scores, as for `BoxSearch`.
         noise: (n,) random numbers that break ties.
 
-        If all points have the same rank, they show no direction: the Gaussian only becomes narrower (once it has a best
-        point), and is given up after too many such evaluations.
+        Points that all have the same rank show no direction. The Gaussian then only becomes narrower (once it has a
+        best point), and is given up after too many such evaluations.
         """
         self.evaluations += len(points)
         ranks = rank(scores)
@@ -219,7 +219,12 @@ class Multistart(BoxSearch):
             self._draw_generation(self._search)
 
     def tell(self, scores: Floats) -> None:
-        """Process the scores (n, c) of the last samples of `ask`, and draw the next generation."""
+        """Process the scores (n, c) of the last samples of `ask`, and draw the next generation.
+
+        The best sample of all is kept. The search that drew the samples is updated. At the end of its slice of
+        evaluations, the same search continues or another one gets the next slice. The scores of first samples, which
+        no search has drawn, set the centre and the scale of all searches instead.
+        """
         ranks, noise = self._rank(scores), self._rng.random(len(scores))
         order = np.lexsort((noise, ranks))
         # The best sample of all generations, then this generation.
@@ -257,8 +262,9 @@ class Multistart(BoxSearch):
         """Return True if a search may continue at once with another slice of evaluations.
 
         It must be in the better half of the searches that have reached the same width, by their results at that width.
-        The best search of all has to wait for its turn, so that half of the evaluations go to other searches. So has a
-        search that is done, that is alone, or that has used more than `MAX_EVALUATION_FRACTION` of all evaluations.
+        The best search of all has to wait for its turn, so that half of the evaluations go to other searches. A search
+        that is done, that is the only one, or that has used more than `MAX_EVALUATION_FRACTION` of all evaluations has
+        to wait, too.
 
         The width and the best scores of the search are added to its curve, unless it has found nothing yet.
         """

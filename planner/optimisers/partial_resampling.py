@@ -113,7 +113,8 @@ class PartialResampling(BoxSearch):
     def tell(self, scores: Floats) -> None:
         """Process the scores (n, c) of the last samples of `ask`, and draw the next samples.
 
-        A sample of a population replaces its parent if it is better.
+        A sample of a population replaces its parent if it is better. Once the population no longer improves, a Gaussian
+        around its best sample draws the samples, until it has converged and a larger population begins.
         """
         if self._gaussian is not None:
             self._update_gaussian(self._gaussian, scores)

@@ -251,7 +251,7 @@ def _dense_ranks(rows: Floats, begin: int, end: int) -> tuple[Ints, int]:
 
 @inner
 def _add_dominator_counts_by_tree(rows: Floats, begin: int, end: int, order: Ints, candidate_ranks: Ints) -> None:
-    """Do the same as `_add_dominator_counts` for two scores, in O(n log n).
+    """Count dominators as `_add_dominator_counts` does, for two scores only, but in O(n log n).
 
     rows: (2, n) scores, one column per candidate.
     begin, end: the group is the columns from begin to end - 1, which are sorted by the first score, then by the second.

@@ -41,8 +41,8 @@ _GROUND_CELL = -2
 class SeparatingZones(NamedTuple):
     """Zones that separate start and destination.
 
-    zones: names of the zones adjacent to both the region of the start and the region of the destination; if there are
-    none, of those adjacent to either region.
+    zones: names of the zones. They are adjacent to the cells that can be reached from the start and to those that can
+    be reached from the destination, or to either of them if no zone is adjacent to both.
     cell_side: side of the cells of the examined grid, m.
     """
 
@@ -306,7 +306,10 @@ def explain_failure(plan: Plan, limits: Limits | None = None) -> list[str]:
 
 
 def _describe_walls(scenario: Scenario) -> list[str]:
-    """Return a line if the ground, or ground and missiles together, block the whole map's width; else []."""
+    """Return a line if the ground, or ground and missiles together, block the whole map's width; else [].
+
+    Lines across the map are tested, perpendicular to the direct line from start to destination.
+    """
     terrain = scenario.terrain
     if terrain is None:
         return []
@@ -343,7 +346,10 @@ def _map_crossings(scenario: Scenario) -> Iterator[tuple[float, np.ndarray]]:
 
 
 def _describe_margin_walls(problem: Problem) -> list[str]:
-    """Return a line if ground, clearance and margins leave no altitude across the whole map; else []."""
+    """Return a line if ground, clearance and margins leave no altitude across the whole map; else [].
+
+    The lines across the map are those of `_describe_walls`, except near the ends, where the margins are reduced.
+    """
     scenario, data = problem.scenario, problem.certified
     if scenario.terrain is None:
         return []
@@ -432,7 +438,8 @@ def nearest_missile_text(plan: Plan) -> str:
 def violated_zones(scenario: Scenario, path: np.ndarray) -> list[str]:
     """Return the names of the zones that a path (w, 3) violates.
 
-    They are the exclusions that the path enters, and the inclusions that it leaves.
+    They are the exclusions that the path enters, and the inclusions that it leaves, at points at most
+    `ZONE_SAMPLE_SPACING_M` apart.
 
     >>> from world.scenario import load_scenario
     >>> violated_zones(load_scenario("tight"), np.zeros((2, 3)))

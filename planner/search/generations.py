@@ -46,7 +46,11 @@ SAFE_SEARCH_FRACTION = 0.1
 def run_path_generations(search: Search, population: int, generations: int, starts: Floats) -> Floats:
     """Run an optimiser on whole paths; return the best vector (d,) of the last generation.
 
+    population: number of samples of the first generation.
+    generations: maximum number of further generations, each of half as many samples.
     starts: vectors (s, d) around which the first population is sampled.
+
+    A seeded search ends earlier if it no longer improves, or after a fraction of these evaluations.
     """
     encoding, algorithm = search.encoding, search.algorithm
     levels, previous_evaluations = _preference_levels(search), search.evaluations

@@ -166,6 +166,7 @@ def _lowest_ground(data: ProblemArrays, i: int, j: int, column_size: float) -> f
     The result is -inf if a pixel has no data or the column is not completely above the raster.
 
     i, j: indices of the column towards east and north.
+    column_size: side of a column, m.
     """
     first_column = math.inf
     first_row = math.inf
@@ -203,6 +204,7 @@ def _close_sphere(
     """Close the altitudes of columns that are completely inside a sphere.
 
     east, north, altitude, radius: sphere, m, with its centre relative to the map's south-western corner.
+    column_size: side of a column, m.
     range_bottoms, range_tops, range_counts: closed altitude ranges of all columns, which are changed.
     """
     columns, rows = range_counts.shape

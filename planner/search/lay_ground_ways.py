@@ -122,8 +122,8 @@ class FinalModel(NamedTuple):
     """Airspeed and slope that the autopilot flies on a final.
 
     airspeed: true airspeed on the glide, m/s, as a function of tailwind (m/s) and altitude (m AMSL).
-    slope: flown slope of the glide, m per m, as a function of height over and distance before the landing point (m),
-    tailwind (m/s) and altitude of the point (m AMSL).
+    slope: flown slope of the glide, m per m, as a function of four numbers: height over the landing point and distance
+    before it (m), tailwind (m/s), and altitude of the landing point (m AMSL).
     """
 
     airspeed: Callable[[float, float], float]
@@ -636,7 +636,7 @@ def _find_approach(site: _Site, strip: LandingStrip, final_model: FinalModel) ->
 
 
 def _describe_strip_fault(terrain: Terrain, strip: LandingStrip, course: float) -> str:
-    """Describe why a strip's ground is unsuitable for landing; "" if it is suitable."""
+    """Describe why a strip's ground is unsuitable for landing on a course (rad); "" if it is suitable."""
     for direction, slope in zip(("along", "across"), strip_slopes(terrain, strip, course), strict=True):
         if math.isnan(slope):
             return "the terrain at the ends of the strip is unknown"

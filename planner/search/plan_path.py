@@ -116,10 +116,7 @@ def plan_path(
     cost = make_objective_cost(scenario, limits, problem)
 
     def search_with(count: int, evaluations: int) -> _Result:
-        """Search with `count` waypoints; if the scenario requires more, halve the longest legs of the path.
-
-        evaluations: number of evaluations that earlier searches have used.
-        """
+        """Search with `count` waypoints; if the scenario requires more, halve the longest legs of the path."""
         encoding = ENCODINGS[found_algorithm.encoding](problem.space, count)
         settings = (progress, stop, first_safe, required_kill_distance(problem), improved)
         search = Search(problem, found_algorithm, encoding, stream(seed, PLANNER), *settings, evaluations=evaluations)
@@ -282,8 +279,8 @@ def _search_repeatedly(search: Search, previous_path: Floats | None) -> tuple[Fl
 def _check_options(scenario: Scenario, airspeed: float) -> None:
     """Raise ScenarioError if a search makes no sense; the first reason found is stated.
 
-    The reasons are: a wind too strong for the airspeed (m/s), a population too large, a budget smaller than the
-    population, and a start or destination inside a missile's kill radius.
+    It makes no sense in a wind that is too strong for the airspeed (m/s), with a population that is too large or larger
+    than the budget, or from or to a place inside a missile's kill radius.
     """
     if scenario.wind.speed > MAX_WIND_FRACTION * airspeed:
         raise ScenarioError.at(

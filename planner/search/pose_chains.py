@@ -159,9 +159,8 @@ class PathMeasures(NamedTuple):
 def measure_path(points: Sequence[MapPoint], turn_lengths: TurnLengths) -> PathMeasures:
     """Measure the length and the turns of a path, and how much of each leg its turns take up.
 
-    A path with a turn that is too sharp, or with two points less than 1 m apart, is only measured so far; its cost is
-    inf and it does not fit. The points are plain numbers, which is faster, because tens of thousands of paths are
-    measured.
+    The measurement ends at a turn that is too sharp, and at two points less than 1 m apart: such a path has the cost
+    inf and does not fit. The points are plain numbers for speed: tens of thousands of paths are measured.
 
     >>> measure_path([(0.0, 0.0), (0.0, 1000.0), (1000.0, 1000.0)], arc_turn_lengths(150.0)).fits
     True
@@ -195,6 +194,7 @@ def climb_altitudes(
 ) -> Floats:
     """Compute the altitude at each point of a path that climbs as steeply as allowed, (n,) m AMSL.
 
+    points: (n) east and north of the path, m.
     start_altitude: altitude at the first point, m.
     climb: function that returns the climb slope on a course.
     min_altitude: minimum altitude except at the end, m.

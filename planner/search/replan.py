@@ -128,7 +128,10 @@ def check_same_mission(scenario: Scenario, old_plan: Plan) -> None:
 
 
 def _check_first_waypoint(scenario: Scenario, old_plan: Plan, leg: int) -> None:
-    """Raise MissionError if the first waypoint of the new plan is in a kill radius or violates a zone."""
+    """Raise MissionError if the first waypoint of the new plan is in a kill radius or violates a zone.
+
+    leg: number of the leg of the old plan at whose start this waypoint is.
+    """
     threats = scenario.threats
     depths = threats.kill_radius - np.sqrt(((threats.position - old_plan.waypoints[leg]) ** 2).sum(axis=1))
     missile = int(np.argmax(np.where(threats.kill_radius > 0.0, depths, -math.inf))) if len(depths) else -1

@@ -70,8 +70,8 @@ def make_objective_cost(scenario: Scenario, limits: Limits, problem: Problem) ->
 def search_cheapest_path(search: Search, shortest_path: _CertifiedPath, weights: TravelCost) -> _CertifiedPath:
     """Return the path with the lowest time or energy that is found, and its certificate.
 
-    The shortest path is returned if it does not meet the goal of the search, if the length is to be minimised, or if no
-    path that is as safe is cheaper.
+    The shortest path itself is returned if the length is to be minimised, or if it does not meet the goal of the
+    search, or if no path that meets this goal is cheaper.
 
     shortest_path: the shortest path and its certificate.
     weights: weights of length, time and energy in the cost.

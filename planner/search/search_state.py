@@ -144,6 +144,8 @@ class Archive:
     def insert(self, vectors: Floats, scores: Floats) -> None:
         """Insert new paths in the order of their rank; of equal paths, older ones stay first.
 
+        vectors, scores: (n, d) paths and (n, 8) their scores.
+
         As soon as one row is feasible, infeasible rows are dropped, because there may be thousands of them to rank. A
         full archive accepts only rows that are better than its last row.
         """
@@ -307,7 +309,7 @@ class Search:
     def move_and_improve(self, vector: Floats, rounds: int, scale: float, max_evaluations: int) -> Floats:
         """Move all waypoints of a vector (d,) at once, then `improve` it; return the resulting scores (8,).
 
-        If the budget is almost used up, the vector is only improved.
+        If the budget is almost used up, the vector is only improved. `max_evaluations` limits `improve`.
 
         rounds, scale: number and relative size of the moves, as in `move_all_waypoints`.
         """

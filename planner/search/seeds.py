@@ -352,8 +352,9 @@ def may_turn_back(search: Search, certificate: Certificate) -> bool:
 def search_turning_back(search: Search, best: tuple[Floats, Certificate]) -> tuple[Floats, Certificate]:
     """Search for a path along a route that may turn back; return the better of it and `best`.
 
-    The route is found on a lattice of places and courses. If this finds no safe path, another search on the lattice
-    uses a better estimate of the remaining length, and a lower buffer above the ground if the usual one is high.
+    The route is found on a lattice of places and courses. If this finds no safe path, a second search on the lattice
+    follows. It has a better estimate of the remaining length, and if the usual buffer above the ground is high, a lower
+    one.
 
     best: best path so far, with its certificate.
     """

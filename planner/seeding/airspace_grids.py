@@ -222,13 +222,10 @@ def _relax_airspace_stage(
 ) -> None:
     """Extend all routes by one step to the next stage; keep the cheapest route to each of its cells.
 
-    The parent of a cell is the cell of the previous stage from which its cheapest route comes.
-
-    stage: number of this stage.
     previous_columns, columns: `COLUMN` records (across,) of the previous stage and of this stage.
     cost, next_cost: (across, layers) costs of the routes to the cells of the previous stage and this stage (updated).
     cell_costs: (across, layers) cost per m of the steps to this stage. A change of course from the parent also costs.
-    previous_parents, parents: (across, layers) parents in both stages, as across x layers + layer; the latter updated.
+    previous_parents, parents: (across, layers) cells from which these routes come: across x layers + layer (updated).
     """
     step, width, zones, spacing = frame.length / grid.stages, grid.across.size, data.airspace.zones, grid.layer_spacing
     lateral = 0.0 if stage in (1, grid.stages) else float(data.tracking.across)  # No tracking error at a fixed end.
@@ -326,7 +323,7 @@ def cheapest_airspace_route(
 
 @compiled
 def begin_airspace_route(data: ProblemArrays, frame: RotatedFrame, grid: AirspaceGrid) -> AirspaceSearch:
-    """Return a new search for the cheapest route, before its first stage."""
+    """Return a new search for the cheapest route, before its first stage: only the start has a cost, 0."""
     stages, width, step = grid.stages, grid.across.size, frame.length / grid.stages
     centre_index = int(np.argmin(np.abs(grid.across)))
     columns = np.zeros((stages + 1, width), dtype=COLUMN)
@@ -436,7 +433,7 @@ def end_airspace_route(
 
 @inner
 def _nearest_layer(grid: AirspaceGrid, column: Record, height: float) -> int:
-    """Return the index of the layer that is nearest to a height, m."""
+    """Return the index of the layer that is nearest to a height (m) in a `COLUMN` record."""
     first_height = column.lowest if grid.follows else grid.floor
     return min(grid.layers - 1, max(0, round((height - first_height) / grid.layer_spacing)))
 

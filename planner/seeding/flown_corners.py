@@ -66,6 +66,7 @@ class FlownCorners(NamedTuple):
 def no_corners(count: int, margin: float) -> FlownCorners:
     """Return the `FlownCorners` of a path that has no corners near the ground.
 
+    count: number w of waypoints of the path.
     margin: additional margin, m.
     """
     slope_margin = ARC_MARGIN_M + ARC_FRACTION * margin

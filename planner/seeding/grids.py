@@ -164,9 +164,10 @@ def _add_kill_cost(
 ) -> None:
     """Add the cost of kill spheres to cells of a stage; the cost increases towards the centre of a sphere.
 
+    obstacles: `OBSTACLE` records: kill spheres in the rotated frame.
     along: position of the stage, m.
     first_across, last_across: range of the cells across, both included.
-    cell_costs: (layers, across) cost per m.
+    cell_costs: (layers, across) cost per m; updated.
     """
     across, layers = grid.across, grid.layers
     across_spacing = across[1] - across[0] if across.size > 1 else 1.0
@@ -245,7 +246,7 @@ SPAN = np.dtype([("first", np.int64), ("last", np.int64)], align=True)
 def layers_per_step(data: ProblemArrays, frame: RotatedFrame, step: float, layers: Floats, ratio: float) -> Records:
     """Return the steepest climb and descent of a step, in whole layers.
 
-    The result is `STEP_LAYERS` records (2 * MAX_SIDE + 1, layers): entry [MAX_SIDE + k, z] is for the step that begins
+    The result is `STEP_LAYERS` records (2 * MAX_SIDE + 1, layers). Entry [MAX_SIDE + k, z] is for the step that begins
     in layer z and goes one stage forward and k cells to the side.
 
     frame: frame of the direct line.
@@ -484,7 +485,7 @@ def cheapest_route(
 
 @compiled
 def begin_route(data: ProblemArrays, frame: RotatedFrame, grid: Grid) -> GridSearch:
-    """Return a new search for the cheapest route, before its first stage."""
+    """Return a new search for the cheapest route, before its first stage: only the start has a cost, 0."""
     stages, width, layer_count = grid.stages, grid.across.size, grid.layers.size
     step = frame.length / stages
     centre_index, start_layer = int(np.argmin(np.abs(grid.across))), int(np.argmin(np.abs(grid.layers - data.start[2])))
@@ -521,12 +522,8 @@ def continue_route(
 ) -> GridSearch:
     """Continue a search by up to `max_stages` stages, or until no route can continue; return it.
 
-    In each stage the costs of its cells are filled, the routes are extended to them, and the cells that only dearer
-    routes can use are dropped.
-
-    extra: (stages + 1, across) additional cost per m of path in each position.
-    bound: upper limit on the cost of the route.
-    search: state of the search; its arrays are overwritten.
+    extra: (stages + 1, across) additional cost per m of path in each position. search: its arrays are overwritten.
+    bound: upper limit on the cost of the route; cells that only dearer routes can use are dropped.
     """
     stages, width, layer_count = grid.stages, grid.across.size, grid.layers.size
     step = frame.length / stages
@@ -596,7 +593,8 @@ def end_route(search: GridSearch) -> tuple[Records, float]:
 def trace_back(parents: Codes, layer: int, across: int) -> Records:
     """Return `ROUTE_CELL` records of the route from the start to a cell of the last stage.
 
-    parents: parent of each cell, (stages + 1, layers, across).
+    parents: (stages + 1, layers, across) parent of each cell, as layer x width + across.
+    layer, across: the cell of the last stage.
     """
     width = parents.shape[2]
     cells = np.zeros(parents.shape[0], dtype=ROUTE_CELL)

@@ -121,7 +121,7 @@ class Heuristic(NamedTuple):
 
 
 class _StateTable(NamedTuple):
-    """What an A* search knows about each state: a point, a layer and one of eight courses.
+    """Tables of an A* search with an entry for each state: a point, a layer and one of eight courses.
 
     cost: cost of the cheapest known route to each state, m.
     parents: the parent's number plus 1; 0 for an unreached state, whose cost is not set, and `_FIRST` for a state of
@@ -168,8 +168,8 @@ def _expand_state(
 ) -> None:
     """Expand a state: add the successors that it reaches at a lower cost than before to the open list.
 
-    A successor is the next point on a course that differs by at most `max_turn`, in a layer that the aircraft can
-    climb or descend to, if the step between both is free of violations.
+    A successor is the next point on a course that differs by at most `max_turn`. Its layer is one that the aircraft can
+    climb or descend to. The step to it must be free of violations.
 
     lattice: points of the lattice; a state is a point, a layer and one of eight courses.
     table: costs, parents and flags of all states; updated.

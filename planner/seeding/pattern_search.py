@@ -182,7 +182,7 @@ def _triangular_basis(inner_count: int) -> tuple[Floats, Ints]:
 
 @inner
 def _make_candidate(data: ProblemArrays, waypoints: int) -> _Candidate:
-    """Make a candidate path with its ends set, and scratch memory to score the path."""
+    """Make a candidate path of a number of waypoints, with its ends set, and working memory to score it."""
     path = np.empty((waypoints, 3))
     copy_into(path[0], data.start)
     copy_into(path[-1], data.destination)
@@ -235,7 +235,10 @@ def _evaluate_merit(
 
 @inner
 def _merit_of_scores(violations: Record, objectives: Record) -> tuple[float, bool]:
-    """Return the merit of scores (length ratio plus priced violations), and True without violations."""
+    """Return the merit of a path (length ratio plus priced violations), and True if it has no violation.
+
+    violations, objectives: `VIOLATIONS` and `OBJECTIVES` records of the path.
+    """
     price, is_feasible = EXPOSURE_PRICE * objectives.kill_exposure, True
     if objectives.kill_exposure > 0.0:
         price += ANY_EXPOSURE_PRICE
@@ -305,12 +308,8 @@ def _continue_search(
 ) -> _State:
     """Continue a search up to `pause_count` evaluations, or to its end; return its state.
 
-    Each move is tried in one direction, and if that is not better in the other. At the end of a round the displacement
-    of the whole round is tried once more. The search ends at `max_evaluations`, or if all moves are too small.
-
-    frames: frame in which each waypoint moves.
-    moves, initial_steps: moves, (k, d), and their initial sizes, (k,).
-    state: state of the search; its vectors are overwritten.
+    moves, initial_steps: (k, d) moves and (k,) their initial sizes; a move that fails is tried in the other direction.
+    state: its vectors are overwritten. The search ends at `max_evaluations`, or when all moves are too small.
     """
     best_vector, best_merit, feasible_vector, feasible_merit, round_start, steps, move, has_moved, evaluations, _ = (
         state

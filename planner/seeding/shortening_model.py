@@ -563,15 +563,9 @@ def _add_turns(
 ) -> float:
     """Add the limits on turns, and on legs that hold them; return their contribution to the merit.
 
-    The value of a turn is the margin to the limit, scaled to m. The value of a leg is the length that its turns, roll
-    and settling leave over, m.
-
-    path: (w, 3) m.
-    multipliers: (c,) multipliers of all constraints.
-    values: (c,) values of all constraints; those added here are filled.
-    penalty: penalty factor, 1 / m.
-    model: gradient and Hessian of the augmented Lagrangian, to which the constraints are added.
-    first_number: number of the first of these constraints.
+    The value of a turn is the margin to its limit, scaled to m; that of a leg is the length, m, that remains.
+    path, penalty: (w, 3) m, and penalty factor, 1 / m. model: gradient and Hessian, to which the constraints are added.
+    multipliers, values: (c,) of all constraints; the values from `first_number` on are filled.
     """
     merit, slopes, count = 0.0, model.slopes, path.shape[0] - 1
     turn = np.zeros(count + 1)

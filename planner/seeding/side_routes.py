@@ -333,6 +333,7 @@ def sides_passed(points: Floats, obstacles: Records) -> Ints:
     """Return the side on which a route passes each obstacle, (k,); -1 for an obstacle beyond the route's ends.
 
     points: (s, 3) along, across, up, m.
+    obstacles: `OBSTACLE` records (k,).
 
     Two routes with the same sides can be deformed into each other without touching an obstacle. Routes with different
     sides are treated as different, although a route over a sphere on the ground could be moved to either side of it.

@@ -200,18 +200,12 @@ def _extend_paths(
     lower_bounds: Floats,
     corners: Records,
 ) -> int:
-    """Extend partial paths to candidate k of waypoint i; return the number of legs that were evaluated.
+    """Extend the best partial path to candidate k of waypoint i; return the number of legs evaluated.
 
-    The best of the partial paths that end at the previous waypoint is extended. They are tried in the order of a lower
-    bound on the cost, so that few legs have to be evaluated.
-
-    candidates: (w, k, 3) m.
-    step: 1 for paths from the start, -1 for paths from the destination.
+    step: 1 for paths from the start, -1 for paths from the destination. candidates: (w, k, 3) m.
     cost, link: (w, k) cost and neighbouring candidate of each partial path; updated for the candidate.
-    max_cost: upper limit on the cost of a partial path.
-    legs: costs of legs, as in `_advance_sweeps`; updated.
-    open_ends: candidates of the previous waypoint that have a partial path.
-    lower_bounds, corners: working memory: (k,), and one `CORNER` record.
+    max_cost: upper limit on the cost of a partial path. legs: costs of legs, as in `_advance_sweeps`; updated.
+    open_ends: candidates of the previous waypoint with a partial path. lower_bounds, corners: working memory.
     """
     previous, evaluated_count, point = i - step, 0, candidates[i, k]
     if not max_cost > 0.0 or open_ends.size == 0:

@@ -106,8 +106,9 @@ def _max_depth_below_leg(
     horizontal_length: m.
     start_altitude, end_altitude: m AMSL.
 
-    The altitude lags by the lag length times the slope. A leg with a smaller change of altitude than the step of the
-    tracking error is demanded at its final altitude from its start, so that the aircraft is low by the whole change.
+    The altitude lags by the lag length times the slope. On a leg with a smaller change of altitude than the step of the
+    tracking error, the final altitude is demanded from the start. The aircraft then flies at that altitude, and differs
+    from the leg by the whole change.
     """
     altitude_change = end_altitude - start_altitude
     if abs(altitude_change) < data.tracking.step:

@@ -129,6 +129,8 @@ def _clean_line(line: str) -> str:
 def _finish_block(block: _Block, source: str) -> tuple[str, dict[str, Any] | str]:
     """Return the location of an airspace in its file, and its [[zones]] entries or the reason why it is skipped.
 
+    It is skipped if it is open to all, or has neither a name nor limits nor a shape.
+
     Raises ScenarioError if the airspace does not have exactly one shape.
     """
     name = "".join(character for character in block.name if character.isprintable())[:80]

@@ -401,7 +401,10 @@ def test_no_more_zones_are_made_than_a_scenario_may_have(
     files = [f"{name}.{suffix}" for name in "ab"]
     with pytest.raises(ScenarioError) as caught:
         zone_files.read_zone_files(files, "s.toml", tmp_path)
-    assert str(caught.value) == f"s.toml: zones_file: b.{suffix}: too many zones: at most 4 are allowed in all files together"
+    assert (
+        str(caught.value)
+        == f"s.toml: zones_file: b.{suffix}: too many zones: at most 4 are allowed in all files together"
+    )
     assert len(made) == 4
 
 
