@@ -111,7 +111,7 @@ def read_at_most(path: Path, max_bytes: int, kind: str) -> bytes:
     status = path.stat()
     file_text = f"{'an' if kind.startswith('a') else 'a'} {kind} file"
     if stat.S_ISREG(status.st_mode) and status.st_size > max_bytes:
-        raise ValueError(f"{status.st_size:,} bytes: {file_text} has at most {max_bytes:,}")
+        raise ValueError(f"{status.st_size:,} bytes: {file_text} has at most {max_bytes:,} bytes")
     if stat.S_ISDIR(status.st_mode):
         raise ValueError(f"{missing_text(path)}; expected {file_text}")
     is_shell_pipe = stat.S_ISFIFO(status.st_mode) and str(path).startswith(("/dev/fd/", "/dev/stdin", "/proc/self/fd/"))
@@ -120,7 +120,7 @@ def read_at_most(path: Path, max_bytes: int, kind: str) -> bytes:
     with path.open("rb") as file:
         data = file.read(max_bytes + 1)
     if len(data) > max_bytes:
-        raise ValueError(f"more than {max_bytes:,} bytes: a {kind} file has no more")
+        raise ValueError(f"more than {max_bytes:,} bytes: {file_text} has at most {max_bytes:,} bytes")
     return data
 
 
@@ -350,7 +350,7 @@ def temporary_folder(prefix: str) -> Iterator[Path]:
 
 
 def remove_temporary_folders(process_id: int) -> bool:
-    """Remove the folders that a killed process made by `temporary_folder`; return True if none was left.
+    """Remove the folders that a killed process made by `temporary_folder`; return True if there were none.
 
     >>> with temporary_folder("planfly-") as folder:
     ...     remove_temporary_folders(os.getpid()), folder.exists()

@@ -65,7 +65,7 @@ def height_datum(crs: str | None, stated_datum: StatedDatum | None) -> HeightDat
     """
     if stated_datum is not None and not isinstance(stated_datum, str):
         return HeightDatum(
-            f"{_MEAN_SEA_LEVEL}, at {stated_datum:g} m of the file's heights as stated",
+            f"{_MEAN_SEA_LEVEL} (at {stated_datum:g} m in the file's heights, as stated)",
             lambda lon, _: np.full(np.shape(lon), stated_datum),
         )
     if stated_datum in ("egm96", "egm2008"):

@@ -375,7 +375,10 @@ def _convert_to_sea_level(heights: NDArray[np.float32], raster: RasterFile, top:
 
 
 def _pixels_per_metre(to_pixel: PolyMap, box: Floats) -> Floats:
-    """Return the derivative of columns and rows (pixels) by east and north (m) at the centre of a box, (2, 2)."""
+    """Return how fast the pixel coordinates change with the map position at the centre of a box, (2, 2).
+
+    Row 0 has the derivatives of the column by east and by north, pixels per m; row 1 has those of the row.
+    """
     centre = box.mean(axis=1)
     col, row = to_pixel(centre[0] + np.array([0.0, 100.0, 0.0]), centre[1] + np.array([0.0, 0.0, 100.0]))
     return np.array([[col[1] - col[0], col[2] - col[0]], [row[1] - row[0], row[2] - row[0]]]) / 100.0

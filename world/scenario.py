@@ -248,7 +248,7 @@ class Scenario:
             verb = "is" if inactive_count == 1 else "are"
             notes.append(
                 f"{inactive_count:,} of {len(timed_tables):,} zones with times of activity {verb} "
-                f"not active {span} UTC: ignored"
+                f"not active from {span} UTC and {verb} ignored"
             )
         return tuple(notes)
 
@@ -489,7 +489,7 @@ def _with_file_zones(
     if far_count := len(file_zones.zones) - len(zones_nearby):
         notes.append(
             f"{source}: {far_count:,} of {count_text(len(file_zones.zones), 'zone')} lie more than "
-            f"{MAX_ZONE_DISTANCE / 1000.0:g} km from the area: ignored"
+            f"{MAX_ZONE_DISTANCE / 1000.0:g} km from the area and are ignored"
         )
     changes = {"zones": [*(spec.zones or ()), *zones_nearby] or None, "zone_notes": notes or None}
     return spec.model_copy(update=changes)
@@ -899,7 +899,9 @@ def with_zones(scenario: Scenario, tables: Sequence[ZoneTable], source: str, not
     added_tables = (spec.zones or [])[previous_count:]
     if previous_count + len(added_tables) > MAX_ZONES:
         added_text = count_text(len(added_tables), "zone")
-        raise ScenarioError(f"{source}: {added_text} more: at most {MAX_ZONES:,} in all", file=source)
+        raise ScenarioError(
+            f"{source}: {added_text} cannot be added: a scenario has at most {MAX_ZONES:,} zones", file=source
+        )
     active_tables = _active_zones(spec.model_copy(update={"zones": added_tables}))
     zones = make_zones(active_tables, source, scenario.origin, scenario.terrain)
     ends = (("start", scenario.start), ("destination", scenario.destination))

@@ -205,7 +205,8 @@ _ENDS = (("start",), ("destination",))
 def _remaining_faults_text(errors: Sequence[Any]) -> str:
     """Describe the errors after the first as the end of a message.
 
-    The text has the names of the missing keys if all errors are missing keys, or else the number of errors.
+    The text has the names of the missing keys if all errors are missing keys, or else the number of errors. It is "" if
+    all errors concern one value, for which pydantic reports an error for each allowed type.
     """
     if len({error_entry["loc"][:2] for error_entry in errors}) < 2 and errors[0]["loc"] not in _ENDS:
         return ""

@@ -58,7 +58,9 @@ END_DISTANCE_M = 100.0
 def tracked_pieces(data: ProblemArrays, waypoints: Floats) -> Records:
     """Cut a path (w, 3) into straight pieces with bounds on the tracking error of the flight.
 
-    Return `TRACKED_PIECE` records, first of its legs, then of its corners.
+    Returns `TRACKED_PIECE` records, first of its legs, then of its corners. A leg is cut where its altitude lag has
+    decayed and near the fixed ends. A corner gives two pieces, a part of the leg before it and a part of the leg after
+    it, with the excursion of the flight there as an additional lateral deviation.
     """
     count = waypoints.shape[0]
     legs, corners = np.zeros(count - 1, dtype=LEG), np.zeros(count, dtype=CORNER)
@@ -138,7 +140,7 @@ def _set_deviations(lag: Record, begin_fraction: float, end_fraction: float, pie
 def _lateral_deviation(data: ProblemArrays, position: Floats, across: float) -> float:
     """Return the lateral deviation of the flight at a position on the path, m.
 
-    The deviation is smaller near the fixed ends.
+    It grows from 0 at the start and the destination to `across` at the distance `END_DISTANCE_M`.
     """
     end_distance = min(
         math.hypot(position[0] - data.start[0], position[1] - data.start[1]),
@@ -185,9 +187,9 @@ def missile_distance(data: ProblemArrays, waypoints: Floats) -> float:
 
 @inner
 def _segment_distance(threats: Records, start: Floats, end: Floats, min_distance: float) -> float:
-    """Return the distance from a segment to the nearest missile sphere, m, if it is below `min_distance`.
+    """Return the distance from a segment to the nearest missile sphere, m; at most `min_distance`.
 
-    Otherwise return `min_distance`. The distance is negative inside a sphere.
+    The distance is negative inside a sphere.
 
     threats: records of the threats; those without a kill radius are ignored.
     start, end: (3,) ends of the segment, m.
@@ -238,7 +240,7 @@ def with_end_course_points(data: ProblemArrays, path: Floats) -> Floats:
 
 @compiled
 def turn_and_roll_lengths(data: ProblemArrays, waypoints: Floats) -> tuple[Floats, Floats]:  # pragma: no cover
-    """Return the lengths that each leg needs for its turns, and for rolling from one bank to the next.
+    """Return the lengths that each leg needs for its turns, and for rolling between opposite banks.
 
     waypoints: (w, 3) m.
 
@@ -286,7 +288,7 @@ def leg_slope_limits(data: ProblemArrays, waypoints: Floats) -> tuple[Floats, Fl
 def heights_above_ground(data: ProblemArrays, waypoints: Floats) -> Records:
     """Measure the smallest height above ground and the required buffer of each piece of a path (w, 3).
 
-    Return `CERTIFIED_PIECE` records, first of its legs, then of its arcs or corners.
+    Returns `CERTIFIED_PIECE` records, first of its legs, then of its arcs or corners.
     """
     if data.tracking.has_error:
         # The height includes the tracking error below the piece and to either side of it, and is NaN over unknown
@@ -328,8 +330,10 @@ def heights_above_ground(data: ProblemArrays, waypoints: Floats) -> Records:
 def _measure_piece(data: ProblemArrays, start: Floats, end: Floats, of_arc: bool, number: int, out: Record) -> None:
     """Fill the `CERTIFIED_PIECE` record for a straight piece from `start` to `end`.
 
+    start, end: (3,) ends of the piece, m.
     of_arc: True for a piece of an arc, False for a piece of a leg.
     number: number of the leg or arc.
+    out: the record to fill.
     """
     height, _ = segment_clearance(data.heights, data.to_pixel, start, end)
     out.of_arc, out.number, out.height = of_arc, number, height
@@ -344,9 +348,10 @@ def required_buffer(
 
     buffer: additional height away from the ends, m.
     end_buffers: additional heights at the start and the destination, m.
+    a, b: (3,) ends of the piece, m.
 
-    The buffer grows half as fast as in a search. The difference allows for the ground between the samples of the
-    search.
+    From an end with a smaller buffer the required height grows with the distance, up to `buffer`. It grows half as fast
+    as in a search: the difference allows for the ground between the samples of the search.
     """
     for end, end_buffer in ((data.start, end_buffers[0]), (data.destination, end_buffers[1])):
         if end_buffer < buffer:

@@ -113,7 +113,8 @@ class PartialResampling(BoxSearch):
     def tell(self, scores: Floats) -> None:
         """Process the scores (n, c) of the last samples of `ask`, and draw the next samples.
 
-        A sample of a population replaces its parent if it is better.
+        A sample of a population replaces its parent if it is better. Once the population no longer improves, a Gaussian
+        around its best sample draws the samples, until it has converged and a larger population begins.
         """
         if self._gaussian is not None:
             points = (self._pending_samples - self.lower) / (self.upper - self.lower)
@@ -176,7 +177,11 @@ class PartialResampling(BoxSearch):
         self.scores = np.concatenate([self._best[1][None], scores])
 
     def _draw(self) -> None:
-        """Draw a sample for each member of the population, which is sorted."""
+        """Draw a new sample for each member of the population, which is sorted.
+
+        The sample keeps a part of the variables of its member. The others are redrawn around one of the best members,
+        which is moved by the difference of two random members, times a width.
+        """
         count = len(self._points)
         points = (self._points - self.lower) / (self.upper - self.lower)
         self._fractions = np.clip(

@@ -46,7 +46,11 @@ SAFE_SEARCH_FRACTION = 0.1
 def run_path_generations(search: Search, population: int, generations: int, starts: Floats) -> Floats:
     """Run an optimiser on whole paths; return the best vector (d,) of the last generation.
 
+    population: number of samples of the first generation.
+    generations: maximum number of further generations, each of half as many samples.
     starts: vectors (s, d) around which the first population is sampled.
+
+    A seeded search ends earlier if it no longer improves, or after a fraction of these evaluations.
     """
     encoding, algorithm = search.encoding, search.algorithm
     previous_evaluations = search.evaluations
@@ -93,7 +97,7 @@ def run_path_generations(search: Search, population: int, generations: int, star
 
 
 def _best_row(scores: Floats) -> Floats:
-    """Return the row (8,) of scores (n, 8) that the archive would place first."""
+    """Return the scores (8,) of the best path among scores (n, 8)."""
     return np.asarray(scores[best_first(scores)[0]])
 
 
@@ -169,6 +173,9 @@ REPAIR_EVALUATIONS = 100
 def run_waypoint_generations(search: Search, population: int, generations: int) -> None:
     """Run the factorised distribution algorithm, and insert the paths that it finds into the archive.
 
+    Each interval of the axis has a set of candidates for its waypoint. In each generation the best path through every
+    candidate is found by dynamic programming, and new candidates are drawn around those with the best paths.
+
     population: number of candidates per interval in the first generation.
     generations: number of generations, at most `MAX_GENERATIONS`, or `SEEDED_GENERATIONS` with seeds.
     """
@@ -211,7 +218,9 @@ def run_waypoint_generations(search: Search, population: int, generations: int) 
 
 
 def _first_candidate_count(search: Search, population: int) -> int:
-    """Return the number of candidates per interval in the first generation, limited by memory.
+    """Return the number of candidates per interval in the first generation.
+
+    A seeded search has fewer candidates. The memory for the legs between them limits the number.
 
     population: requested number of candidates.
     """
@@ -246,7 +255,10 @@ def may_try_again(search: Search) -> bool:
 
 
 def _count_attempt_legs(search: Search) -> int:
-    """Return the number of legs between all candidates in all generations of the first attempt."""
+    """Return how many legs there are between the candidates of neighbouring intervals, in all generations.
+
+    The number is that of the first attempt.
+    """
     settings = search.problem.scenario.planner
     first_count = _first_candidate_count(search, settings.population)
     candidate_pairs = (
@@ -262,12 +274,13 @@ def _as_vectors(rows: Floats) -> Floats:
 
 
 def _join_candidates(search: Search, paths: Floats, slack: float) -> WaypointChains:
-    """Join the waypoints of different paths (k, w, 3) to the best path through each waypoint.
+    """Find the best path through each waypoint of some paths (k, w, 3), whose waypoints may be mixed.
 
-    slack: fraction by which the first bound exceeds the cost of the best safe path.
+    Only paths below an upper bound on the cost are searched, because without a bound almost every leg would have to be
+    evaluated. If there is none, a larger bound is tried. If few legs may still be evaluated, the last search, without a
+    bound, only joins the first candidates.
 
-    Larger bounds follow until a path is found: without a bound almost every leg would be evaluated. If few legs may
-    still be evaluated, only the first candidates are joined.
+    slack: fraction by which the first bound exceeds the cost of the best safe path, if there is one.
     """
     data, space = search.problem.search, search.problem.space
     straight_length = math.dist(space.start, space.destination)
@@ -291,7 +304,14 @@ def _join_candidates(search: Search, paths: Floats, slack: float) -> WaypointCha
 
 
 def _evaluate_best(search: Search, rows: Floats, chains: WaypointChains) -> None:
-    """Evaluate whole paths through some of the best candidates; repair one path if none is feasible."""
+    """Evaluate whole paths through some of the best candidates of some intervals.
+
+    Without any path through candidates, the path of the first candidates is evaluated. If no path in the archive is
+    feasible, a pattern search tries to repair the best one.
+
+    rows: (intervals, candidates, 3) candidates in the rotated frame.
+    chains: best path through each candidate.
+    """
     candidate_chains = set()
     for i in range(1, len(chains.cost) - 1, INTERVAL_STEP):
         for k in np.argsort(chains.cost[i], kind="stable")[:BEST_PER_INTERVAL]:

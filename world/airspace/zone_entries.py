@@ -127,7 +127,10 @@ def published_entries(limits: Mapping[str, Any], source: str) -> dict[str, Any]:
 
 
 def _comparable_limit(limit: Any) -> tuple[bool, float] | None:
-    """Return two values for a limit: True if it is a height above ground, and its value in m; None if invalid."""
+    """Return a limit in a form in which limits can be compared; None for an invalid limit.
+
+    The form is True for a height above ground, and the limit's value, m.
+    """
     if not isinstance(limit, dict):
         return None
     try:

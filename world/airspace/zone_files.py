@@ -292,7 +292,7 @@ def _extended_data(placemark: _Element, source: str) -> dict[str, Any]:
 # ----------------------------------------------------------------------
 # Formats by suffix, and reading of files.
 
-# A function of a text and the file's name in messages.
+# A function of a file's text, and of the file's name in messages, that yields the zones.
 Reader = Callable[[str, str], Iterator[Found]]
 # Readers of text formats by suffix; a GeoPackage is not a text.
 FORMATS: dict[str, Reader] = {
@@ -385,11 +385,11 @@ def read_zone_file(path: Path, source: str, max_zones: int = MAX_ZONES) -> FileZ
             unrestricted_counts[entries] += 1
             continue
         if len(file_zones.zones) >= max_zones:
-            message = f"{source}: too many zones: at most {MAX_ZONES:,} in all files"
-            raise ScenarioError(message, file=source, field="zones", allowed=f"at most {MAX_ZONES:,}")
+            allowed = f"at most {MAX_ZONES:,} are allowed in all files together"
+            raise ScenarioError(f"{source}: too many zones: {allowed}", file=source, field="zones", allowed=allowed)
         corner_count += sum(map(len, entries.get("rings_deg", ())))
         if corner_count > MAX_FILE_CORNERS:
-            allowed = f"at most {MAX_FILE_CORNERS:,}"
+            allowed = f"at most {MAX_FILE_CORNERS:,} are allowed in one file"
             raise ScenarioError(f"{source}: too many corners: {allowed}", file=source, allowed=allowed)
         outline_notes, crossing_count = _repair_outline(
             entries, MAX_CROSSINGS - total_crossings, f"{source}: {location}"
@@ -409,7 +409,7 @@ def read_zone_file(path: Path, source: str, max_zones: int = MAX_ZONES) -> FileZ
         file_zones.notes.append(f"{source}: {subject} no flight: {reason}")
     for note_text, names in repaired_names.items():
         if names:
-            remainder = f", {len(names) - 5:,} more" if len(names) > 5 else ""
+            remainder = f" and {len(names) - 5:,} more" if len(names) > 5 else ""
             file_zones.notes.append(f"{source}: {note_text}: {', '.join(names[:5])}{remainder}")
     return file_zones
 
@@ -452,7 +452,7 @@ def _check_size(path: Path, source: str) -> None:
         raise ScenarioError(f"{source}: {missing_text(path)}", file=source)
     if path.stat().st_size > MAX_BYTES:
         raise ScenarioError(
-            f"{source}: {path.stat().st_size:,} bytes: a file of zones has at most {MAX_BYTES:,}", file=source
+            f"{source}: {path.stat().st_size:,} bytes: a file of zones has at most {MAX_BYTES:,} bytes", file=source
         )
 
 
