@@ -192,12 +192,10 @@ def guide_to_path(
 ) -> None:
     """Set ``memory.lateral_acceleration`` to join and follow a track (`guideToPath`).
 
-    Far from the track the course points straight to it; on the track, along it. The acceleration turns the aircraft to
-    the heading that flies this course in the wind, and adds what the curvature of the track requires.
+    Far from the track the course points to it, on the track along it. The acceleration turns the aircraft to this course.
 
     path_east, path_north, curvature: the track's nearest point, m, and curvature there, 1/m, positive to the right.
-    tangent_east, tangent_north: direction of the track at that point, a unit vector.
-    wind_east, wind_north: velocity of the air, m/s.
+    tangent_east, tangent_north, wind_east, wind_north: unit vector along the track there; velocity of the air, m/s.
     target_airspeed: m/s. If the ground speed would be too low at this airspeed, ``memory.min_airspeed`` is set.
     estimated, parameters, memory: `MOTION`, `PX4_PARAMETERS` and `PX4_MEMORY` records.
     """
