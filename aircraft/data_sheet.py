@@ -885,7 +885,7 @@ def _no_propeller_error(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -
     allowed = (
         f"allowed about {min(feasible_values):.3g}..{max(feasible_values):.3g} {unit} {condition}"
         if feasible_values
-        else f"no propeller reaches it {condition}"
+        else f"no propeller reaches this value {condition}"
     )
     value = getattr(stated_sheet, field) / factor
     return FlightError.of_argument(option, value, allowed, shown=f"{value:.3g} {unit}")

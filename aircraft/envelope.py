@@ -141,7 +141,8 @@ class Envelope:
         air_angle: angle relative to the air, rad, positive in a climb.
 
         The power lies on a parabola through idle, level flight and full throttle. Beyond idle and full throttle it is
-        constant. It is NaN if the power is unknown, or if the airspeed is outside the table.
+        constant. It is NaN if the power is unknown, if the airspeed is outside the table, or in between if the aircraft
+        cannot both climb and descend there.
         """
         if not self.power_level.size:
             return math.nan

@@ -280,7 +280,8 @@ def slopes_along(
 
     tail_fraction, cross_fraction: components of the unit wind vector along and across the course.
 
-    The result is (0, 0) if the course cannot be held.
+    The result is (0, 0) if the course cannot be held. The dive is 0 at an altitude at which the aircraft cannot hold an
+    equivalent airspeed in level flight.
     """
     count = table.amsl.size
     wind = wind_speed_at(table, amsl)
@@ -327,7 +328,7 @@ def _turn_radius_of_courses(
     """Return the radius (m) of the arc at the bank limit from the unit course u to the unit course v.
 
     ux, uy, vx, vy: east and north components of u and v.
-    turn_sign: sign of the turn, 0 for either direction.
+    turn_sign: positive for a turn to the left, negative to the right, 0 for either direction.
     wx, wy: components of `downwind_vector`.
 
     The radius is inf if one of the courses cannot be held.
@@ -377,7 +378,8 @@ def corner_tangent(
     ux, uy, vx, vy: east and north components of u and v.
     wx, wy: components of `downwind_vector`.
 
-    The tangent length R tan(theta/2) = R |sin theta| / (1 + cos theta) is 0 without a turn and inf for a U-turn.
+    The tangent length R tan(theta/2) = R |sin theta| / (1 + cos theta) is 0 without a turn and inf for a U-turn; the
+    radius is 0 in both cases.
     """
     cross, dot = ux * vy - uy * vx, ux * vx + uy * vy
     if abs(cross) < 1e-9 and dot > 0.0:

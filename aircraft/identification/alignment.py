@@ -46,7 +46,8 @@ class Signals:
     surfaces: (n, 3) elevator, aileron, rudder after the servos' lag, rad.
     airspeed_factor: factor that the airspeed was multiplied with.
     airspeed_sd: relative standard deviation of the airspeed.
-    edges: first row of each record, and at the end the number of rows.
+    edges: first row of each record, and at the end the number of rows: with (0, 500, 900) the first record has the rows
+        0 to 499, the second record the rows 500 to 899.
     block: (n,) number of the time block of each row.
     hertz: samples per second.
     extra: further columns by name.
@@ -213,7 +214,9 @@ _SIMPLEX_STEPS_S = np.diag([0.02, 0.02, 0.03, 0.02])
 
 
 def find_clocks(misfit: Callable[[Clocks], float]) -> Clocks:
-    """Find the clocks with the smallest misfit, by a grid and a simplex search (Nelder and Mead 1965).
+    """Find the lags and delays (clocks) with the smallest misfit, by a grid and a simplex search.
+
+    The simplex search (Nelder and Mead 1965) starts at the best point of the grid.
 
     misfit: function that returns the misfit between signals and model for given clocks.
 

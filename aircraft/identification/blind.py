@@ -78,8 +78,8 @@ class Band:
     along: (n,) time or distance.
     low, high: (n,) ends of the band.
     flown: (n,) values of the flight; NaN where they are not known.
-    unchanged: half the width of the band if the quantity is predicted to keep its value at the start of each window;
-        NaN if this is not a prediction.
+    unchanged: half the width of the band of a prediction without a model, in which the quantity keeps the value that it
+        has at the start of each window; NaN if there is no such prediction.
     """
 
     name: str
@@ -111,7 +111,7 @@ class Band:
 
     @property
     def is_informative(self) -> bool:
-        """True if the band is narrower than for a quantity that keeps its value at the start of each window."""
+        """True if the band is narrower than the band without a model (`unchanged`), or if that band is unknown."""
         return not self.half_width >= self.unchanged
 
     @property

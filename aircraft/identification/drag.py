@@ -205,8 +205,9 @@ def _fold_nuisances(forces: ForwardForces, unknown: Floats) -> tuple[Floats, Flo
 
 
 class _Measurement:
-    """Low-passed forward acceleration (m/s^2) and battery current (A) of a log, (n,); no current on request.
+    """Low-passed forward acceleration (m/s^2) and battery current (A) of a log, two arrays (n,).
 
+    with_current: False to leave out the current; it is then None.
     block: (n,) time block of each row.
     floor: lower bound on the residual variance; see `aircraft.identification.regression.fit_with_prior`.
     """

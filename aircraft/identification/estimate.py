@@ -267,7 +267,8 @@ def fit_parameters(
     lift: (2,) values of slope and offset of the lift curve to hold fixed; None to estimate them.
     level: error of the level of the autopilot, rad.
     dynamics: True to estimate the moments as well.
-    nominal: refinement whose values are changed to first order; None to refine the moments.
+    nominal: refinement of an earlier estimate, whose values are only adjusted (to first order) to the changed signals
+        and parameters; None to refine the moments.
     """
     values, covariance = prior_means(), np.diag(np.square(prior_sds()))
     fits: dict[Group, Fit] = {}

@@ -56,7 +56,7 @@ class Refinement:
     starts: (n,) rows of the compared predictions.
     filters: filters of the unmodelled moments about roll, pitch and yaw.
     errors: (3, n, h) errors of the predictions, rad/s, by axis, start and time ahead.
-    gains: (m, 3 n h) change of the values with each error.
+    gains: (m, 3 n h) change of the values with each error; the columns follow the flattened array ``errors``.
     """
 
     values: Floats

@@ -66,7 +66,8 @@ _SOURCE_NAMES: dict[Origin, str] = {
 def find_contradictions(values: Iterable[ParameterValue], orders: Iterable[tuple[str, ...]]) -> tuple[str, ...]:
     """Return a text for each pair of values in the wrong order, if the user's file states at least one of them.
 
-    orders: groups of parameter names; within a group no value may be below the value of the name before it.
+    orders: groups of parameter names, each in the order of the values: ("THR_MIN", "TRIM_THROTTLE") says that THR_MIN
+        must not exceed TRIM_THROTTLE.
 
     >>> values = [ParameterValue("THR_MIN", 74.0, "aircraft"), ParameterValue("TRIM_THROTTLE", 60.0, "file")]
     >>> find_contradictions(values, [("THR_MIN", "TRIM_THROTTLE")])
@@ -243,7 +244,7 @@ class Autopilot(ABC):
     def missing_files(cls, aircraft: Aircraft) -> list[str]:
         """Return a sentence for each required file that is missing from an aircraft's folder.
 
-        Raises PlanflyError if a file is invalid.
+        The base class requires no file. Raises PlanflyError if a file is invalid.
         """
         return []
 
@@ -251,7 +252,8 @@ class Autopilot(ABC):
         """Return a copy in which some parameters have other values, by the autopilot's names and in its units.
 
         origin: source of the values.
-        Raises ValueError for an autopilot without parameters.
+
+        Raises ValueError for an autopilot without parameters, such as the base class.
         """
         raise ValueError(f"{self.title} has no parameters")
 
@@ -272,7 +274,10 @@ class Autopilot(ABC):
         return ""
 
     def describe(self, aircraft: str) -> str:
-        """Return the autopilot's name with its most important settings, for a report on a flight of an aircraft."""
+        """Describe the autopilot in a report on a flight: its title, in most subclasses with important settings.
+
+        aircraft: name of the aircraft that flew.
+        """
         return self.title
 
     # Parts; by default the autopilot has no special behaviour in the part.
@@ -331,7 +336,7 @@ def describe_program(program: AutopilotProgram, aircraft: str, max_named: int = 
     max_named: maximum number of changed parameters that the description names; the number of others is appended.
     """
     changed_texts = [f"{name} {value:g}" for name, value in program.changed.items()]
-    remainder = f", +{len(changed_texts) - max_named} more" if len(changed_texts) > max_named else ""
+    remainder = f" and {len(changed_texts) - max_named} more" if len(changed_texts) > max_named else ""
     parameters_text = count_text(len(program.parameters), "parameter")
     return (
         f"{program.version} (sha256 {program.sha256[:8]}...), {parameters_text} set for"

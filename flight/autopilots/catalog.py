@@ -21,10 +21,10 @@ if TYPE_CHECKING:
 
 
 class Entry(NamedTuple):
-    """A simulated autopilot.
+    """Name, class and releases of a simulated autopilot.
 
     name: name in a scenario.
-    autopilot: module, below `flight.autopilots`, and class.
+    autopilot: module, below `flight.autopilots`, and class, such as "px4.autopilot.Px4".
     releases: releases that fly differently, as the `[flight]` table names them.
     """
 
@@ -77,7 +77,11 @@ def _load_class(path: str) -> "type[Autopilot]":
 def load_autopilot(scenario: "Scenario", aircraft: "Aircraft") -> "Autopilot":
     """Return the autopilot that a scenario names, with its settings and the RTL settings of the scenario.
 
-    Raises ScenarioError if the name is not listed, and as `Autopilot.load` does.
+    If the scenario has a landing, parameters that the landing needs get assumed values, unless the user's file states
+    them.
+
+    Raises ScenarioError if the name is not listed, or if the scenario and the parameter file state different values of
+    an RTL parameter; also raises the errors of `Autopilot.load`.
 
     >>> from aircraft.catalog import load_aircraft
     >>> from world.scenario import load_scenario

@@ -72,7 +72,8 @@ def parse_parameters(text: str, source: str) -> dict[str, Entry]:
 
     Raises ParameterError with file, line, field, value and allowed values. The reason is a line of unknown format, a
     value that is not a finite number, a name that occurs twice, or a file without parameters. If several components of
-    a vehicle have the same name, the autopilot's value is taken. A name that is too long is read like any unknown name.
+    a vehicle have a parameter of the same name, the autopilot's value is taken. A name that is too long is read like
+    any unknown name.
 
     >>> found = parse_parameters("# Vehicle 1\n1\t1\tWP_RADIUS\t90.0\t9\n", "qgc.params")
     >>> found["WP_RADIUS"].value, str(found["WP_RADIUS"].where)

@@ -140,6 +140,9 @@ class ParameterOrigin(NamedTuple):
 def parameter_origin(text: str, entries: Mapping[str, Entry]) -> ParameterOrigin:
     r"""Return the autopilot and the vehicle for which a parameter file was written.
 
+    Each parameter name is a vote for the autopilot that has such a parameter, and a header counts as `_HEADER_WEIGHT`
+    votes. Without a majority of `_CLEAR_MAJORITY` to 1 the result is mixed.
+
     text: text of the file.
     entries: parameters of the file.
 
@@ -178,7 +181,7 @@ def parameter_origin(text: str, entries: Mapping[str, Entry]) -> ParameterOrigin
 
 
 def _select_names(names: Iterable[str], matches: Callable[[str], object]) -> list[str]:
-    """Return the names that match."""
+    """Return those of ``names`` for which ``matches`` returns True, or a match of a pattern."""
     return [name for name in names if matches(name)]
 
 
@@ -220,7 +223,8 @@ def _vehicle_by_majority(
 def _px4_vehicle(text: str, entries: Mapping[str, Entry]) -> str:
     """Return the vehicle of a PX4 file, from its type parameters, header or names; "" for an aeroplane.
 
-    A header that states another vehicle has priority, because QGroundControl writes the vehicle that PX4 reports.
+    The first of these that shows another vehicle decides. A header comes before the names, because QGroundControl
+    writes the vehicle that PX4 reports.
     """
     for name, kinds in _PX4_TYPES.items():
         if name in entries and (kind := kinds.get(round(entries[name].value))):

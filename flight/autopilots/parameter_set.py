@@ -57,7 +57,7 @@ class ParameterTable:
     definitions: definitions by the field of the control law's record, in the order of the values.
     when_stated: definitions of parameters that have no part in the control law, by name; a set holds them only if a
         file states them.
-    pairs: a minimum and a maximum; the minimum must be lower.
+    pairs: names of a minimum and of its maximum, such as ("THR_MIN", "THR_MAX"); the minimum must be lower.
     orders: names of parameters whose values should not decrease from one parameter to the next.
     log_digits: significant digits of the values in a log.
     """
@@ -111,6 +111,9 @@ class ParameterTable:
 
     def read_log(self, logged: Mapping[str, float]) -> tuple[dict[str, float], list[str]]:
         """Return the accepted values of a log by present name, and a sentence for each rejected value.
+
+        A minimum that is not below its maximum is rejected together with the maximum. A log without any accepted value
+        also gets a sentence.
 
         logged: values by present or older name.
         """
@@ -238,9 +241,9 @@ class ParameterSet:
 
     @classmethod
     def _is_relevant(cls, definition: Definition, value: float) -> bool:
-        """Return True if a value of a file says more than the default value does.
+        """Return True if a value that a file states is used; in this base class every value is.
 
-        A subclass may return False for a value that equals the default.
+        A subclass may return False for a value that equals the default, which is then treated as not stated.
         """
         return True
 
@@ -255,6 +258,11 @@ class ParameterSet:
     @classmethod
     def _build(cls, sources: list[Stated], source: str, unused: tuple[str, ...], *fields: Any) -> Self:
         """Return a parameter set; each value is from the first source that states it, or is the default.
+
+        sources: sources in order of priority, each with its values by name.
+        source: the user's file, "" if there is no file.
+        unused: names in the file that the table does not contain.
+        fields: additional fields of the subclass, such as PX4's version.
 
         Raises ParameterError if a minimum is not below its maximum.
         """
@@ -306,7 +314,8 @@ class ParameterSet:
         """Return a copy in which some parameters have other values, by the autopilot's names and in its units.
 
         origin: source of the new values.
-        Raises ValueError if the table has no parameter of a name.
+
+        Raises ValueError for a name that the table does not contain.
         """
         if unknown := sorted(set(values) - self.table.by_name.keys()):
             raise ValueError(f"{unknown[0]}: not a parameter of the simulated autopilot")

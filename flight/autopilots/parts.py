@@ -240,8 +240,8 @@ FailsafeAction = Literal[
 class LinkLossReaction(NamedTuple):
     """One reaction of an autopilot to the loss of a radio link in a mission.
 
-    action: what the autopilot does instead of its mission, or "on".
-    delay: time for which the link has then been lost, s; inf for "on".
+    action: what the autopilot does instead of its mission; "on" if it continues the mission.
+    delay: time from the loss of the link to the reaction, s; inf for "on".
     parameter, value: the parameter that decides the reaction, and its value.
     """
 
@@ -311,10 +311,10 @@ class FlyReturns(Protocol):
 class ReturnTrials(NamedTuple):
     """Changes of parameters that may make an autopilot's RTLs safe, in the order in which they are tried.
 
-    altitudes: groups of parameters that are set to the same height, m, with their present values, which they keep if
-        these are greater; the heights that are tried begin at the first one's present value.
-    others: values by name, tried without and with such a height.
-    text: names of all of them, in messages.
+    altitudes: groups of parameters of the RTL's height, with their present values, m.  A trial sets all parameters of a
+        group to the same height, but lowers none.  The tried heights begin at the present value of the first parameter.
+    others: other changes, as values by name; each is tried alone and together with a greater height.
+    text: names of all these parameters, in messages.
     """
 
     altitudes: tuple[Mapping[str, float], ...] = ()
@@ -333,7 +333,7 @@ class ReturnBehaviour:
     make_parameters: returns the autopilot's parameters, by name and in its units, for a scenario's settings of the RTL.
     after_link_loss: returns the reactions to the loss of a radio link, in order of time.  If the mission continues, it
         is the reaction "on" alone, or () for an autopilot without parameters.
-    fly: simulates RTLs; None for an autopilot without an RTL, for which ArduPlane returns.
+    fly: simulates RTLs; None for an autopilot without an RTL, whose returns are simulated as those of ArduPlane.
     flies_without_engine: True if ``fly`` also simulates RTLs after an engine failure.
     causes: returns the events that can end a mission, with the autopilot's reaction to each.
     unsimulated_text: returns the reason why no RTL of a mission is simulated; "" if RTLs are simulated.
@@ -453,10 +453,11 @@ class ReturnTimeFailsafe(NamedTuple):
     """A failsafe that starts an RTL once the battery is estimated to last hardly longer than the RTL.
 
     parameter: name and value of the parameter that enables it.
-    remedy: text on the value with which it does not act.
+    remedy: text on the parameter value that switches the failsafe off.
     capacity: capacity of the battery, mAh.
-    initial_current: current with which the autopilot's average of the current in level flight begins, A.
-    time_factor, time_margin: the failsafe acts at the time of the return times this factor, plus this margin, s.
+    initial_current: first value of the autopilot's running average of the current in level flight, A.
+    time_factor, time_margin: the failsafe acts when the battery lasts no longer than the estimated time of the return,
+        multiplied by the factor, plus the margin (s).
     airspeed, climb_rate, sink_rate: speeds of the return, m/s.
     altitude: transit altitude of the return above its destination, m.
     delay: time that the return waits before it lands, s.

@@ -1,7 +1,8 @@
 """Model an aircraft as a point mass for compiled code, with drag, thrust and power from its trims.
 
 Bank and pitch are inputs; the path angle is the pitch minus the angle of attack, which grows with the load factor.
-Specific excess power is interpolated from trims by throttle, airspeed and altitude, less the induced drag of the bank.
+Specific excess power is the climb rate at constant airspeed.  It is interpolated from trims (states of steady flight)
+by throttle, airspeed and altitude, and reduced by the additional induced drag of a bank.
 """
 
 import functools
@@ -306,8 +307,9 @@ def _electric_power(
     """Return the electric power (W) for a specific excess power (m/s).
 
     The power is a parabola through the points at idle, in level flight and at full throttle, as in `Envelope.power`. It
-    is constant below the excess power at idle, and above the excess power at full throttle. It is 0 for an aircraft
-    without known power.
+    is constant below the excess power at idle, and above the excess power at full throttle. If the aircraft cannot
+    climb at full throttle, or does not sink at idle, it is the power at full throttle. It is 0 for an aircraft without
+    known power.
 
     thrust_power: specific excess power in straight flight, m/s.
     excess_table: specific excess power, m/s, `PointMass.excess`.

@@ -3,7 +3,7 @@
 The simulated autopilots follow an attitude with the lag of a tuned aircraft.  An attitude error e demands the rate
 e / T, with T the attitude's time constant.  The controller's output is F r + P (r - p) + I times the integral of r - p,
 for a demanded rate r and a rate p, and an output u gives the rate u / N in the end.  N is therefore the feed-forward of
-a tuned aircraft.  The fraction (F + P) / (N + P) of a demanded rate follows at once, and what is missing falls with the
+a tuned aircraft.  The fraction (F + P) / (N + P) of a demanded rate is reached at once; the rest is reached with the
 time constant (N + P) / I.
 """
 

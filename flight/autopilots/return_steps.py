@@ -54,10 +54,12 @@ def simulate_each(
 
 @inner
 def initialise_outcome(start: Record, estimated: Record, has_terrain: bool, result: Record) -> None:  # pragma: no cover
-    """Set the motion ``estimated`` to the start of an RTL, and ``result`` to the outcome before the first tick.
+    """Move ``estimated`` to the start of an RTL, and reset ``result``: no clearance, arrival or energy yet.
 
-    estimated: position and velocity over the ground, a `MOTION` record.
-    result: `RETURN_RESULT` record, which is updated.
+    start: position and velocity of the start, a `RETURN_START` record.
+    estimated: position and velocity over the ground, a `MOTION` record to fill.
+    has_terrain: True if the terrain is known; otherwise the clearances stay NaN.
+    result: `RETURN_RESULT` record to fill.
     """
     estimated.east, estimated.north, estimated.up = start.east, start.north, start.up
     estimated.velocity_east, estimated.velocity_north = start.velocity_east, start.velocity_north
@@ -125,9 +127,10 @@ def store_position(estimated: Record, positions: Floats, result: Record) -> None
 def advance_loiter(estimated: Record, target: Record, loiter: Record, arrival_radius: float, dt: float) -> bool:
     """Update the progress around the last loiter of an RTL; return True once the loiter is complete.
 
-    It is complete after one lap and `flight.mission.itinerary.ENDLESS_LOITER_TIME_S`.
+    The loiter begins once the aircraft is near the center and near the target altitude. It is complete after one lap
+    and `flight.mission.itinerary.ENDLESS_LOITER_TIME_S`.
 
-    target: waypoint of the loiter.
+    target: waypoint of the loiter, a `WAYPOINT` record.
     loiter: progress around the loiter, a record of `LOITER_PROGRESS`.
     arrival_radius: distance from the center, m, within which the aircraft has arrived at the loiter.
     dt: s since the last call.
@@ -159,8 +162,9 @@ def update_clearances(
 ) -> None:
     """Update the duration, the minimum height above ground and the minimum distance from kill spheres.
 
-    Distances are measured from the surface of a sphere. The RTL ends where there are no elevation data, or once the
-    aircraft is `MAX_IMPACT_DEPTH_M` below the ground.
+    The minima before the arrival are stored separately, and so are time and place of the minimum height. Distances are
+    measured from the surface of a sphere. The RTL ends where there are no elevation data, or once the aircraft is
+    `MAX_IMPACT_DEPTH_M` below the ground.
 
     time: time since the start, s.
     heights, to_pixel: ground heights, m, and the map from east and north to column and row.

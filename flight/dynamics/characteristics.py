@@ -86,9 +86,11 @@ class StepResponse:
 
 
 def trim_table(aircraft: Aircraft, count: int = 7) -> tuple[TrimRow, ...]:
-    """Return level flights at evenly spaced airspeeds in the range of the guidance.
+    """Return level flights at evenly spaced airspeeds, from the aircraft's minimum to its maximum airspeed.
 
-    An airspeed at which no trim exists is left out.
+    An airspeed at which the aircraft cannot hold level flight is left out.
+
+    count: number of airspeeds.
 
     >>> from aircraft.catalog import load_aircraft
     >>> slow, fast = trim_table(load_aircraft("aerosonde"), 2)
@@ -190,7 +192,11 @@ def step_responses(aircraft: Aircraft) -> tuple[StepResponse, ...]:
 def _step_response(
     aircraft: Aircraft, control: str, size: float, hold_time: float, duration: float, quantities: tuple[str, ...]
 ) -> StepResponse:
-    """Simulate the response to a control that moves by ``size`` for ``hold_time`` s, over ``duration`` s."""
+    """Simulate the response to a control that moves by ``size`` for ``hold_time`` s, over ``duration`` s.
+
+    size: rad, or fraction of full throttle.
+    quantities: fields of `flight.dynamics.state.STATE` whose changes are returned.
+    """
     fdm = Fdm(aircraft, rate_hz=_RATE_HZ)
     commands = fdm.start(*_POSITION_DEG, TRIM_AMSL, 0.0, aircraft.airspeed, terrain_amsl=-1000.0).commands()
     moved_commands = commands._replace(**{control: getattr(commands, control) + size})

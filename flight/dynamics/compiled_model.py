@@ -73,7 +73,7 @@ _NUMBER_PROPERTIES = {
 class CompiledModel:
     """Compiled model of an aircraft in flight, which continues a flight that JSBSim has started.
 
-    numbers: registers.
+    numbers: registers: the values of all quantities; a register is named by its index in this array.
     frames: (1,) of `flight.dynamics.compiled_frame.FRAME`, the first registers.
     code: sections as `flight.dynamics.compiled_frame` describes them.
     contacts, frictions: records of `flight.dynamics.ground_contact`.

@@ -43,8 +43,11 @@ def load_envelope(aircraft: Aircraft, *, motor_braking: bool = False) -> Envelop
     """Return the aircraft's envelope from the cache; if it is not there, compute it and store it in the cache.
 
     The cached and the computed envelope are identical. A cache file is replaced if it is unreadable or damaged, or if
-    it is for another model, JSBSim or schema. It is not replaced if its folder is not writable. Raises FlightError for
-    a model that JSBSim cannot load.
+    it is for another model, JSBSim or schema. It is not replaced if its folder is not writable. The uncertainty in the
+    aircraft's folder is added. For a model made from a data sheet, the lowest airspeeds are raised so that sea level
+    has the stated stall speed.
+
+    Raises FlightError for a model that JSBSim cannot load.
 
     >>> from aircraft.catalog import load_aircraft
     >>> climb, descent = load_envelope(load_aircraft("aerosonde")).air_angles(25.0, 500.0)

@@ -290,6 +290,9 @@ def friction_accelerations(
 ) -> tuple[Vector, Vector]:
     """Return the linear (ft/s^2) and angular (rad/s^2) accelerations that friction causes, in body axes.
 
+    The friction forces are those that stop all contacts along the ground within one time step, as far as their limits
+    allow. They follow from a linear system with one equation for each friction record.
+
     contacts: `CONTACT` records, in which the friction forces are stored.
     frictions: `FRICTION` records; their rows of the system of equations are filled.
     count: number of friction records.

@@ -95,7 +95,10 @@ class _Reader:
             self._refuse_model("a document type declaration may expand without limit")
 
     def _start_element(self, name: str, attributes: dict[str, str]) -> None:
-        """Record the files and properties that an element names; refuse a forbidden element."""
+        """Record the files and properties that an element names; refuse a forbidden element.
+
+        An input or output channel is forbidden, or is noted for removal in a model that JSBSim ships.
+        """
         depth = len(self._path)
         self._path.append(name)
         self._text = []
@@ -198,7 +201,6 @@ def shipped_model(aircraft: Aircraft) -> dict[str, bytes]:
 def _read_model(file: Path, *, main: bool, remove_channels: bool) -> _Reader:
     """Return the reader of a file after it has read the file; an unchanged file is read only once.
 
-    main: True for the model's main file.
     main: True for the model itself, False for a file that it includes.
     remove_channels: True to note input and output channels for removal instead of refusing them.
     """

@@ -68,6 +68,9 @@ def steer_elevator(
 
     The command is a feed-forward of the angle of attack, plus damping of the pitch rate.
 
+    state: attitude, airspeed and rates of the aircraft, a `STATE` record.
+    gains, memory: a `GAINS` record, and a `GUIDANCE_MEMORY` record with the trimmed elevator and angle of attack.
+    commands: `COMMANDS` record, whose elevator is set.
     climb_rate: m/s.
     acceleration: demanded acceleration, m/s^2, positive upwards.
     """

@@ -83,11 +83,12 @@ def l1_length(speed: float, period: float, damping: float) -> float:
 def l1_angles(
     motion: Record, a_east: float, a_north: float, b_east: float, b_north: float, l1_distance: float
 ) -> tuple[float, float]:
-    """Return the angles -Nu2 and -Nu1 of AP_L1_Control, rad.
+    """Return the angle of the ground velocity to the leg, and the angle between the leg and the L1 point, rad.
 
-    -Nu2 is the angle from the leg, or from the direction to a waypoint, to the ground velocity. -Nu1 is the angle
-    between the leg and the direction to the L1 point, without the integrator. -Nu1 is NaN while L1 aims straight at a
-    waypoint, which is the case far before the leg's start and past the leg's end.
+    The L1 point is the point of the leg at the L1 distance from the aircraft, at which L1 aims. Far before the leg's
+    start and past the leg's end, L1 aims straight at the waypoint there: the first angle is then measured from the
+    direction to this waypoint, and the second angle is NaN. The angles are -Nu2 and -Nu1 (without its integrator) of
+    AP_L1_Control.
 
     motion: a record of `flight.guidance.navigation_error.MOTION`.
     a_east, a_north: start of the leg, m.

@@ -90,6 +90,8 @@ def gains_at_airspeed(airspeed: float) -> dict[str, float]:
 def airframe_gains(aircraft: Aircraft, fdm: Fdm | None = None) -> dict[str, float]:
     """Compute the gains that follow from the airframe's linear model in level cruise.
 
+    fdm: the aircraft in JSBSim; None to load it.
+
     Raises FlightError if the aircraft cannot hold level flight at cruise.
     """
     fdm = Fdm(aircraft) if fdm is None else fdm
@@ -141,9 +143,9 @@ def idle_throttle(aircraft: Aircraft, fdm: Fdm, level: Trim) -> float:
 
 
 def gains_from_model(aircraft: Aircraft, fdm: Fdm | None = None) -> Gains:
-    """Compute the autopilot gains for an aircraft from its linearised flight model.
+    """Compute the gains of planfly's guidance for an aircraft from its linearised flight model.
 
-    fdm: simulation of the aircraft with the engine off; None creates one.
+    fdm: the aircraft in JSBSim; None to load it.
 
     Raises FlightError as `airframe_gains` does.
     """

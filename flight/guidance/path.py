@@ -303,7 +303,10 @@ def reversals(route: Route) -> NDArray[np.int64]:
 
 
 def _turn_angles(route: Route, fly_over_turn: FlyOverTurn) -> Floats:
-    """Return the turn at each inner waypoint, rad, positive to the right, (w - 2,); see `fly_by_path`."""
+    """Return the turn at each waypoint but the first and last, rad, positive to the right, (w - 2,).
+
+    fly_over_turn: with "long" a reversal turns to the other side, by more than 180 degrees; see `fly_by_path`.
+    """
     turns = signed_turns(route.positions)
     if fly_over_turn == "long":
         corners = reversals(route) - 1
@@ -421,6 +424,9 @@ def _fly_over_arcs(
 
 def _altitude_profile(corners: list[tuple[float, float]], limits: Limits, route: Route) -> Records:
     """Return an altitude profile as records of `NODE`: its corners, blended by parabolas.
+
+    A parabola between two slopes takes the length that the fastest flight needs for the change of slope, but at most
+    half of the distance to the next corner.
 
     corners: (distance along the path, altitude) pairs, m.
     """

@@ -151,7 +151,7 @@ class ArmingState:
     def continue_from_current_item(self) -> None:
         """Request that the flight continue from the mission item that a station has just made the current one.
 
-        A loiter center without values stands for this request.
+        The request is a diversion, which `loiter_center` signals; in AUTO its values are not used.
         """
         self.loiter_center = LoiterCenter()
 

@@ -58,7 +58,7 @@ SHUT_DOWN = "stopped: the vehicle was shut down"
 # Beginning of the end reason of a route that a diversion left; the name of the new mode follows.
 DIVERTED_TEXT = "left at a ground station's request for "
 # End reason of a log that ends while the loiter continues.
-STILL_LOITERING_TEXT = "log ends here; the aircraft keeps circling"
+STILL_LOITERING_TEXT = "the log ends here; the aircraft continues to loiter"
 # Maximum number of logs of one loiter.
 _MAX_LOITER_LOGS = 16
 
@@ -344,7 +344,7 @@ def _run_flight(
         # A broken pipe ends the process; a full disk ends only the flight.
         if isinstance(error, BrokenPipeError | ConnectionResetError):
             raise
-        send_event(connection, FlightEnded(f"log: {error.strerror}"))
+        send_event(connection, FlightEnded(f"ended: its log cannot be written: {error.strerror}"))
         text = f"flight ended: its log cannot be written: {error.strerror}"
         events = [FlightJudged(False, (StatusText(text, CRITICAL),))]
         should_continue = True
@@ -373,7 +373,8 @@ class _LoggedFlight:
         """Fly in real time until the flight ends, and serve the requests that arrive.
 
         Returns the end reason, and False if the process must end afterwards. If the flight falls behind the clock by
-        more than `_MAX_DELAY_S`, the excess is not made up.
+        more than `_MAX_DELAY_S`, the excess is not made up. A completed loiter of a diversion is flown again, with
+        another log, up to `_MAX_LOITER_LOGS` times.
         """
         clock, speed = time.monotonic, self._factory.speed
         time_origin = start_time = clock()
@@ -442,6 +443,8 @@ class _LoggedFlight:
 
     def _start_route(self, request: DivertFlight, end_reason: str) -> bool:
         """Start another route at the aircraft's position, with its own log; return False if no such route exists.
+
+        In that case the flight stays on its route, and an event reports the reason.
 
         end_reason: reason for the end of the current route, for its log.
         """

@@ -48,6 +48,8 @@ class MavlinkFrame:
     """One frame with a valid checksum.
 
     raw: bytes of the whole frame.
+    number: MAVLink number of the message.
+    system, component: MAVLink ids of the sender.
     signed: True if a signature is attached, valid or not.
     """
 
@@ -338,7 +340,13 @@ class DropCounts:
 
 @dataclass(frozen=True, slots=True)
 class Access:
-    """Access to the vehicle: open on this machine; from other machines a key or addresses are required."""
+    """Access to the vehicle: open on this machine; from other machines a key or addresses are required.
+
+    bind: address at which the vehicle listens.
+    to: addresses to which the vehicle sends heartbeats before a station has been heard.
+    allowed: IP addresses from which messages are accepted; empty for all.
+    key: key of 32 bytes with which messages are signed; None without signing.
+    """
 
     bind: Address
     to: tuple[Address, ...]

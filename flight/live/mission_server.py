@@ -322,7 +322,7 @@ class _FinishedUpload:
 
 @dataclass(slots=True)
 class MissionServer:
-    """Three lists of items and their transfers.
+    """Server of the vehicle's three lists of items (mission, fence, rally points), which stations upload and download.
 
     lists: the vehicle's items, seq from 0 on; item 0 of a mission may be home.
     changed: lists that an upload replaced since the caller last cleared this set.

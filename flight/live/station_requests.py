@@ -118,7 +118,7 @@ class Parameters:
         if number is None:
             return None, f"{_decode_name(name)}: no such parameter"
         entry = self.entries[number]
-        unchanged_text = f"{entry.value:g} kept"
+        unchanged_text = f"the value stays {entry.value:g}"
         if entry.is_simulated:
             if in_flight:
                 return (
@@ -136,15 +136,15 @@ class Parameters:
     def _set_autopilot_parameter(self, entry: Parameter, value: float) -> str:
         """Set a parameter of the simulated autopilot, and return the reason for a refusal, or ""."""
         if not math.isfinite(value):
-            return f"{entry.name} {value:g}: expected a finite number; {entry.value:g} kept"
+            return f"{entry.name} {value:g}: expected a finite number; the value stays {entry.value:g}"
         # MAVLink carries 0.7 as 0.699999988. The number that was typed is the shortest one with the same float32.
         stated_values = self.stated | {entry.name: float(str(np.float32(value)))}
         try:
             values = self.autopilot_values(stated_values)
         except PlanflyError as error:
-            return f"{error}; {entry.value:g} kept"
+            return f"{error}; the value stays {entry.value:g}"
         if values[entry.name] != stated_values[entry.name]:
-            return f"{entry.name} {_FIXED_REASON}: {entry.value:g} kept"
+            return f"{entry.name} {_FIXED_REASON}: the value stays {entry.value:g}"
         self.stated = stated_values
         for name, autopilot_value in values.items():
             self.set_value(name, autopilot_value)
@@ -179,11 +179,11 @@ def vehicle_parameters(
     >>> parameters["AIRSPEED_CRUISE"]
     25.0
     >>> parameters.set(b"AIRSPEED_MAX", 99.0)
-    (1, 'AIRSPEED_MAX is fixed by the aircraft or the scenario: 31 kept')
+    (1, 'AIRSPEED_MAX is fixed by the aircraft or the scenario: the value stays 31')
     >>> parameters.set(b"WP_RADIUS", 70.0), parameters["WP_RADIUS"]
     ((13, ''), 70.0)
     >>> parameters.set(b"TRIM_PITCH_CD", 3.0)[1]
-    'TRIM_PITCH_CD is read, but has no effect on a flight: 2 kept'
+    'TRIM_PITCH_CD is read, but has no effect on a flight: the value stays 2'
     """
     vehicle_entries = [
         Parameter("AIRSPEED_CRUISE", airspeed),
@@ -253,6 +253,9 @@ class _WaitingArmCommand:
 class Requests:
     """Handler of requests, which answers with messages for the requesting station and texts for all stations.
 
+    arming: state that commands about arming and modes change.
+    parameters: parameters that stations read and set.
+    status: state of the vehicle, for the telemetry that stations request.
     set_start_item: function that sets the item at which the next flight starts, by the station's number.
     """
 
@@ -365,7 +368,7 @@ class Requests:
     def _run_message_command(
         self, number: int, message: Any, peer: Peer, now: float
     ) -> tuple[CommandResult, list[Any]]:
-        """Run a command about messages and their rates; return its result and the messages to send."""
+        """Send a message once, or set or get its interval, as a command asks; return the result and the messages."""
         implied_number = _MESSAGE_COMMANDS[number]
         requested_number = _to_integer(message.param1) if implied_number is None else implied_number
         message_class = mavlink.mavlink_map.get(requested_number)
@@ -446,7 +449,7 @@ _MODE_COMMANDS = {mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: RTL, mavlink.MAV_CMD_NAV
 _UNSUPPORTED_COMMAND_TEXTS: dict[int, str] = {
     mavlink.MAV_CMD_DO_CHANGE_SPEED: "speed change refused: put DO_CHANGE_SPEED into the mission",
     _DO_ORBIT: "orbit refused: put a loiter into the mission",
-    mavlink.MAV_CMD_DO_CHANGE_ALTITUDE: "altitude change refused: a go-to has an altitude",
+    mavlink.MAV_CMD_DO_CHANGE_ALTITUDE: "altitude change refused: send a go-to with the altitude",
     mavlink.MAV_CMD_NAV_TAKEOFF: "take-off refused: put NAV_TAKEOFF into the mission and start it",
     mavlink.MAV_CMD_NAV_LAND: "landing refused: put NAV_LAND into the mission and start it",
     mavlink.MAV_CMD_DO_SET_HOME: "home refused: home is item 0 of the mission",

@@ -486,7 +486,11 @@ class Vehicle:
             self._restart_process()
 
     def _restart_process(self) -> None:
-        """Start another flight process after a crash, because an abort of JSBSim must not end the vehicle."""
+        """Start another flight process after a crash, because an abort of JSBSim must not end the vehicle.
+
+        A flight in progress is lost, and stations must upload the mission again. Raises ChildProcessError after
+        `_MAX_CRASHES` crashes in a row.
+        """
         self._flight.close()
         self._crash_count += 1
         if self._crash_count >= _MAX_CRASHES:

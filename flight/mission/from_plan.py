@@ -156,9 +156,10 @@ def acceptance_radii(
 
     The radius is the distance at which a fly-by turn passes its waypoint, R(1/cos(turn/2) - 1), plus
     `ACCEPTANCE_TOLERANCE_M`, rounded up. R is the turn radius at this airspeed and bank with the scenario's wind from
-    behind. With this acceptance radius no arc of the flight misses its waypoint. If the tracking error of the autopilot
-    is known, the radius is the one with the smallest error, because ArduPlane turns to the next leg at that distance
-    before a waypoint.
+    behind. If the wider arc in a gust passes the waypoint at a greater distance, the radius is that distance. With this
+    acceptance radius no arc of the flight misses its waypoint. If the tracking error of the autopilot is known, the
+    radius is the one with the smallest error, because ArduPlane turns to the next leg at that distance before a
+    waypoint.
     """
     if tracking is not None:
         return _acceptance_radii_for_tracking(scenario, points, airspeed, tracking)

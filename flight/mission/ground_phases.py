@@ -232,7 +232,8 @@ def airborne_route(route: Route, ground_phases: GroundPhases, first_leg_start: F
 
     first_leg_start: point at which the take-off ends and the first leg starts, (3,) m; None to keep the first waypoint.
 
-    The leg to the landing point is omitted; the numbers of legs and waypoints do not change.
+    The waypoints before the end of the take-off are moved to the start of the first leg, 1 m apart. The leg to the
+    landing point is omitted. The numbers of the other legs and waypoints do not change.
     """
     points = np.array(route.positions)
     if ground_phases.take_off is not None and first_leg_start is not None:

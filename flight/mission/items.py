@@ -408,7 +408,7 @@ def _count_problem(item: MissionItem) -> ItemProblem | None:
             target = "an item's number" if item.command == Command.DO_JUMP else "the number of a tag"
             return ItemProblem("p1", p1, f"a jump's target is {target}")
         if not (p2 >= -1 and p2 == int(p2)):
-            return ItemProblem("p2", p2, "a jump's count is a whole number, or -1 for without end")
+            return ItemProblem("p2", p2, "a jump's count is a whole number, or -1 to repeat indefinitely")
     if item.command in (Command.NAV_LOITER_TURNS, Command.NAV_LOITER_TIME) and p1 < 0:
         return ItemProblem("p1", p1, "turns and seconds to loiter cannot be negative")
     if item.command == Command.DO_SET_CAM_TRIGG_DIST and 0.0 < p1 < MIN_PHOTO_DISTANCE_M:

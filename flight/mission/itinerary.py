@@ -402,7 +402,8 @@ class _Steps:
     passes_exhausted_jump: True if a jump is passed again after its last repeat.
     reached: numbers of the items reached, including jumps.
     endless: seq of the jump without end at which the iteration ended, or None; such a jump is taken once.
-    jump_chains: seq of the first jump that is the n-th in a row, by n, for the n at which an autopilot gives up.
+    jump_chains: lengths of jump chains at which an autopilot ends the mission, each with the seq of the first jump that
+        makes a chain so long: {10: 7} if item 7 is the first jump that is the tenth in a row.
     long_command_chain: seq of the command at which ArduPlane ends the mission, -1 for none.
     """
 
@@ -636,9 +637,10 @@ class _ItineraryBuilder:
             self._note_unsimulated_command(item, as_px4=True)
 
     def _note_unsimulated_command(self, item: MissionItem, *, as_px4: bool) -> None:
-        """Record a command that is not simulated: as an unresolved point, or only as a note.
+        """Record a command that is not simulated: as an open item if it may change the path, or only as a note.
 
-        A command that may change the path leaves the judgement of the mission unresolved (see `add_open_item`).
+        An open item leaves the verdict on the mission unresolved (see `add_open_item`). Markers and camera switches get
+        neither.
 
         as_px4: True for PX4's treatment of the command, False for ArduPlane's.
         """
@@ -713,8 +715,9 @@ class _ItineraryBuilder:
     def _add_take_off(self, item: MissionItem) -> None:
         """Add the stop of a take-off.
 
-        A take-off at the start adds a stop above home, and a stop at its own position if that differs from home. A
-        take-off in the air is flown as a waypoint. Raises MissionError for a take-off at the start without an altitude.
+        A take-off at the start adds a stop above home, and a stop at its own position if that differs from home. After
+        other stops, a take-off with a position is flown as a waypoint, and a vertical one or one without a position is
+        not flown. Raises MissionError for a take-off at the start without an altitude.
         """
         name = command_name(item.command)
         is_vertical = item.command == Command.NAV_VTOL_TAKEOFF

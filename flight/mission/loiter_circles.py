@@ -98,11 +98,11 @@ class LoiterRules:
         """Return a note for an autopilot that loiters about the last waypoint after the mission's end.
 
         >>> LoiterRules(80.0, "NAV_LOITER_RAD", ends_in_circle=True).end_note()
-        'after the last waypoint the aircraft loiters around it without end, with NAV_LOITER_RAD, 80 m: ...'
+        'after the last waypoint the aircraft loiters around it indefinitely, with NAV_LOITER_RAD, 80 m: ...'
         """
-        name = f"{self.radius_name}, " if self.radius_name else ""
-        circle = f"with {name}{abs(self.radius):g} m"
-        return f"after the last waypoint the aircraft loiters around it without end, {circle}: one lap is flown"
+        name = f"{self.radius_name}," if self.radius_name else "a radius of"
+        circle = f"with {name} {abs(self.radius):g} m"
+        return f"after the last waypoint the aircraft loiters around it indefinitely, {circle}: one lap is flown"
 
 
 # Rules of an autopilot without loiter rules.
@@ -269,15 +269,16 @@ def _signed_radius(
         return math.copysign(max(MIN_LOITER_RADIUS_M, abs(rules.radius) * radius_scale), -1.0 if is_left else 1.0)
     if radius == 0.0:
         radius = default_radius(stop.airspeed, up)
-        notes.add(f"loiter without a radius: flown with {radius:.0f} m", stop.item)
+        notes.add(f"loiter without a radius: flown with a radius of {radius:.0f} m", stop.item)
     elif radius < MIN_LOITER_RADIUS_M:
         notes.add(
-            f"loiter radius below {MIN_LOITER_RADIUS_M:.0f} m: simulated with {MIN_LOITER_RADIUS_M:.0f} m", stop.item
+            f"loiter radius below {MIN_LOITER_RADIUS_M:.0f} m: simulated with a radius of {MIN_LOITER_RADIUS_M:.0f} m",
+            stop.item,
         )
         radius = MIN_LOITER_RADIUS_M
     elif round(radius * radius_scale) != round(stated_radius):
         notes.add(
-            f"loiter radius {stated_radius:g} m: flown with {radius * radius_scale:.0f} m,"
+            f"loiter radius {stated_radius:g} m: flown with a radius of {radius * radius_scale:.0f} m,"
             " because the autopilot enlarges it with altitude",
             stop.item,
         )
@@ -356,8 +357,10 @@ def _corners_around(
     min_radius: minimum loiter radius of the aircraft, m, which determines the duration of a tighter loiter; 0 if
         unknown.
 
+    The aircraft circles for the turns, the time or the altitude change of the loiter, and then on to the exit course.
     Some autopilots leave a loiter as soon as its time is over. For them the circle ends at the last exit tangent before
-    that time.
+    that time. In a loiter to an altitude the corners climb or descend evenly; otherwise they are level. Raises
+    MissionError for a loiter with more corners than are flown.
     """
     radius, turn_sign = abs(node.arc_radius), math.copysign(1.0, node.arc_radius)
     entry_altitude, required_sweep = node.up, 0.0

@@ -45,8 +45,9 @@ class ReturnCircle(NamedTuple):
 
     east, north, up: center, m, up AMSL.
     radius: m at sea level, negative for a left-hand loiter.
-    slope_base: offset by which the autopilot draws the descent slope below the true target, m; 0 except for ArduPlane's
-        rally points.
+    slope_base: height of the loiter above the end of ArduPlane's descent slope, m. It is not 0 only at a rally point
+        whose height above home ArduPlane reads as an altitude AMSL (see `ReturnRules.slope_to_stated_height`); it is
+        then home's altitude.
     """
 
     east: float
@@ -118,8 +119,8 @@ class ReturnRules:
 
     height: height above home at the end of the RTL, m; NaN to keep the altitude of its start.
     radius: loiter radius at the end, m, negative to the left; 0 for the default radius of the aircraft.
-    initial_climb: altitude gain before a turn with the full bank limit, m, even above the target; inf for the whole
-        altitude difference, 0 for none.
+    initial_climb: altitude gain, m, before which the aircraft does not bank further than ``initial_climb_bank``; inf
+        for a climb to the target's altitude, 0 for none. A finite climb is flown even if it ends above the target.
     initial_climb_bank: bank limit during that climb, rad.
     max_sink_rate: m/s.
     min_slope_height: altitude difference below which a descent is a step instead of a slope, m.
@@ -399,9 +400,9 @@ def rtl_waypoints(
 
     The turn takes the shorter direction. A descent follows the straight slope from the start of the turn to the target,
     but is no steeper than the aircraft can fly. A climb or a small descent begins at once. The aircraft covers the
-    remaining altitude difference in the loiter, which then lasts `flight.mission.itinerary.ENDLESS_LOITER_TIME_S`. A
-    climb before the turn has the same height for every target altitude. An RTL that holds its altitude descends only in
-    the loiter.
+    remaining altitude difference in the loiter, which then lasts `flight.mission.itinerary.ENDLESS_LOITER_TIME_S`. The
+    initial climb of the rules comes before the turn, even if the target is lower. An RTL that holds its altitude
+    descends only in the loiter. An RTL that starts inside its loiter has neither turn nor leg.
     """
     start = previous_points[-1].map_position
     course = (

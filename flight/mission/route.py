@@ -700,7 +700,8 @@ def _insert_gates(placed_mission: PlacedMission, notes: Notes) -> list[RoutePoin
     """Return the placed stops of a mission, with a stop for each gate at which PX4 changes airspeed or camera.
 
     PX4 passes a gate when the aircraft crosses the plane through the gate that is perpendicular to the line from the
-    gate to the next stop. Each gate is placed where this plane cuts the leg.
+    gate to the next stop. Each gate is placed where this plane cuts the leg. A gate that is not between two waypoints,
+    and a gate that switches the camera but lies beside its leg, get a note.
     """
     placed_stops = list(placed_mission.stops[:1])
     for next_stop in placed_mission.stops[1:]:
@@ -718,7 +719,8 @@ def _insert_gates(placed_mission: PlacedMission, notes: Notes) -> list[RoutePoin
             start, end = np.array(previous.map_position), np.array(next_stop.map_position)
             gate_position = to_map(placed_mission.origin, gate.lat_deg, gate.lon_deg)
             if gate.switches_camera and _distance_to_line(start, end, gate_position) > _MAX_GATE_DISTANCE_M:
-                notes.add(f"passed beside it: {GATES_ARE_NO_WAYPOINTS}", gate.item)
+                distance_text = f"passed at more than {_MAX_GATE_DISTANCE_M:g} m"
+                notes.add(f"{distance_text}: {GATES_ARE_NO_WAYPOINTS}", gate.item)
             fraction = _gate_fraction(start, end, gate_position)
             east, north, up = (start + fraction * (end - start)).tolist()
             is_apart = (
@@ -821,8 +823,9 @@ def _spiral_slope_function(limits: Limits | None) -> SpiralSlopes:
     """Return a function that computes the steepest climb and descent of a spiral, as tangents.
 
     In wind, the aircraft's slope limit depends on the course. A spiral passes through all courses, so the lowest limit
-    of eight courses counts, reduced by `SPIRAL_SLOPE_FRACTION`. The slope is `DEFAULT_SPIRAL_SLOPE` if there is no
-    limit, or if the aircraft cannot climb or descend at all.
+    of eight courses counts, or the limit stated for every course if that is lower. The tangent of this limit is
+    multiplied by `SPIRAL_SLOPE_FRACTION`. The slope is `DEFAULT_SPIRAL_SLOPE` if there is no limit, or if the aircraft
+    cannot climb or descend at all.
     """
 
     def slopes(airspeed: float, up: float) -> tuple[float, float]:

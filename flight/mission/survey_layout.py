@@ -219,8 +219,8 @@ def _without_lead_waypoints(
 ) -> list[MissionItem]:
     """Return the items before or after a survey without its lead waypoints, which the new layout replaces.
 
-    items: items between the first or last line of the survey and the transit.
-    end: index of the waypoint at that end of the survey.
+    items: items between the transit and the first line of the survey, or between its last line and the transit.
+    end: index of the waypoint at which the survey starts or ends.
     max_lead_length: distance from that waypoint within which a waypoint is a lead waypoint, m. More distant waypoints
         belong to the transit, and are kept.
     """
@@ -272,6 +272,8 @@ def _items_with_turn_arounds(line: _Line, turn_around: float, lead_in: float, or
 
     turn_around: length of both extensions, m; 0 for none.
     lead_in: length of the extension before the line, m, if it exceeds ``turn_around``.
+
+    Without turn-arounds, gates at the line's points become waypoints.
     """
     point_items = line.point_items
     entry_direction, exit_direction = line.corners[0] - line.corners[1], line.corners[-1] - line.corners[-2]

@@ -469,9 +469,13 @@ class _Runs:
 
 
 def _find_chain(runs: _Runs, start: int) -> list[_Line]:
-    """Return the lines of the survey that starts at a run or a few runs before or after it, in flying order.
+    """Return the lines of the survey that starts near a run, in flying order.
 
-    start: index of the run.
+    start: index of the run. The first line may start before it, if the line bends, or after it, if this run only leads
+        to the survey.
+
+    Of the possible first lines, the one with the most lines after it is chosen, then the one with the longest lines. A
+    last line that is only a turn-around of the next survey is omitted.
     """
     chain = _follow_lines(runs, start)
     if len(chain) > 1:
@@ -555,6 +559,9 @@ def _make_survey(
     runs: _Runs, chain: Sequence[_Line], camera: Floats, turn_arounds: Sequence[tuple[float, float]]
 ) -> Survey | None:
     """Build a survey from successive lines; return None if they have too few different lateral positions.
+
+    `_MIN_LINES` positions are needed, or `_MIN_LINES_WITH_PHOTOS` if photos are taken on every line.
+
 
     camera: distance between photos on each leg, (w,) m.
     turn_arounds: two distances for each survey of the ground station; see `find_surveys`.

@@ -118,9 +118,10 @@ def _describe_battery_faults(
 ) -> Iterator[str]:
     """Describe failsafe thresholds of one battery monitor that prevent arming.
 
-    A threshold prevents arming if a full battery does not meet it, or if it is below the critical threshold. Follows
-    `AP_BattMonitor_Backend::arming_checks`.
+    The low threshold prevents arming if it is below the critical threshold. Any threshold prevents arming if it exceeds
+    the charge or the voltage of a full battery. Follows `AP_BattMonitor_Backend::arming_checks`.
 
+    values: value of every parameter by name; the default where no file states one.
     monitor: prefix of the monitor's parameters, such as "BATT2".
     full_voltage: voltage of the full battery, V.
     has_current: True if the monitor measures the current.

@@ -166,7 +166,10 @@ class ArduPlane(Autopilot):
 
     @classmethod
     def missing_files(cls, aircraft: Aircraft) -> list[str]:
-        """Return an empty list, because ArduPlane has a default for each parameter that the aircraft does not state."""
+        """Return an empty list, because ArduPlane has a default for each parameter that the aircraft does not state.
+
+        Raises ParameterError if the aircraft's own parameter file is invalid.
+        """
         ArduPilotParameters.load(aircraft)
         return []
 
@@ -195,10 +198,9 @@ class ArduPlane(Autopilot):
 
     @cached_property
     def checks(self) -> MissionChecks:
-        """ArduPlane's rules for mission commands, and checks that TERRAIN_ENABLE, MIS_OPTIONS and others decide.
+        """ArduPlane's rules for mission commands, and checks by TERRAIN_ENABLE, MIS_OPTIONS, FENCE_OPTIONS and BATT_*.
 
-        The others are FENCE_OPTIONS and BATT_*. Unsimulated settings are those of the simulated autopilot, not those of
-        a flight with the ArduPlane program.
+        The checks list settings that the simulated ArduPlane ignores; the ArduPlane program itself uses some of them.
 
         >>> default = ArduPilotParameters.defaults()
         >>> [len(ArduPlane(default.changed(MIS_OPTIONS=bits)).checks.parameter_notes) for bits in (0, 1, 8)]
@@ -380,7 +382,8 @@ class ArduPlane(Autopilot):
     def _unjudged_return_texts(self, mission: ReturnMission) -> tuple[str, ...]:
         """Return the parts of a mission's RTLs that are not simulated.
 
-        An RTL follows the mission's return path if RTL_AUTOLAND is 4.  Settings that change every flight change RTLs.
+        These are the mission's return path, which an RTL follows if RTL_AUTOLAND is 4, and the settings that are not
+        simulated in any flight.
         """
         has_path = not mission.commands.isdisjoint((Command.DO_RETURN_PATH_START, Command.DO_LAND_START))
         path_parts = ("return path",) if has_path and int(self.parameters.rtl_autoland) == 4 else ()
@@ -471,7 +474,7 @@ class ArduPlane(Autopilot):
     @property
     def deviations(self) -> Deviations:
         """Deviations from the legs, and the altitude that ArduPlane gains in updrafts while it holds its airspeed."""
-        # The values end where another parameter becomes the limit of the pitch.
+        # Try values only up to the pitch at which another parameter becomes the limit.
         name, *other_names = self._max_pitch_parameters
         higher_limits = (limit for limit in self._pitch_limits.values() if limit > self._max_pitch)
         max_tried = min(MAX_TRIED_PITCH_DEG, *map(math.degrees, higher_limits), math.inf)
@@ -504,7 +507,7 @@ class ArduPlane(Autopilot):
         }
 
     def with_parameters(self, origin: Origin = "file", /, **values: float) -> "ArduPlane":
-        """Return a copy with the given parameters changed; also for an autopilot that runs the ArduPlane program."""
+        """Return the simulated ArduPlane with some parameters changed, even if this autopilot runs the program."""
         return ArduPlane(self.parameters.changed(origin, **values))
 
 
@@ -522,7 +525,7 @@ def _transfer_state(previous_record: Record, record: Record, start: Floats) -> N
 
 @dataclass(frozen=True)
 class ArduPlaneFromGround:
-    """ArduPlane's controllers with take-off, landing, or both.
+    """ArduPlane's controllers for a mission with a take-off, a landing, or both.
 
     ground_phases: take-off and landing that are flown.
     contacts: points where the aircraft touches the ground.
@@ -547,7 +550,10 @@ class ArduPlaneFromGround:
 
     @property
     def motor_start(self) -> float:
-        """Time of the motor start, s after the release; inf if the motor never starts."""
+        """Time of the motor start, s after the release, negative for a start on the rail; inf if it never starts.
+
+        It is -inf if the motor runs before the launch, and without a take-off.
+        """
         take_off = self.ground_phases.take_off
         if take_off is None:
             return -math.inf
@@ -650,7 +656,8 @@ def read_loiter_radius(loiter: Loiter) -> float:
 
     ArduPlane reads the radius of three kinds of loiter: by turns, to an altitude, and unlimited. In a loiter by time
     it flies WP_LOITER_RAD, even if the time is zero. It then reads only the direction from the item, because
-    `Plane::verify_loiter_time` does not pass the item's radius to `Plane::update_loiter`.
+    `Plane::verify_loiter_time` does not pass the item's radius to `Plane::update_loiter`. An infinite or undefined
+    radius is returned without its sign.
 
     >>> [read_loiter_radius(Loiter(radius, turns=3)) for radius in (-250.7, 307.0, 1.0)]
     [250.0, 300.0, 0.0]

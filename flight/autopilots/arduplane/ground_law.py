@@ -244,7 +244,8 @@ def ground_loop(
 def update_ground_contact(state: Record, clearance: float, ground: Record) -> None:
     """Update the flags that show whether the aircraft touches the ground and whether it has tipped over.
 
-    The ground is level, as in JSBSim.
+    The aircraft has tipped over if it does not stand on the lowest of its points that touch the ground. The ground is
+    level, as in JSBSim.
 
     state: a `flight.dynamics.state.STATE` record.
     clearance: height of the center of gravity above ground, m.
@@ -269,6 +270,11 @@ def end_status(work: Record, ground: Record) -> int:
 
     work: a `flight.simulation.tick.WORKSPACE` record.
     ground: a `GROUND_STATE` record, filled by this control law or from the flight of ArduPlane's program.
+
+    Ground contact ends the flight on the legs of the mission, after lift-off, and far from the landing point. Near the
+    landing point it is a touchdown: the flight is complete once the aircraft has been at rest for `_STOPPED_TIME_S`.
+    Take-off and landing also end if the aircraft banks too far or tips over, and with an empty battery in the air.
+    A take-off ends if the motor does not start, and a landing if the aircraft stalls before the flare.
     """
     state, ground_speed = work.state, math.hypot(work.true.velocity_east, work.true.velocity_north)
     is_battery_empty = work.air.energy >= work.settings.battery
@@ -421,7 +427,7 @@ def _leveling_fraction(estimated: Record, parameters: Record, ground: Record) ->
     """Return the factor (0..1) by which the minimum pitch is reduced near the end of the take-off.
 
     Follows `Plane::get_takeoff_pitch_min_cd`: the reduction begins once the climb would reach the end altitude within
-    TKOFF_PLIM_SEC. Before that the factor is 1.
+    TKOFF_PLIM_SEC; the height and the time of its beginning are stored in ``ground``. Before that the factor is 1.
 
     estimated: estimated position and velocity over the ground, a `MOTION` record.
     parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
@@ -502,7 +508,8 @@ def _begin_first_leg(
 def _tick_landing(work: Record, arduplane: Record, landing_point: Record) -> None:
     """Set the commands for one tick of the landing.
 
-    Navigation and TECS run every `NAVIGATION_TICK_S`, the attitude controllers in each tick.
+    Navigation and TECS run every `NAVIGATION_TICK_S`, the attitude controllers in each tick. In the flare the throttle
+    closes at its slew rate.
 
     work: state, commands and settings of the flight, a `WORKSPACE` record; updated.
     arduplane: parameters and memories of the control law and of take-off and landing; updated.
@@ -592,7 +599,8 @@ def _update_stage(
 ) -> None:
     """Begin the approach stage or the flare once its condition is met.
 
-    Follows `AP_Landing::type_slope_verify_land`.
+    The approach begins once the aircraft is lined up, in any case after half of the line. The flare begins at a height,
+    or at a time before the ground, or past the landing point. Follows `AP_Landing::type_slope_verify_land`.
 
     estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
     parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.

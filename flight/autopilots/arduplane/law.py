@@ -118,7 +118,8 @@ _RTL_CLIMB_EXTRA_M = 10.0
 def update_height_demand(estimated: Record, target: Record, parameters: Record, memory: Record, dt: float) -> None:
     """Update the altitude demand for the current leg; it has a limited rate and lags its target.
 
-    Follows `AP_TECS::_update_height_demand`.
+    While throttle or pitch is at its limit, the target does not move further away from the aircraft. Follows
+    `AP_TECS::_update_height_demand`.
 
     estimated: a record of `flight.guidance.navigation_error.MOTION`.
     target: the leg's end, a record of `flight.guidance.lateral_reference_laws.WAYPOINT`.
@@ -229,7 +230,8 @@ def _terrain_following_altitude_demand(estimated: Record, target: Record, parame
     The demanded height above ground changes linearly along the leg, from the height above ground of the leg's start
     (`Plane::set_target_altitude_proportion_terrain`). If the terrain ahead rises faster than the aircraft climbs at
     half of its maximum climb rate, the excess height is added to the demand. A descent of the leg reduces this excess
-    (`lookahead_adjustment` in ArduPlane/altitude.cpp).
+    (`lookahead_adjustment` in ArduPlane/altitude.cpp). On a loiter the demand is the height above ground of the
+    loiter. In the update in which a leg begins, the demand does not change.
 
     estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
     target: end of the leg, a `WAYPOINT` record, with its height above ground.
@@ -432,7 +434,7 @@ def control_as_ardupilot(
     """Compute the commands for one tick of ``dt`` s, and update the memories ``guidance`` and ``memory``.
 
     ArduPlane's navigation and TECS run every `NAVIGATION_TICK_S`, its attitude controllers in each tick. ArduPlane does
-    not use the path: the track is only measured against it.
+    not use the path: the track is only measured against it. ``guidance`` records the end of the last loiter or RTL.
 
     state, estimated: true attitude, airspeed and rates, a `STATE` record, and estimated motion, a `MOTION` record.
     pieces, nodes: course and altitude profile of the reference path, arrays of a `FlyByPath`.

@@ -48,7 +48,8 @@ _SAME_PLACE_M = 0.01
 def turn_distance(acceptance: float, turn_angle: float, wp_radius: float, l1_distance: float, eas2tas: float) -> float:
     """Return the distance before a waypoint at which ArduPlane turns to the next leg, m.
 
-    The distance is 0 if ArduPlane flies to the waypoint itself.
+    This is the acceptance radius that the mission states. Without one it is the smaller of WP_RADIUS and the L1
+    distance, reduced in proportion for a turn of less than 90 degrees.
 
     Follows `AP_L1_Control::turn_distance`.
 
@@ -91,6 +92,9 @@ def navigate_legs(
 ) -> None:
     """Set the lateral acceleration demand on the current leg, and begin the next leg once this leg is over.
 
+    A leg to a waypoint follows the line to it, a leg to a loiter also flies around the loiter, and an RTL lasts until
+    it joins the landing sequence. The last leg of the route never ends here.
+
     estimated: a record of `flight.guidance.navigation_error.MOTION`.
     waypoints: (w,) of `flight.guidance.lateral_reference_laws.WAYPOINT`.
     parameters: of `flight.autopilots.arduplane.parameters.ARDUPILOT_PARAMETERS`.
@@ -127,7 +131,10 @@ def navigate_legs(
 
 @inner
 def target_position(waypoint: Record) -> tuple[float, float]:
-    """Return east and north of a waypoint, m; for a waypoint on a loiter, of the loiter's center."""
+    """Return east and north of the point to which ArduPlane flies, m: a loiter's center, or the waypoint itself.
+
+    For an RTL the waypoint itself is returned.
+    """
     return (
         (waypoint.centre_east, waypoint.centre_north)
         if waypoint.loiter_radius != 0.0 and not waypoint.is_rtl
@@ -175,7 +182,8 @@ def _follow_line(
 def keep_turn_side(estimated: Record, angle: float, target_e: float, target_n: float, memory: Record) -> float:
     """Return L1's angle (rad), or the last angle if the new angle would reverse a turn of almost 180 degrees.
 
-    Follows `AP_L1_Control::_prevent_indecision`, with the course instead of the heading.
+    The result is stored as the last angle. Follows `AP_L1_Control::_prevent_indecision`, with the course instead of the
+    heading.
 
     angle: angle from the direction to the L1 point to the ground velocity, rad (`-Nu`).
     target_e, target_n: position that the aircraft flies to, m.
@@ -258,8 +266,9 @@ def _is_leg_over(
 ) -> bool:
     """Return True if the leg's end is within the turn distance, or if the aircraft is past the end.
 
-    Follows `Plane::verify_nav_wp`. A leg is never over while the aircraft is further than WP_MAX_RADIUS from the
-    target; an aircraft that passes the target at such a distance turns back to it.
+    Follows `Plane::verify_nav_wp`. The aircraft must be past the end of a leg to a fly-over waypoint. A leg is never
+    over while the aircraft is further than WP_MAX_RADIUS from the target; an aircraft that passes the target at such a
+    distance turns back to it.
 
     end_e, end_n: end of the leg, m, to which the aircraft flies; with a pass-by distance it lies beyond the target.
     turn_angle: turn of the route at the target, rad.
@@ -299,8 +308,8 @@ def _update_loiter(
 ) -> None:
     """Fly to a loiter and around it, until the loiter is complete and the aircraft heads for the next waypoint.
 
-    Follows `Plane::update_loiter`: far from the circle the aircraft flies straight to its centre, then around it. The
-    next leg begins once the loiter is complete and the course leads to the next waypoint that is not on the circle.
+    Follows `Plane::update_loiter`: far from the circle the aircraft flies straight to its center, then around it. The
+    next leg begins once the loiter is complete and the course leads to the next waypoint of another stop.
 
     estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
     waypoints: `WAYPOINT` records of the route, (w,).
@@ -404,8 +413,8 @@ def _is_heading_lined_up(
 
     The tolerance grows with each lap. From a loiter with an exit bearing, the aircraft leaves on this bearing. If the
     next waypoint is inside the circle, no tangent leads to it, and the aircraft leaves on a tangent that passes the
-    waypoint. Follows `ModeLoiter::isHeadingLinedUp`, whose tangent touches the circle in the direction of the aircraft
-    from the center.
+    waypoint. If the next waypoint is the loiter's center, the aircraft leaves at once. Follows
+    `ModeLoiter::isHeadingLinedUp`, whose tangent touches the circle in the direction of the aircraft from the center.
 
     estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
     next_waypoint: `WAYPOINT` record of the next leg's end.

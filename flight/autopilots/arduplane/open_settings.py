@@ -28,7 +28,7 @@ class Phase(StrEnum):
 
 
 class OpenSetting(NamedTuple):
-    """A setting with a neutral value.
+    """A setting of ArduPlane that is not simulated, with the values that do not change a flight.
 
     phase: the setting matters only where this part of a flight is flown.
     lowest, highest: range of values that change nothing.

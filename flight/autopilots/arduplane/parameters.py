@@ -477,7 +477,7 @@ class ArduPilotParameters(ParameterSet):
 
     @classmethod
     def _read_aircraft_values(cls, entries: Mapping[str, Entry]) -> dict[str, float]:
-        """Return the values in the aircraft's file that the control law uses, or that may leave a verdict undecided."""
+        """Return the values in the aircraft's file by name, without those that the aircraft needs in any case."""
         values, _ = cls.table.read(entries)
         return {name: value for name, value in values.items() if name not in _NEEDED_BY_AIRCRAFT}
 
@@ -597,7 +597,3 @@ SIDE_CANDIDATES = (
     Candidate("WP_RADIUS", 5.0, 150.0, "m"),
     Candidate("ROLL_LIMIT_DEG", 1.0, 60.0, "deg"),
 )
-
-
-# ----------------------------------------------------------------------
-# Airspeeds of a mission that ArduPlane accepts.

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Mapping
 from itertools import chain
 
 from world.scenario_tables import ArduPlaneVersion
+from world.wording import count_text
 
 _STREAMS = ("RAW_SENS", "EXT_STAT", "RC_CHAN", "RAW_CTRL", "POSITION", "EXTRA1", "EXTRA2", "EXTRA3", "PARAMS", "ADSB")
 _RANGE_FINDERS = "123456789A"
@@ -87,7 +88,7 @@ def describe_renamed(names: Iterable[str], used: Iterable[str], version: ArduPla
     >>> describe_renamed(["GLIDE_SLOPE_MIN", "WP_RADIUS"], ["GLIDE_SLOPE_MIN"], "4.7")
     'GLIDE_SLOPE_MIN is read as ALT_SLOPE_MIN, its name in ArduPlane 4.7'
     >>> describe_renamed(["SR0_ADSB", "SR1_ADSB"], [], "4.7")
-    'not used: SR0_ADSB (now MAV1_ADSB), +1 more renamed'
+    'SR0_ADSB (now MAV1_ADSB) and 1 more renamed parameter are not used'
     """
     used_names = set(used)
     renamed = {name: new_name for name in names if (new_name := name_in_release(name, version)) != name}
@@ -95,8 +96,7 @@ def describe_renamed(names: Iterable[str], used: Iterable[str], version: ArduPla
     if read_texts := [f"{name} is read as {new_name}" for name, new_name in renamed.items() if name in used_names]:
         texts.append(f"{', '.join(read_texts)}, its name in ArduPlane {version}")
     if unused_texts := [f"{name} (now {new_name})" for name, new_name in renamed.items() if name not in used_names]:
-        texts.append(
-            f"not used: {unused_texts[0]}"
-            + (f", +{len(unused_texts) - 1} more renamed" if len(unused_texts) > 1 else "")
-        )
+        others_text = count_text(len(unused_texts) - 1, "more renamed parameter")
+        verb_text = f" and {others_text} are not used" if len(unused_texts) > 1 else " is not used"
+        texts.append(unused_texts[0] + verb_text)
     return "; ".join(texts)

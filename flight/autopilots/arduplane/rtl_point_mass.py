@@ -269,12 +269,12 @@ def fly_stages(
     positions: Floats,
     result: Record,
 ) -> None:
-    """Simulate the flight from stage to stage for up to ``timeout`` s; fill the `RETURN_RESULT` ``result``.
+    """Simulate the flight from stage to stage for up to ``timeout`` s; fill ``positions`` and ``result``.
 
-    start, stages: `RETURN_START` record, and successive targets, `WAYPOINT` records (n,); the last loiter is flown on.
+    start, stages: `RETURN_START` record, and successive targets, loiters or waypoints, as `WAYPOINT` records (n,).
     climb, climb_parameters: the climb at the start and its parameters. engine_out: True if the engine failed there.
     min_clearance, min_distance: height above ground and distance outside spheres, m, below which the flight is aborted.
-    positions: array (t, 3), m, to fill, one per second. aircraft, excesses, power, field: tables of a `PointMass`.
+    positions: one row a second, m. aircraft to field, heights to has_terrain: a `PointMass` and a `ReturnEnvironment`.
     """
     spaced, progress_records = np.zeros(6, WAYPOINT), np.zeros(1, LOITER_PROGRESS)  # Spaced as in `waypoint_column`.
     waypoints, loiter = spaced[::2], progress_records[0]
@@ -536,6 +536,8 @@ def _update_demands(
     dt: float,
 ) -> None:
     """Update the demands for bank, altitude, throttle and pitch on the leg to ``waypoints[1]``.
+
+    TECS sets throttle and pitch; only in a turn without an engine does the pitch hold the airspeed of a gliding turn.
 
     excess_table: specific excess power, m/s, `PointMass.excess`.
     eas2tas: ratio of true to equivalent airspeed.

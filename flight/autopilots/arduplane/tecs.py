@@ -66,6 +66,8 @@ def load_factor_roll_limit(airspeed: float, min_level_airspeed: float, min_bank:
 def limited_nav_roll(lateral_acceleration: float, pitch: float, airspeed: float, parameters: Record) -> float:
     """Return the bank (rad) for a lateral acceleration (m/s^2), limited by ROLL_LIMIT_DEG and by the stall.
 
+    The limit by the stall grows with the airspeed. It applies only with stall prevention.
+
     Follows `Plane::calc_nav_roll` and `Plane::update_load_factor`.
 
     pitch: rad.
@@ -256,6 +258,9 @@ def update_tecs(
 ) -> None:
     """Update the throttle and pitch demands that hold the altitude demand and a target airspeed.
 
+    The throttle controls the total energy, the pitch its distribution between altitude and airspeed. In underspeed and
+    in a bad descent the target is the minimum airspeed.
+
     Follows `AP_TECS::update_pitch_throttle`: `_update_speed`, `_detect_underspeed`, `_update_speed_demand`,
     `_update_energies`, `_update_throttle_with_airspeed` and `_update_pitch`.
 
@@ -316,7 +321,8 @@ def _update_speed_demand(
 
     SKE is the specific kinetic energy. Follows `AP_TECS::_update_speed_demand`. A rise of the airspeed may use half of
     the energy rate of a climb at TECS_CLMB_MAX. A fall may use nine tenths of the energy rate of a descent: at
-    TECS_SINK_MIN at AIRSPEED_CRUISE, at TECS_SINK_MAX at the maximum airspeed, and interpolated in between.
+    TECS_SINK_MIN at AIRSPEED_CRUISE, at TECS_SINK_MAX at the maximum airspeed, and interpolated in between. The
+    demanded SKE rate fades during a long change of airspeed, because the mean rate of the change is subtracted.
 
     parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
     memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record; updated.
@@ -365,6 +371,9 @@ def _update_throttle(
     dt: float,
 ) -> None:
     """Set the throttle demand from an STE rate demand, the STE error and the STE rate.
+
+    The demand is the sum of the throttle for the demanded rate, a correction proportional to the error, damping of the
+    rate, and an integral of the error.
 
     Follows `AP_TECS::_update_throttle_with_airspeed`.
 
@@ -437,7 +446,8 @@ def _update_pitch_integrators(
 ) -> None:
     """Update the SEB and SKE integrators of the pitch demand.
 
-    Both integrators fade while the pitch demand is beyond a limit. Follows `AP_TECS::_update_pitch`.
+    If the pitch demand is beyond a limit and the change would move it further, both integrators fade instead. Follows
+    `AP_TECS::_update_pitch`.
 
     seb_rate_demand_total: SEB rate demand without integrators, m^2/s^3.
     seb_change, ske_change: changes of the integrators in this update, m^2/s^3.

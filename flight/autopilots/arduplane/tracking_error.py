@@ -118,7 +118,8 @@ def _corner_tables(
 ) -> tuple[Floats, Floats, Floats, Floats]:
     """Return the acceptance radius, the excursion, and the affected length of each leg at corners, m.
 
-    Each is a table with one row per turn of `TURNS` and one column per speed of `SPEED_RATIOS`.
+    Each is a table with one row per turn of `TURNS` and one column per speed of `SPEED_RATIOS`. The excursion, the
+    greatest distance from the legs, includes the margin for wind.
     """
     corners = np.zeros((TURNS.size, SPEED_RATIOS.size), CORNER_TRACKING)
     record, speeds = parameters.record(), SPEED_RATIOS * airspeed
@@ -144,8 +145,9 @@ def _measure_corners(
 ) -> None:
     """Fill the `CORNER_TRACKING` record of each corner, by turn angle (rows) and ground speed (columns).
 
-    For each corner, search for the acceptance radius with the smallest excursion. With ``fly_over`` there is nothing to
-    choose, and one turn is simulated.
+    For each corner, search for the acceptance radius with the smallest excursion: simulate the corner with evenly
+    spaced radii, then with closer ones around the best radius. With ``fly_over`` the radius has no effect, and one
+    corner is simulated. A turn of 0 gets the smallest radius without a simulation.
 
     airspeed: equivalent airspeed, m/s.
     turn_angles: rad.

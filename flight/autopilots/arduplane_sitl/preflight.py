@@ -66,7 +66,7 @@ class Preflight(Conversation):
             lambda: self._send_command(Command.DO_SET_MODE, mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, AUTO),
             "AUTO",
         )
-        auto_mode = Awaited("AUTO", REPLY_TIMEOUT_S, "did not change to AUTO, armed,")
+        auto_mode = Awaited("AUTO", REPLY_TIMEOUT_S, "was not armed and in AUTO")
         yield from self._wait_until(lambda: reported.mode == AUTO and reported.armed, auto_mode)
 
 

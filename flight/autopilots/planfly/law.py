@@ -262,13 +262,15 @@ def _roll_offset_correction(
     """Return the acceleration to the right that corrects the offset from rolling into and out of arcs, m/s^2.
 
     An aircraft needs time to change its bank, so it leaves the path where the curvature changes in a step. A model of
-    the roll predicts this offset, which is stored in ``memory.roll_offset``.
+    the roll predicts this offset (m, positive to the right), and stores it in ``memory.roll_offset``: the lateral law
+    follows the path with this offset. The returned acceleration brings the predicted offset back to 0.
 
     curvature: curvature of the path at the aircraft, 1/m.
     turn_acceleration: acceleration to the right for the path ahead, m/s^2.
     speed: ground speed, m/s.
     crab: cosine of the angle between heading and ground course.
     gains: gains of the control law and of the aircraft, a `GAINS` record.
+    memory: `GUIDANCE_MEMORY` record; the predicted bank and offset are updated.
     dt: duration of a tick, s.
     """
     memory.path_bank, memory.path_bank_rate, _ = step_roll_model(
@@ -296,8 +298,9 @@ def _lateral_correction(
 ) -> float:
     """Return the acceleration to the right that corrects cross-track errors and disturbances, m/s^2.
 
-    The cross-track error demands a cross-track rate, whose error demands an acceleration. The integrator and the
-    acceleration that neither lift nor ailerons explain are subtracted, each times its gain.
+    The law has two loops: the cross-track error gives a demanded cross-track rate, and the error of this rate gives the
+    acceleration. Two terms are subtracted, each times its gain: the integrator of the cross-track error, and the
+    measured acceleration that neither lift nor ailerons explain.
 
     state: attitude, airspeed and rates of the aircraft, a `STATE` record.
     estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.

@@ -204,7 +204,10 @@ class Px4(Autopilot):
 
     @classmethod
     def missing_files(cls, aircraft: Aircraft) -> list[str]:
-        """Return an empty list, because PX4 has a default for each parameter that the aircraft does not state."""
+        """Return an empty list, because PX4 has a default for each parameter that the aircraft does not state.
+
+        Raises ParameterError if the aircraft's own parameter file is invalid.
+        """
         Px4Parameters.load(aircraft)
         return []
 
@@ -341,7 +344,10 @@ class Px4(Autopilot):
             yield f"RTL_TYPE {return_type:g} without a rally point loiters where the RTL begins, which is not simulated"
 
     def _unjudged_return_texts(self, rally_distance: float) -> Iterator[str]:
-        """Describe settings with which a part of an RTL is not simulated; see `_unsimulated_return_texts`."""
+        """Describe settings with which a part of an RTL is not simulated, although the rest of the RTL is.
+
+        rally_distance: distance of the nearest rally point from home, m; infinite without one.
+        """
         parameters = self.parameters
         if parameters["RTL_TYPE"] != _TO_RALLY_POINT and rally_distance <= _RALLY_HOME_DISTANCE_M:
             yield "PX4 ignores a rally point within 10 m of home, but the simulated return goes to it"

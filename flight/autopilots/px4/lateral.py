@@ -29,7 +29,8 @@ _MIN_GROUND_SPEED_MPS = 1.0
 def bearing_feasibility(airspeed: float, wind_cross_bearing: float, wind_dot_bearing: float) -> float:
     """Return the feasibility of a course in wind, 0..1 (`bearingFeasibility`).
 
-    The result is 1 if the airspeed is sufficient for the course, and 0 if the wind is too strong for it.
+    The result is 1 if the airspeed is sufficient for the course, and 0 if the wind is too strong for it. It falls
+    smoothly from 1 to 0 over the last `_AIRSPEED_BUFFER_MPS` of airspeed.
 
     wind_cross_bearing, wind_dot_bearing: wind components across and along the course, m/s.
     """
@@ -71,7 +72,7 @@ def straight_track_period(parameters: Record) -> float:
 def switch_distance(ground_speed: float, parameters: Record) -> float:
     """Return the distance before a waypoint at which guidance would turn to the next leg, m.
 
-    The distance is NPFG_SW_DST_MLT times `track_error_bound`.
+    The distance is NPFG_SW_DST_MLT times `track_error_bound`, but at most `MAX_SWITCH_DISTANCE_M`.
 
     parameters: PX4's parameters, a `PX4_PARAMETERS` record.
     """
@@ -93,7 +94,8 @@ def adapted_period(
 ) -> float:
     """Return NPFG's period on a track, s.
 
-    The period is long enough for the roll lag, and short enough for a curve in wind.
+    The period is NPFG_PERIOD, raised to a lower bound for the roll lag. On a curved track in wind an upper bound also
+    applies near the track, but never below the lower bound. PX4's parameters can disable both bounds.
 
     curvature: curvature of the track, 1/m.
     track_feasibility: feasibility of the track's course, 0..1; see `bearing_feasibility`.
@@ -190,12 +192,12 @@ def guide_to_path(
 ) -> None:
     """Set ``memory.lateral_acceleration`` to join and follow a track (`guideToPath`).
 
-    estimated: a record of `flight.guidance.navigation_error.MOTION`.
-    path_east, path_north: point of the track nearest to the aircraft, m.
-    tangent_east, tangent_north: direction of the track at that point, a unit vector.
-    curvature: 1/m, positive to the right.
-    wind_east, wind_north: velocity of the air, m/s.
+    Far from the track the course points to it, on the track along it. The acceleration turns the aircraft to this course.
+
+    path_east, path_north, curvature: the track's nearest point, m, and curvature there, 1/m, positive to the right.
+    tangent_east, tangent_north, wind_east, wind_north: unit vector along the track there; velocity of the air, m/s.
     target_airspeed: m/s. If the ground speed would be too low at this airspeed, ``memory.min_airspeed`` is set.
+    estimated, parameters, memory: `MOTION`, `PX4_PARAMETERS` and `PX4_MEMORY` records.
     """
     air_east, air_north = estimated.velocity_east - wind_east, estimated.velocity_north - wind_north
     airspeed = max(0.1, math.hypot(air_east, air_north))
@@ -256,11 +258,11 @@ def follow_leg(
 ) -> None:
     """Guide the aircraft onto the line from the leg's start to its end (`navigateWaypoints`).
 
-    Before the start, and further from it than the switch distance, it flies straight to the start; past the end, to it.
-    estimated: position and velocity over the ground, a `MOTION` record.
-    end_east, end_north: end of the leg, m. Its start is in the memory.
+    An aircraft past the end flies straight back to the end. An aircraft before the start, and further from it than the
+    switch distance, flies straight to the start.
+    end_east, end_north: end of the leg, m. Its start is in the memory, where the lateral acceleration is set.
     wind_east, wind_north, target_airspeed: velocity of the air and airspeed to fly at, m/s.
-    parameters, memory: PX4's parameters, and the control law's memory, whose lateral acceleration is set.
+    estimated, parameters, memory: `MOTION`, `PX4_PARAMETERS` and `PX4_MEMORY` records.
     """
     leg_east, leg_north = end_east - memory.from_east, end_north - memory.from_north
     length = math.hypot(leg_east, leg_north)
@@ -320,7 +322,7 @@ def follow_loiter(
 ) -> None:
     """Guide the aircraft onto a loiter circle (`navigateLoiter`).
 
-    At the centre of the circle, where no radius leads to the aircraft, the direction of its ground speed is used.
+    At the center of the circle, where no radius leads to the aircraft, the direction of its ground velocity is used.
 
     estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
     center_east, center_north: center of the circle, m.

@@ -201,7 +201,7 @@ def control_as_px4(
 def update_roll_setpoint(parameters: Record, memory: Record, dt: float) -> None:
     """Move the roll setpoint towards the bank for the lateral acceleration, at a limited rate.
 
-    The limit is FW_PN_R_SLEW_MAX.
+    The limit is FW_PN_R_SLEW_MAX; 0 is no limit.
 
     parameters: PX4's parameters, a `PX4_PARAMETERS` record.
     memory: memory of the control law between ticks, a `PX4_MEMORY` record.

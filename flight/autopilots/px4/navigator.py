@@ -91,6 +91,8 @@ def navigate(
 ) -> None:
     """Follow the current leg, set the altitude setpoint, and begin the next leg once the target is reached.
 
+    The target is the next waypoint, loiter or RTL. Gates before it only divide the way to it into legs.
+
     estimated: a record of `flight.guidance.navigation_error.MOTION`.
     waypoints: (w,) of `flight.guidance.lateral_reference_laws.WAYPOINT`.
     wind_east, wind_north: velocity of the air, m/s.
@@ -437,9 +439,10 @@ def begin_leg(estimated: Record, waypoints: Records, leg: int, memory: Record) -
 
 @inner
 def is_past_corner(estimated: Record, corner: Record) -> bool:
-    """Return True if an aircraft on a loiter has passed a corner of the loiter by less than 90 degrees.
+    """Return True if an aircraft on a loiter has passed a waypoint on its circle by less than 90 degrees.
 
     estimated: estimated position and velocity over the ground, a `MOTION` record.
+    corner: the waypoint on the circle, with the circle's center and radius, a `WAYPOINT` record.
     """
     corner_bearing = math.atan2(corner.east - corner.centre_east, corner.north - corner.centre_north)
     bearing = math.atan2(estimated.east - corner.centre_east, estimated.north - corner.centre_north)

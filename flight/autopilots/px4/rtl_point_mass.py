@@ -121,7 +121,7 @@ def _fly_one(
     positions: Floats,
     result: Record,
 ) -> None:
-    """Simulate one RTL with `fly_rtl`.
+    """Simulate one RTL by the compiled `fly_rtl`, to which the arrays of point mass and terrain are passed.
 
     start: position, velocity, bank and time of the start, a `RETURN_START` record.
     route: the start, then the loiter at the RTL's end, or the stops of a landing sequence and the landing.

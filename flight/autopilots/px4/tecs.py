@@ -75,6 +75,7 @@ def update_tecs(
 ) -> None:
     """Update the throttle and pitch setpoints for the altitude setpoint and an airspeed setpoint.
 
+    The throttle controls the total energy, the pitch its distribution between altitude and airspeed.
     Follows `TECS::update` and `TECSControl::update`, with `_calcAltitudeControlOutput` and
     `_calcAirspeedControlOutput`.  The setpoint of the SKE rate follows from the airspeed setpoint
     (`_calcSpecificEnergyRates`).
@@ -125,8 +126,8 @@ def _adapt_airspeed_setpoint(
 ) -> None:
     """Move the true airspeed setpoint towards an equivalent airspeed (m/s) at a limited rate.
 
-    Follows `adapt_airspeed_setpoint`. The airspeed limits are not rate-limited. In a bank the minimum airspeed grows as
-    the square root of the load factor.
+    Follows `adapt_airspeed_setpoint`. A setpoint outside the airspeed limits moves to the limit at once. In a bank the
+    minimum airspeed grows as the square root of the load factor.
 
     airspeed_setpoint: equivalent airspeed, m/s.
     parameters: PX4's parameters, a `PX4_PARAMETERS` record.

@@ -140,7 +140,8 @@ CORNER_TRACKING = record_dtype("acceptance", "excursion", "before", "after")
 def _corner_tables(parameters: Px4Parameters, airspeed: float) -> tuple[Floats, Floats, Floats, Floats]:
     """Return the acceptance radius, the excursion, and the affected length of each leg at corners, m.
 
-    Each is a table with one row per turn of `TURNS` and one column per speed of `SPEED_RATIOS`.
+    Each is a table with one row per turn of `TURNS` and one column per speed of `SPEED_RATIOS`. The excursion, the
+    greatest distance from the legs, includes the margin for wind.
     """
     corners = np.zeros((TURNS.size, SPEED_RATIOS.size), CORNER_TRACKING)
     _measure_corners(parameters.record(), airspeed, TURNS, SPEED_RATIOS * airspeed, corners, waypoint_column(3))
@@ -163,6 +164,8 @@ def _measure_corners(
     waypoints: Records,
 ) -> None:
     """Fill the `CORNER_TRACKING` record of each corner, by turn angle (rows) and ground speed (columns).
+
+    Each corner is simulated once, with PX4's own acceptance radius; a turn of 0 is not simulated.
 
     airspeed: equivalent airspeed, m/s.
     turn_angles: rad.

@@ -36,7 +36,7 @@ class Px4Sitl(ProgramAutopilot, Px4):
 
     @classmethod
     def missing_files(cls, aircraft: Aircraft) -> list[str]:
-        """Return an empty list: the only required file, the servo map, is reported by the ArduPlane program."""
+        """Return an empty list, because `ArduPlaneSitl.missing_files` already reports a missing servo map."""
         return []
 
     @property

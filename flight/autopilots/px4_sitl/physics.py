@@ -371,7 +371,7 @@ class HilLockstep(Lockstep):
         )
 
     def _send_motion(self, motion: tuple[float, ...], battery: tuple[float, float] | None) -> None:
-        """Send sensor messages for the motion of the aircraft."""
+        """Run two steps of PX4: with the motion halfway from the last frame to this one, and with this motion."""
         current = BodyMotion(*motion)
         previous = self._last_motion or current._replace(time=current.time - 1.0 / FRAME_HZ)
         self._last_motion = current

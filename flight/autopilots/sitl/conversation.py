@@ -54,9 +54,10 @@ class _Stopwatch:
         self._start_times = now(), clock()
 
     def has_passed(self, seconds: float) -> bool:
-        """Return True if more than a time has passed, both by the autopilot's clock and in real time.
+        """Return True if more than a time has passed by the autopilot's clock, and enough real time too.
 
-        seconds: time by the autopilot's clock, s. The minimum real time is a constant.
+        seconds: time by the autopilot's clock, s. In real time as much must have passed, but at most
+            `_MIN_REAL_TIME_S`.
         """
         start, clock_start = self._start_times
         return self._now() - start > seconds and self._clock() - clock_start > min(seconds, _MIN_REAL_TIME_S)

@@ -161,8 +161,9 @@ def update_endless_loiter(true: Record, corner: Record, memory: Record, dt: floa
 def distances_from_route_end(true: Record, waypoints: Records) -> tuple[float, float]:
     """Return the distance to the right of the last leg, and the distance past its end, m.
 
-    Both are negative on the other side.
+    They are negative to the left of the leg and before its end.
 
+    true: position of the aircraft, a `MOTION` record.
     waypoints: `WAYPOINT` records of the route, (w,).
     """
     start, end = waypoints[waypoints.shape[0] - 2], waypoints[waypoints.shape[0] - 1]

@@ -124,7 +124,7 @@ def test_a_station_ends_the_flight() -> None:
 def test_a_full_disk_ends_the_flight_and_not_the_process() -> None:
     log = MemoryLog(full=True)
     ended, judged = events_of(log)[-2:]
-    assert ended == FlightEnded("log: No space left on device")
+    assert ended == FlightEnded("ended: its log cannot be written: No space left on device")
     assert isinstance(judged, FlightJudged)
     assert "cannot be written" in judged.texts[0].text
     assert log.closed == ["abandoned"]

@@ -268,8 +268,8 @@ def test_parameters_that_fly_are_set_on_the_ground_and_the_mission_is_judged_ane
     assert isinstance(fake.orders[-1], JudgeMission)
     assert fake.orders[-1].parameters == (("WP_RADIUS", 70.3),)
     judged = len(fake.orders)
-    assert setting(b"WP_RADIUS", 0.5) == (pytest.approx(70.3), "WP_RADIUS: 0.5: allowed 1..32767; 70.3 kept")
-    assert setting(b"WP_RADIUS", math.nan)[1] == "WP_RADIUS nan: expected a finite number; 70.3 kept"
+    assert setting(b"WP_RADIUS", 0.5) == (pytest.approx(70.3), "WP_RADIUS: 0.5: allowed 1..32767; the value stays 70.3")
+    assert setting(b"WP_RADIUS", math.nan)[1] == "WP_RADIUS nan: expected a finite number; the value stays 70.3"
     assert setting(b"AIRSPEED_CRUISE", 22.0)[1].startswith("AIRSPEED_CRUISE is fixed by the aircraft or")
     assert len(fake.orders) == judged
     fake.send(command(400, 1.0), command(176, 1.0, 10.0))

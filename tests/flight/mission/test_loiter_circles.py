@@ -118,7 +118,7 @@ def test_a_loiter_without_a_radius_has_the_aircrafts_own() -> None:
     """R = 625 / (9.80665 tan 30) = 110.39 m in calm air; a tenth over it in whole tens of metres is 130 m."""
     lines = (wp(0, 0), wp(0, 2000, command=18, p="1 0 0 0"), wp(3000, 2000))
     assert circled(setup_of(*lines).route, 2)[1] == 130.0
-    assert "item 2: loiter without a radius: flown with 130 m" in setup_of(*lines).route.notes
+    assert "item 2: loiter without a radius: flown with a radius of 130 m" in setup_of(*lines).route.notes
     # (25 + 8)^2 / (9.80665 tan 30) = 192.3 m downwind.
     assert circled(setup_of(*lines, wind={"speed_mps": 8.0, "from_deg": 0.0}).route, 2)[1] == 220.0
 
@@ -269,13 +269,13 @@ def test_a_circle_left_when_its_time_is_over_is_drawn_no_longer() -> None:
 def test_what_comes_after_the_last_waypoint_is_said() -> None:
     rules = LoiterRules(80.0, "NAV_LOITER_RAD", ends_in_circle=True)
     note = (
-        "item 2: after the last waypoint the aircraft loiters around it without end, with NAV_LOITER_RAD, 80 m: one lap"
-        " is flown"
+        "item 2: after the last waypoint the aircraft loiters around it indefinitely, with NAV_LOITER_RAD, 80 m:"
+        " one lap is flown"
     )
     assert any(line.startswith(note) for line in laid_for(rules, wp(0, -1500), wp(0, 0)).notes)
     for last in (wp(0, 0, command=17, p="0 0 150 0"), "3 20 0 0 0 0 0 0 0", wp(0, 0, command=21)):
-        assert not any("without end" in line for line in laid_for(rules, wp(0, -1500), wp(900, -1500), last).notes)
-    assert not any("without end" in line for line in laid_for(LoiterRules(), wp(0, -1500), wp(0, 0)).notes)
+        assert not any("indefinitely" in line for line in laid_for(rules, wp(0, -1500), wp(900, -1500), last).notes)
+    assert not any("indefinitely" in line for line in laid_for(LoiterRules(), wp(0, -1500), wp(0, 0)).notes)
 
 
 def test_a_circle_that_is_left_heading_for_what_follows_is_drawn_as_it_is_flown() -> None:
@@ -314,7 +314,7 @@ def test_a_radius_is_what_the_autopilot_reads_of_it_and_grows_with_height() -> N
         (
             wp(0, 0, 100, 18, p="2 0 207 0"),
             280.0,
-            "loiter radius 207 m: flown with 280 m, because the autopilot enlarges it with altitude",
+            "loiter radius 207 m: flown with a radius of 280 m, because the autopilot enlarges it with altitude",
         ),
     ):
         made = laid_for(rules, wp(0, -1500), loiter, wp(1500, 1500))

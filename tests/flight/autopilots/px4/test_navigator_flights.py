@@ -108,7 +108,7 @@ def test_a_circle_left_on_its_far_side_is_left_within_its_corridor(aerosonde: Ai
         for line in verdict.lines
         if line.startswith("PX4 would reject the mission: PX4's fixed-wing default refuses")
     ]
-    assert "item 3: after the last waypoint the aircraft loiters around it without end" in verdict.notes[-1]
+    assert "item 3: after the last waypoint the aircraft loiters around it indefinitely" in verdict.notes[-1]
     # On the way it climbs at 3 m/s from the beginning, not along the slope: 120 m in 40 s, of 2,500 m.
     track = result.track
     level = int(np.argmax(track.position[:, 2] > 710.0))
