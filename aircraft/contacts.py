@@ -177,18 +177,20 @@ def _center_of_gravity(model: bytes) -> Floats:
         (element.find("contents"), _read_location(element.find("location")))
         for element in root.findall("propulsion/tank")
     ]
-    masses = [(_read_mass(weight), position) for weight, position in loads if position is not None]
+    masses = [
+        (
+            0.0
+            if weight is None
+            else _KILOGRAMS_PER_UNIT.get(weight.get("unit", "LBS"), 1.0) * float(weight.text or "0"),
+            position,
+        )
+        for weight, position in loads
+        if position is not None
+    ]
     total = sum(mass for mass, _ in masses)
     if not total > 0.0:
         return masses[0][1] if masses else np.zeros(3)
     return np.asarray(sum(mass * position for mass, position in masses) / total)
-
-
-def _read_mass(weight: ElementTree.Element | None) -> float:
-    """Return the mass in a weight element of a model, kg; 0 if the element is missing."""
-    if weight is None:
-        return 0.0
-    return _KILOGRAMS_PER_UNIT.get(weight.get("unit", "LBS"), 1.0) * float(weight.text or "0")
 
 
 def _read_location(location: ElementTree.Element | None) -> Floats | None:

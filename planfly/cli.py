@@ -36,14 +36,14 @@ def main(argv: Sequence[str] | None = None) -> int:
     return: the process ends with the exit code of the command, or after SIGINT or SIGTERM.
     """
     if argv is not None:
-        return _run_and_report(argv)
+        return _run_command(argv)
     prepare_process()
     open_standard_streams()
     if COMPLETION_VARIABLE in os.environ:
         complete_for_shell(build_parser())
     with end_on_signals() as received_signals:
         try:
-            code = with_large_stack(lambda: _run_and_report(argv))
+            code = with_large_stack(lambda: _run_command(argv))
         except Exception:
             if not received_signals:
                 raise
@@ -57,43 +57,34 @@ def main(argv: Sequence[str] | None = None) -> int:
 _REPORTED_ERRORS = (PlanflyError, OSError, MemoryError, KeyboardInterrupt)
 
 
-def _run_and_report(argv: Sequence[str] | None) -> int:
-    """Run one command.
-
-    Report bad input, errors of the machine and interruptions in one line.  Return the exit code.
-    """
-    try:
-        with safe_streams():
-            return _run_command(argv)
-    except _REPORTED_ERRORS as error:
-        return _report_error(*_exit_code_and_text(error))
-
-
 def _run_command(argv: Sequence[str] | None) -> int:
     """Parse the command line, run its command, and return the exit code.
 
-    An error is also written to the files of --json and --junit, so that files of an earlier run are not mistaken for
-    this run's.
+    Bad input, errors of the machine and interruptions are reported in one line.  Errors are also written to the files
+    of --json and --junit, so that files of an earlier run are not mistaken for this run's.
     """
-    parser = build_parser()
+    command_parser = None
     try:
-        args = parser.parse_args(argv)
-    except UsageExit as usage:
-        write_usage_error_if_requested(sys.argv[1:] if argv is None else argv, usage.line, parser.commands)
-        raise
-    try:
-        with redirect_output(args):
+        with safe_streams():
+            parser = build_parser()
             try:
-                return COMMANDS_BY_NAME[args.command].load()(args)
-            except _REPORTED_ERRORS as error:
-                write_error_if_requested(args, *_exit_code_and_text(error, parser.commands[args.command]))
+                args = parser.parse_args(argv)
+            except UsageExit as usage:
+                write_usage_error_if_requested(sys.argv[1:] if argv is None else argv, usage.line, parser.commands)
                 raise
-            except Exception as error:
-                # An error of planfly itself; Python prints its traceback and ends with exit code 1.
-                write_error_if_requested(args, FAULT, f"internal error: {type(error).__name__}: {error}")
-                raise
-    except PlanflyError as error:
-        return _report_error(*_exit_code_and_text(error, parser.commands[args.command]))
+            command_parser = parser.commands[args.command]
+            with redirect_output(args):
+                try:
+                    return COMMANDS_BY_NAME[args.command].run(args)
+                except _REPORTED_ERRORS as error:
+                    write_error_if_requested(args, *_exit_code_and_text(error, command_parser))
+                    raise
+                except Exception as error:
+                    # An error of planfly itself; Python prints its traceback and ends with exit code 1.
+                    write_error_if_requested(args, FAULT, f"internal error: {type(error).__name__}: {error}")
+                    raise
+    except _REPORTED_ERRORS as error:
+        return _report_error(*_exit_code_and_text(error, command_parser))
 
 
 def _exit_code_and_text(error: BaseException, parser: CommandParser | None = None) -> tuple[int, str]:

@@ -146,6 +146,8 @@ class LinkOptions(LogOptions, total=False):
     use: LinkUse | None
 
 
+# Options with one range or list of words wherever they are given; the other options have a range in scenarios.
+RANGED_OPTIONS = ("seed", "budget", "seconds", "flight", "datum", "engine", "log_hz", "max_hours", "max_log")
 # Options that apply only to the log of another program.
 LOG_OPTIONS = ("plan", "flight", "datum")
 

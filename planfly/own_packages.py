@@ -33,21 +33,15 @@ def find_hidden_package(home: Path) -> HiddenPackage | None:
     '/elsewhere/aircraft/__init__.py'
     """
     for name in PACKAGES:
-        file, package_file = _module_file(name), home / name / "__init__.py"
+        if name in sys.modules:
+            file = getattr(sys.modules[name], "__file__", None)
+        else:
+            spec = find_spec(name)
+            file = None if spec is None else spec.origin
+        package_file = home / name / "__init__.py"
         if file is not None and file != str(package_file) and not _is_same_file(file, package_file):
             return HiddenPackage(file, str(package_file))
     return None
-
-
-def _module_file(name: str) -> str | None:
-    """Return the file of the module that Python imported, or would import, by a name.
-
-    Returns None if there is no such file.
-    """
-    if name in sys.modules:
-        return getattr(sys.modules[name], "__file__", None)
-    spec = find_spec(name)
-    return None if spec is None else spec.origin
 
 
 def _is_same_file(file: str, package_file: Path) -> bool:

@@ -28,7 +28,7 @@ from world.terrain import Terrain
 PLAN_SCHEMA = "planfly.plan/1"
 # Algorithm of a plan whose waypoints were given instead of searched.
 GIVEN_WAYPOINTS = "given"
-# First words of a problem of a departure or an approach, which is searched for given waypoints as well.
+# First words of a problem with a departure or an approach. Both are searched even if the waypoints are given.
 GROUND_PROBLEMS = ("climb-out: ", "landing: ")
 # Maximum size of a file, bytes; ten thousand waypoints with as many threats take 4 MB.
 MAX_BYTES = 64 * 2**20
@@ -80,19 +80,20 @@ class Objectives(NamedTuple):
 class Certificate:
     """Result of the continuous check along the whole path, not only at six points per leg.
 
-    Margins are the smallest difference of limit and value, negative exactly if the path fails by this limit.  The
-    limits include the margins that a plan keeps, as the lines of ``problems`` state them.  For algorithms with graded
-    violations, as the default, clearance, kill_distance, zone_distance and headroom are those of the worst position
-    that is predicted for the autopilot: beside the legs by its lateral deviation, navigation error and excursion at
-    corners, and above or below by its lag in altitude on slopes.  Its vertical deviation on a level leg is part of the
-    required margins.  For bounds all deviations are subtracted.  For other algorithms, such as "umda" and "de-paper",
-    nothing is subtracted: the margins are of the legs and fly-by arcs.  For given waypoints the algorithm of the
-    scenario decides.
+    A margin is the smallest difference between a limit and the path's value; it is negative if, and only if, the path
+    violates the limit.  The limits include the margins that a plan keeps, as the lines of ``problems`` state them.
+
+    For algorithms with graded violations, as the default, clearance, kill_distance, zone_distance and headroom are
+    measured at the worst position that is predicted for the autopilot.  To the side of a leg this is by its lateral
+    deviation, navigation error and excursion at corners; above or below the leg by its lag in altitude on slopes.  Its
+    vertical deviation on a level leg is part of the required margins.  For bounds all deviations are subtracted.  For
+    other algorithms, such as "umda" and "de-paper", nothing is subtracted: the margins are those of the legs and fly-by
+    arcs.  For given waypoints the algorithm of the scenario decides.
 
     turn: margin to the greatest course change, rad: the scenario's limit less 0.5 degrees, or 150 degrees for
     ``max_turn_deg = "aircraft"``, which limits turns by the lengths of their legs.
-    available_length: smallest length of a leg minus the length that its turns, the roll between them and their settling
-    need, or minus 5 m for a leg that need not contain its turns, m.
+    available_length: smallest length that is left of a leg, m, after its turns, the roll between them and settling; or
+    after 5 m for a leg that need not contain its turns.
     slope: margin to the limits of climb and dive less 0.5 degrees, rad.
     clearance: smallest height above ground minus the required clearance and its margin, m; NaN off the terrain.
     bounds: margin to map, floor and ceiling, m.
@@ -122,7 +123,7 @@ class Certificate:
 
     @property
     def margins(self) -> tuple[float, ...]:
-        """Margins of the path, from `turn` to `headroom`, (8,)."""
+        """Margins of the path in the order of the fields, from `turn` to `headroom`, without `problems`, (8,)."""
         return (
             self.turn,
             self.available_length,
@@ -229,7 +230,8 @@ class Plan:
     def unmet_margins(self) -> tuple[str, ...]:
         """Margins of the planner that given waypoints do not meet; empty for a plan that was searched.
 
-        A verdict on given waypoints judges the flight, which may be flyable without these margins.
+        A problem of a departure or an approach is not among them. A verdict on given waypoints judges the flight
+        itself, which may be flyable without these margins.
         """
         if self.algorithm != GIVEN_WAYPOINTS:
             return ()
@@ -245,7 +247,7 @@ class Plan:
 
     @property
     def _problems(self) -> tuple[str, ...]:
-        """Problems of the certificate, or without such problems the violations at the paper's points."""
+        """Problems of the certificate; if it has none, a line on violations at the paper's points, if any."""
         if self.certificate.problems or not any(self.violations):
             return self.certificate.problems
         return ("the path violates constraints at its sampled points",)
@@ -391,7 +393,7 @@ def parse_plan(
 
     >>> parse_plan('{"schema": "planfly.plan/2"}', "plan.json")
     Traceback (most recent call last):
-    world.errors.MissionError: plan.json: schema: "planfly.plan/2": Input should be 'planfly.plan/1' (and 11 more)
+    world.errors.MissionError: plan.json: schema: "planfly.plan/2": expected "planfly.plan/1" (and 11 more)
 
     Raises MissionError (or the scenario's own errors) with one line: file, field, value, allowed values.
     """
@@ -454,7 +456,7 @@ def _none_to_inf(value: float | None) -> float:
 
 
 def _reject_constant(name: str) -> float:
-    """Raise ValueError for NaN or Infinity, which Python's JSON reader accepts."""
+    """Raise ValueError for NaN, Infinity and -Infinity, which Python's JSON reader would otherwise accept."""
     raise ValueError(f"{name} is not a number")
 
 

@@ -43,7 +43,7 @@ class ClimbOut:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Descent:
-    """Approach: waypoints from the plan's end to the line-up, then the line-up and the landing point.
+    """Approach: waypoints from the plan's end to the line-up, a level leg, and a glide to the ground.
 
     waypoints: (n, 3) m, before the line-up.
     final_waypoints: (2, 3) m, two points at one altitude on the landing course; the glide begins at the second.
@@ -74,7 +74,10 @@ class DepartureAndApproach:
 
 
 def _lock_arrays(procedure: ClimbOut | Descent, *names: str) -> None:
-    """Replace the named arrays of a departure or approach by read-only copies; waypoints get the shape (n, 3)."""
+    """Replace the named arrays of a departure or approach by read-only copies.
+
+    `waypoints` and `final_waypoints` get the shape (n, 3), also if they are empty.
+    """
     for name in names:
         array = np.array(getattr(procedure, name), dtype=np.float64)
         array = array.reshape(-1, 3) if name in ("waypoints", "final_waypoints") else array

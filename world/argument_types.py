@@ -19,7 +19,7 @@ _Result = TypeVar("_Result")
 def checks_types(function: Callable[_Parameters, _Result]) -> Callable[_Parameters, _Result]:
     """Decorate a function of the API so that wrong argument types raise the ArgumentError of `check_types`.
 
-    The function has no options; for a function with options use `planfly.runtime.first_start.api_function`.
+    The function has no options; for a function with options use `planfly.api.api_function.api_function`.
 
     >>> @checks_types
     ... def read(log: str | Path) -> None: ...
@@ -90,8 +90,17 @@ def _expected_type(value: Any, annotation: Any) -> str | None:
     """
     classes, item_classes = _allowed_classes(annotation)
     if classes:
-        is_allowed = isinstance(value, classes) or _is_sequence_of(value, item_classes)
-        return None if is_allowed else _classes_text(classes, item_classes) + _hint(value, classes)
+        is_sequence = bool(item_classes) and isinstance(value, Sequence) and not isinstance(value, str | bytes)
+        if isinstance(value, classes) or (is_sequence and all(isinstance(item, item_classes) for item in value)):
+            return None
+        # Such as "a Plan, text or a path", with the remedy for a scenario where only a plan is allowed.
+        words: dict[type, str] = {str: "text", Path: "a path"}
+        names = [words.get(cls, f"a {cls.__name__}") for cls in classes if cls not in (NoneType, os.PathLike)]
+        names += ["a list of these"] if item_classes else []
+        text = " or ".join([*([", ".join(names[:-1])] if names[1:] else []), names[-1]])
+        if type(value).__name__ == "Scenario" and "Plan" in {allowed.__name__ for allowed in classes}:
+            text += "; planfly.plan makes a plan of a scenario, and planfly.plan_then_fly flies it"
+        return text
     if isinstance(annotation, type) and is_dataclass(annotation):
         return None if isinstance(value, annotation) else f"a {annotation.__name__}"
     members = get_args(annotation) if get_origin(annotation) in (Union, UnionType) else (annotation,)
@@ -104,20 +113,6 @@ def _expected_type(value: Any, annotation: Any) -> str | None:
     if kinds == {Sequence} and float not in get_args(members[0]):
         return None if isinstance(value, Iterable) and not isinstance(value, str | bytes) else "a list"
     return None
-
-
-def _hint(value: Any, classes: tuple[type, ...]) -> str:
-    """Return the remedy for a scenario where only a plan is allowed, as the end of a message; "" otherwise."""
-    is_scenario_for_plan = type(value).__name__ == "Scenario" and "Plan" in {allowed.__name__ for allowed in classes}
-    return (
-        "; planfly.plan makes a plan of a scenario, and planfly.plan_then_fly flies it" if is_scenario_for_plan else ""
-    )
-
-
-def _is_sequence_of(value: Any, classes: tuple[type, ...]) -> bool:
-    """Return True if a value is a sequence of instances of some classes, and is neither text nor bytes."""
-    is_sequence = isinstance(value, Sequence) and not isinstance(value, str | bytes)
-    return bool(classes) and is_sequence and all(isinstance(item, classes) for item in value)
 
 
 @functools.cache
@@ -140,11 +135,3 @@ def _allowed_classes(annotation: Any) -> tuple[tuple[type, ...], tuple[type, ...
         return (), ()
     item_classes = _allowed_classes(get_args(sequences[0])[0])[0] if sequences else ()
     return (*classes, *((os.PathLike,) if Path in classes else ())), item_classes
-
-
-def _classes_text(classes: Sequence[type], item_classes: Sequence[type]) -> str:
-    """List the names of classes for a message, such as "a Plan, text or a path"."""
-    words: dict[type, str] = {str: "text", Path: "a path"}
-    names = [words.get(cls, f"a {cls.__name__}") for cls in classes if cls not in (NoneType, os.PathLike)]
-    names += ["a list of these"] if item_classes else []
-    return " or ".join([*([", ".join(names[:-1])] if names[1:] else []), names[-1]])

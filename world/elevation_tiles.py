@@ -120,26 +120,26 @@ def join_tiles(tiles: Sequence[RasterFile], name: str) -> RasterFile:
                     ]
         return block
 
+    def to_pixels(
+        lon: NDArray[np.float64], lat: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the pixel coordinates (columns, rows) of positions in all tiles."""
+        col, row = first.to_pixels(lon, lat)
+        return col - left, row - top
+
     corners = np.concatenate([tile.corners for tile in tiles])
     digest = hashlib.sha256("".join(tile.sha256 for tile in tiles).encode("ascii")).hexdigest()
     return replace(
         first,
         name=name,
         shape=(rows, cols),
-        to_pixels=lambda lon, lat: _shift_pixels(first.to_pixels(lon, lat), -left, -top),
+        to_pixels=to_pixels,
         to_lon_lat=lambda col, row: first.to_lon_lat(col + left, row + top),
         corners=corners,
         sha256=digest,
         read=read,
         grid=shift_grid(first.grid, top, left),
     )
-
-
-def _shift_pixels(
-    pixels: tuple[NDArray[np.float64], NDArray[np.float64]], cols: int, rows: int
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return pixel coordinates (columns, rows) shifted by numbers of columns and rows."""
-    return pixels[0] + cols, pixels[1] + rows
 
 
 def _place_on_grid(first: RasterFile, tile: RasterFile) -> tuple[int, int]:

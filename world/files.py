@@ -111,7 +111,7 @@ def read_at_most(path: Path, max_bytes: int, kind: str) -> bytes:
     status = path.stat()
     file_text = f"{'an' if kind.startswith('a') else 'a'} {kind} file"
     if stat.S_ISREG(status.st_mode) and status.st_size > max_bytes:
-        raise ValueError(f"{status.st_size:,} bytes: {file_text} has at most {max_bytes:,}")
+        raise ValueError(f"{status.st_size:,} bytes: {file_text} has at most {max_bytes:,} bytes")
     if stat.S_ISDIR(status.st_mode):
         raise ValueError(f"{missing_text(path)}; expected {file_text}")
     is_shell_pipe = stat.S_ISFIFO(status.st_mode) and str(path).startswith(("/dev/fd/", "/dev/stdin", "/proc/self/fd/"))
@@ -120,7 +120,7 @@ def read_at_most(path: Path, max_bytes: int, kind: str) -> bytes:
     with path.open("rb") as file:
         data = file.read(max_bytes + 1)
     if len(data) > max_bytes:
-        raise ValueError(f"more than {max_bytes:,} bytes: a {kind} file has no more")
+        raise ValueError(f"more than {max_bytes:,} bytes: {file_text} has at most {max_bytes:,} bytes")
     return data
 
 
@@ -280,7 +280,12 @@ def write_atomically(path: Path, data: str | bytes) -> None:
     """
     content = data.encode("utf-8") if isinstance(data, str) else data
     try:
-        target = _resolve_link(path) if path.is_symlink() else path
+        target = path
+        if path.is_symlink():
+            try:
+                target = path.resolve()
+            except RuntimeError:
+                raise OSError(errno.ELOOP, os.strerror(errno.ELOOP)) from None
         # Limit the name by bytes: a file name has at most 255 bytes, and a letter takes up to four.
         name = target.name.encode()[:200].decode("utf-8", "ignore")
         temporary_path = target.with_name(f".{name}.{os.getpid()}-{os.urandom(4).hex()}")
@@ -329,14 +334,6 @@ def write_folder(path: Path, files: Mapping[str, bytes], kept_names: Iterable[st
         raise OSError(error.errno, error.strerror, str(path)) from error
 
 
-def _resolve_link(link: Path) -> Path:
-    """Return the target of a link. Raises OSError for a link that refers to itself."""
-    try:
-        return link.resolve()
-    except RuntimeError:
-        raise OSError(errno.ELOOP, os.strerror(errno.ELOOP)) from None
-
-
 @contextlib.contextmanager
 def temporary_folder(prefix: str) -> Iterator[Path]:
     """Make a temporary folder, and remove it with its contents at the end of the block.
@@ -353,7 +350,7 @@ def temporary_folder(prefix: str) -> Iterator[Path]:
 
 
 def remove_temporary_folders(process_id: int) -> bool:
-    """Remove the folders that a killed process made by `temporary_folder`; return True if none was left.
+    """Remove the folders that a killed process made by `temporary_folder`; return True if there were none.
 
     >>> with temporary_folder("planfly-") as folder:
     ...     remove_temporary_folders(os.getpid()), folder.exists()

@@ -65,7 +65,7 @@ def height_datum(crs: str | None, stated_datum: StatedDatum | None) -> HeightDat
     """
     if stated_datum is not None and not isinstance(stated_datum, str):
         return HeightDatum(
-            f"{_MEAN_SEA_LEVEL}, at {stated_datum:g} m of the file's heights as stated",
+            f"{_MEAN_SEA_LEVEL} (at {stated_datum:g} m in the file's heights, as stated)",
             lambda lon, _: np.full(np.shape(lon), stated_datum),
         )
     if stated_datum in ("egm96", "egm2008"):
@@ -75,9 +75,14 @@ def height_datum(crs: str | None, stated_datum: StatedDatum | None) -> HeightDat
         return HeightDatum(
             f"{_MEAN_SEA_LEVEL}, converted from the ellipsoid by {name}", _make_sea_level_function(transformer)
         )
-    if crs is not None and _is_depth(crs):
-        raise ValueError("heights are positive downwards, as depths")
-    name = "" if crs is None else _vertical_name(crs)
+    name = ""
+    if crs is not None:
+        from pyproj import CRS
+
+        system = CRS.from_user_input(crs)
+        if any(axis.direction == "down" for axis in system.axis_info):
+            raise ValueError("heights are positive downwards, as depths")
+        name = next((part.name for part in system.sub_crs_list if part.is_vertical), "")
     return HeightDatum(f"{_MEAN_SEA_LEVEL} ({name}, as the file states)" if name else UNSTATED)
 
 
@@ -112,17 +117,3 @@ def _find_geoid() -> tuple[str, Any]:
             if TransformerGroup("EPSG:4979", target, always_xy=True).best_available:
                 return name, Transformer.from_crs("EPSG:4979", target, always_xy=True, only_best=True)
     raise ValueError("heights are above the ellipsoid, and no geoid grid is available")
-
-
-def _is_depth(crs: str) -> bool:
-    """Return True if a reference system states depths, which are positive downwards."""
-    from pyproj import CRS
-
-    return any(axis.direction == "down" for axis in CRS.from_user_input(crs).axis_info)
-
-
-def _vertical_name(crs: str) -> str:
-    """Return the name of the vertical part of a reference system; "" without one."""
-    from pyproj import CRS
-
-    return next((part.name for part in CRS.from_user_input(crs).sub_crs_list if part.is_vertical), "")

@@ -196,7 +196,7 @@ class _Window:
 
     @classmethod
     def around(cls, file: Path, source: Any, origin: GeoOrigin, area: BaseGeometry) -> "_Window":
-        """Make the window of an open raster around an area on the map.
+        """Make the window of an open raster that encloses an area on the map.
 
         Raises PlanflyError if the raster's reference system is unknown or tears the area apart, or if the window is too
         large.

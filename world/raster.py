@@ -104,7 +104,7 @@ def open_npz(file: Path, name: str) -> RasterFile:
     """Open an .npz file of heights. Raises TerrainError for any other file.
 
     The file has `elevation` (rows from north to south) and xmin, xmax, ymin, ymax: pixel edges in degrees. The two
-    values of a pair may be in any order, except in the tile that planfly ships; see `open_npz`.
+    values of a pair may be in any order, except in the tile that planfly ships.
     """
     heights, edges = _read_npz(file, name)
     if heights.ndim != 2 or heights.dtype.kind not in "iuf":
@@ -375,7 +375,10 @@ def _convert_to_sea_level(heights: NDArray[np.float32], raster: RasterFile, top:
 
 
 def _pixels_per_metre(to_pixel: PolyMap, box: Floats) -> Floats:
-    """Return the derivative of columns and rows (pixels) by east and north (m) at the centre of a box, (2, 2)."""
+    """Return how fast the pixel coordinates change with the map position at the centre of a box, (2, 2).
+
+    Row 0 has the derivatives of the column by east and by north, pixels per m; row 1 has those of the row.
+    """
     centre = box.mean(axis=1)
     col, row = to_pixel(centre[0] + np.array([0.0, 100.0, 0.0]), centre[1] + np.array([0.0, 0.0, 100.0]))
     return np.array([[col[1] - col[0], col[2] - col[0]], [row[1] - row[0], row[2] - row[0]]]) / 100.0

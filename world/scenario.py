@@ -223,7 +223,19 @@ class Scenario:
     @property
     def notes(self) -> tuple[str, ...]:
         """Notes on zones that were changed or omitted, on inactive zones, and on implausibly small threats."""
-        notes = [*(self.spec.zone_notes or ()), *self._small_threat_notes()]
+        # One note on threats whose radius is so small that it may be in kilometres.
+        threats = self.threats
+        small_radii = [
+            f"the {kind} radius of {name} is {radius:g} m"
+            for kind, radii in (("kill", threats.kill_radius), ("detection", threats.detection_radius))
+            for name, radius in zip(threats.names, radii.tolist(), strict=True)
+            if 0.0 < radius < MIN_PLAUSIBLE_RADIUS_M
+        ]
+        small_threat_notes = []
+        if small_radii:
+            others = f" (and {len(small_radii) - 1} more)" if len(small_radii) > 1 else ""
+            small_threat_notes = [f"{small_radii[0]}{others}: radii are in metres, not kilometres"]
+        notes = [*(self.spec.zone_notes or ()), *small_threat_notes]
         timed_tables = [table for table in self.spec.zones or () if table.times]
         if timed_tables and self.spec.at is None:
             count = "1 zone has times of activity, but is treated as active"
@@ -236,23 +248,9 @@ class Scenario:
             verb = "is" if inactive_count == 1 else "are"
             notes.append(
                 f"{inactive_count:,} of {len(timed_tables):,} zones with times of activity {verb} "
-                f"not active {span} UTC: ignored"
+                f"not active from {span} UTC and {verb} ignored"
             )
         return tuple(notes)
-
-    def _small_threat_notes(self) -> list[str]:
-        """Return at most one note, on threats whose radius is so small that it may be in kilometres."""
-        threats = self.threats
-        small_radii = [
-            f"the {kind} radius of {name} is {radius:g} m"
-            for kind, radii in (("kill", threats.kill_radius), ("detection", threats.detection_radius))
-            for name, radius in zip(threats.names, radii.tolist(), strict=True)
-            if 0.0 < radius < MIN_PLAUSIBLE_RADIUS_M
-        ]
-        if not small_radii:
-            return []
-        others = f" (and {len(small_radii) - 1} more)" if len(small_radii) > 1 else ""
-        return [f"{small_radii[0]}{others}: radii are in metres, not kilometres"]
 
     def __repr__(self) -> str:
         """Return a short description: name, distance, and numbers of threats and zones."""
@@ -350,19 +348,16 @@ def load_scenario(name_or_path: str, terrain: str | None = None) -> Scenario:
     except OSError:  # a name that is too long
         is_missing = True
     if is_missing:
-        suggestion = did_you_mean(name_or_path, [*names, *_sibling_toml_files(path)])
+        # Files for a suggestion; relative if the path is relative.
+        try:
+            sibling_files = [str(file) for file in sorted(path.parent.glob("*.toml"))]
+        except OSError:
+            sibling_files = []
+        suggestion = did_you_mean(name_or_path, [*names, *sibling_files])
         message = f"{name_or_path}: no such file, and not a built-in scenario ({', '.join(names)}){suggestion}"
         raise ScenarioError(message, file=name_or_path)
     spec = parse_scenario(read_scenario_text(path), str(path))
     return scenario_from_spec(spec, str(path), base=path.parent, terrain=terrain)
-
-
-def _sibling_toml_files(missing_file: Path) -> list[str]:
-    """Return the .toml files in the folder of a missing file, for a suggestion; relative if its path is relative."""
-    try:
-        return [str(file) for file in sorted(missing_file.parent.glob("*.toml"))]
-    except OSError:
-        return []
 
 
 def embedded_names() -> list[str]:
@@ -494,7 +489,7 @@ def _with_file_zones(
     if far_count := len(file_zones.zones) - len(zones_nearby):
         notes.append(
             f"{source}: {far_count:,} of {count_text(len(file_zones.zones), 'zone')} lie more than "
-            f"{MAX_ZONE_DISTANCE / 1000.0:g} km from the area: ignored"
+            f"{MAX_ZONE_DISTANCE / 1000.0:g} km from the area and are ignored"
         )
     changes = {"zones": [*(spec.zones or ()), *zones_nearby] or None, "zone_notes": notes or None}
     return spec.model_copy(update=changes)
@@ -904,7 +899,9 @@ def with_zones(scenario: Scenario, tables: Sequence[ZoneTable], source: str, not
     added_tables = (spec.zones or [])[previous_count:]
     if previous_count + len(added_tables) > MAX_ZONES:
         added_text = count_text(len(added_tables), "zone")
-        raise ScenarioError(f"{source}: {added_text} more: at most {MAX_ZONES:,} in all", file=source)
+        raise ScenarioError(
+            f"{source}: {added_text} cannot be added: a scenario has at most {MAX_ZONES:,} zones", file=source
+        )
     active_tables = _active_zones(spec.model_copy(update={"zones": added_tables}))
     zones = make_zones(active_tables, source, scenario.origin, scenario.terrain)
     ends = (("start", scenario.start), ("destination", scenario.destination))

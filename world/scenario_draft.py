@@ -269,7 +269,7 @@ def _terrain_text(draft: Draft) -> str:
 [terrain]
 kind = "dem"
 {_entry_line("path", _quote(draft.terrain), comment)}
-{_entry_line("# vertical_error_m", "5", "as stated by its source; clearance is then also shown minus this")}
+{_entry_line("# vertical_error_m", "5", "as its source states it; clearance is then also shown minus this error")}
 """
 
 
@@ -369,9 +369,9 @@ def _examples_text(draft: Draft) -> str:
 # lat_deg = {zone.lat:.5f}
 # lon_deg = {zone.lon:.5f}
 {_entry_line("# radius_m", _number_text(radius))}
-{_entry_line("# ceiling_agl_m", "300", "it may be flown over above this height above ground")}
+{_entry_line("# ceiling_agl_m", "300", "height above ground up to which the zone reaches")}
 
-# Requirements on the way home.
+# Requirements on the return from every point of the route.
 # [returns]
 # require = ["rtl", "glide"]  # from anywhere on the route a return to launch must be safe, and the engine may fail
 """

@@ -31,7 +31,8 @@ def parse_scenario(text: str, source: str) -> ScenarioFile:
         data = toml_table(text)
     # ValueError includes TOMLDecodeError, numbers of thousands of digits, and deeply nested brackets.
     except ValueError as error:
-        raise ScenarioError(f"{source}: not valid TOML: {_first_line(error)}", file=source) from error
+        first_line = str(error).splitlines()[0]
+        raise ScenarioError(f"{source}: not valid TOML: {first_line}", file=source) from error
     terrain = data.get("terrain")
     if isinstance(terrain, dict) and terrain.get("kind") == "none":
         raise ScenarioError(
@@ -204,7 +205,8 @@ _ENDS = (("start",), ("destination",))
 def _remaining_faults_text(errors: Sequence[Any]) -> str:
     """Describe the errors after the first as the end of a message.
 
-    The text has the names of the missing keys if all errors are missing keys, or else the number of errors.
+    The text has the names of the missing keys if all errors are missing keys, or else the number of errors. It is "" if
+    all errors concern one value, for which pydantic reports an error for each allowed type.
     """
     if len({error_entry["loc"][:2] for error_entry in errors}) < 2 and errors[0]["loc"] not in _ENDS:
         return ""
@@ -265,8 +267,3 @@ def _value_text(value: Any) -> str:
         return str(value)
     text = json.dumps(value, default=str)
     return text if len(text) <= 60 else text[:57] + "..."
-
-
-def _first_line(error: BaseException) -> str:
-    """Return the first line of an error's text."""
-    return str(error).splitlines()[0]

@@ -374,8 +374,9 @@ class LimitsTable(ScenarioTable):
     """[limits]: a number, or "aircraft" for the limit of the flight envelope.
 
     corridor_m: half width of the corridor about the legs; None for the width that the autopilot needs.
-    surveys: "lines" to judge parallel lines as the photo lines of a survey and leave the turn-arounds to the autopilot,
-    "path" to judge them as any other path; None for "lines" where the mission triggers its camera on them.
+    surveys: how parallel lines are judged. "lines" judges them as the photo lines of a survey, and leaves the
+    turn-arounds to the autopilot; "path" judges them as any other path. None means "lines" where the mission triggers
+    its camera on them.
     max_height_m: largest height above ground; None for no limit.
     """
 
@@ -544,8 +545,9 @@ class FlightTable(ScenarioTable):
 class WindTable(ScenarioTable):
     """[wind]: gradient in m/s per metre of height above the start.
 
-    forecast: file of a weather forecast, which states the wind instead; speed_mps, from_deg and gradient are then those
-    of its mean profile around the start, and a scenario file must not state them.
+    forecast: file of a weather forecast, which states the wind instead. A scenario file then must not state speed_mps,
+    from_deg and gradient; planfly sets them to those of the forecast's mean profile around the start.
+
     """
 
     speed_mps: Annotated[float, in_range(0.0, 40.0)] = 0.0
@@ -787,7 +789,7 @@ class ScenarioFile(ScenarioTable):
     def _check_area(self) -> "ScenarioFile":
         """Raise ValueError if the area is missing and there is no elevation file to take it from."""
         if self.area is None and self.terrain.kind != "dem":
-            raise ValueError(f'area: missing; terrain kind "{self.terrain.kind}" implies none')
+            raise ValueError(f'area: missing; terrain of kind "{self.terrain.kind}" does not imply an area')
         return self
 
     @model_validator(mode="after")

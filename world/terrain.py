@@ -238,8 +238,8 @@ def _piece_clearance(
 
     col0, row0, up0, col1, row1, up1: ends of the piece, in fractional pixels and m AMSL.
 
-    The height is NaN if the piece leaves the data. Within a pixel cell the height above the bilinearly interpolated
-    ground is a parabola.
+    The height is NaN if the piece leaves the data. The piece is followed from one pixel boundary to the next. Between
+    two boundaries, the height above the bilinearly interpolated ground is a parabola, whose lowest point is computed.
     """
     delta_col, delta_row, delta_up = col1 - col0, row1 - row0, up1 - up0
     start_fraction = 0.0

@@ -84,17 +84,6 @@ def cut_from_files(source: Path, box: Box, out: Path) -> CutTerrain:
     the area, have no data in it, or cannot be read.
     """
     raster = open_raster(str(source))
-    top, bottom, left, right = _window(raster, box)
-    heights = raster.read(top, bottom, left, right)
-    _write_geotiff(out, heights, shift_grid(raster.grid, top, left), raster.crs or "EPSG:4326")
-    return CutTerrain(out, (bottom - top, right - left), (raster.name,), (), _count_empty(heights), 0)
-
-
-def _window(raster: RasterFile, box: Box) -> tuple[int, int, int, int]:
-    """Return the window of rows and columns that covers an area: top, bottom, left, right.
-
-    Raises TerrainError if the raster does not cover the area.
-    """
     col, row = raster.to_pixels(*_box_outline(box))
     rows, cols = raster.shape
     if not (col.min() >= 0.0 and row.min() >= 0.0 and col.max() <= cols - 1 and row.max() <= rows - 1):
@@ -104,7 +93,10 @@ def _window(raster: RasterFile, box: Box) -> tuple[int, int, int, int]:
             f"{raster.name}: does not cover {area_text}", file=raster.name, field="area", value=tuple(box)
         )
     top, left = max(0, math.floor(row.min()) - 1), max(0, math.floor(col.min()) - 1)
-    return top, min(rows, math.ceil(row.max()) + 2), left, min(cols, math.ceil(col.max()) + 2)
+    bottom, right = min(rows, math.ceil(row.max()) + 2), min(cols, math.ceil(col.max()) + 2)
+    heights = raster.read(top, bottom, left, right)
+    _write_geotiff(out, heights, shift_grid(raster.grid, top, left), raster.crs or "EPSG:4326")
+    return CutTerrain(out, (bottom - top, right - left), (raster.name,), (), _count_empty(heights), 0)
 
 
 def _box_outline(box: Box) -> tuple[Floats, Floats]:
@@ -208,7 +200,15 @@ def cut_from_server(server: str, box: Box, out: Path, cache: Path, progress: Cut
     heights, grid = _merge_tiles(tiles, box)
     absent_degrees = tuple(degree for degree, remote in remote_files.items() if remote is None)
     if sea:
-        _fill_sea(heights, grid, absent_degrees)
+        dx, _, west, _, dy, north = grid
+        lon, lat = west + (np.arange(heights.shape[1]) + 0.5) * dx, north + (np.arange(len(heights)) + 0.5) * dy
+        for south_degree, west_degree in absent_degrees:
+            # Tiles reach half a pixel beyond their degree; one pixel is added.
+            is_in_columns = np.abs((lon - west_degree - 0.5 + 180.0) % 360.0 - 180.0) <= 0.5 + abs(dx)
+            is_in_rows = np.abs(lat - south_degree - 0.5) <= 0.5 + abs(dy)
+            degree_heights = heights[np.ix_(is_in_rows, is_in_columns)]
+            degree_heights[np.isnan(degree_heights)] = 0.0
+            heights[np.ix_(is_in_rows, is_in_columns)] = degree_heights
     _write_geotiff(out, heights, grid, _SYSTEM)
     rows, cols = heights.shape
     names = tuple(tile_name(*degree) for degree in remotes)
@@ -389,20 +389,3 @@ def _interpolate(tile_heights: Heights, row: Floats, col: Floats) -> Heights:
     upper = blend(tile_heights[np.ix_(r0, c0)], tile_heights[np.ix_(r0, c1)], col_fractions)
     lower = blend(tile_heights[np.ix_(r1, c0)], tile_heights[np.ix_(r1, c1)], col_fractions)
     return blend(upper.astype(np.float32), lower.astype(np.float32), row_fractions).astype(np.float32)
-
-
-def _fill_sea(heights: Heights, grid: Sequence[float], sea_degrees: Sequence[tuple[int, int]]) -> None:
-    """Set missing heights to 0 m, in place, in the one-degree squares that are sea.
-
-    grid: affine coefficients that convert columns and rows to longitude and latitude.
-    sea_degrees: latitude and longitude of the south-west corners of these squares.
-    """
-    dx, _, west, _, dy, north = grid
-    lon, lat = west + (np.arange(heights.shape[1]) + 0.5) * dx, north + (np.arange(len(heights)) + 0.5) * dy
-    for south_degree, west_degree in sea_degrees:
-        # Tiles reach half a pixel beyond their degree; one pixel is added.
-        columns = np.abs((lon - west_degree - 0.5 + 180.0) % 360.0 - 180.0) <= 0.5 + abs(dx)
-        rows = np.abs(lat - south_degree - 0.5) <= 0.5 + abs(dy)
-        degree_heights = heights[np.ix_(rows, columns)]
-        degree_heights[np.isnan(degree_heights)] = 0.0
-        heights[np.ix_(rows, columns)] = degree_heights

@@ -45,7 +45,16 @@ def airspeed_scale(signals: Signals, flow: Flow) -> tuple[float, float]:
     """
     from scipy.signal import lfilter
 
-    north_air, east_air = _air_velocity(signals, flow)
+    # Velocity through the air.
+    roll, pitch, yaw = signals.attitude.T
+    u = signals.airspeed * np.cos(flow.alpha) * np.cos(flow.beta)
+    v = signals.airspeed * np.sin(flow.beta)
+    w = signals.airspeed * np.sin(flow.alpha) * np.cos(flow.beta)
+    # Components with wings level, then with wings and nose level.
+    wings_level_down = v * np.sin(roll) + w * np.cos(roll)
+    right = v * np.cos(roll) - w * np.sin(roll)
+    forward = u * np.cos(pitch) + wings_level_down * np.sin(pitch)
+    north_air, east_air = forward * np.cos(yaw) - right * np.sin(yaw), forward * np.sin(yaw) + right * np.cos(yaw)
     thin_signals = signals.thin(_THINNING, {"north_air": north_air, "east_air": east_air})
     north_air, east_air = thin_signals.extra["north_air"], thin_signals.extra["east_air"]
     north, east, _ = thin_signals.velocity.T
@@ -85,16 +94,3 @@ def airspeed_scale(signals: Signals, flow: Flow) -> tuple[float, float]:
     blocks = np.concatenate([thin_signals.block, thin_signals.block + thin_signals.block.max() + 1])
     fit = fit_with_prior(regressors, targets, np.zeros(len(sds)), sds, blocks)
     return 1.0 + float(fit.estimate[0]), float(np.hypot(_MIN_SD, np.sqrt(fit.covariance[0, 0])))
-
-
-def _air_velocity(signals: Signals, flow: Flow) -> tuple[Floats, Floats]:
-    """Return the north and the east component of the velocity through the air, m/s, two arrays (n,)."""
-    roll, pitch, yaw = signals.attitude.T
-    u = signals.airspeed * np.cos(flow.alpha) * np.cos(flow.beta)
-    v = signals.airspeed * np.sin(flow.beta)
-    w = signals.airspeed * np.sin(flow.alpha) * np.cos(flow.beta)
-    # Components with wings level, then with wings and nose level.
-    wings_level_down = v * np.sin(roll) + w * np.cos(roll)
-    right = v * np.cos(roll) - w * np.sin(roll)
-    forward = u * np.cos(pitch) + wings_level_down * np.sin(pitch)
-    return forward * np.cos(yaw) - right * np.sin(yaw), forward * np.sin(yaw) + right * np.cos(yaw)

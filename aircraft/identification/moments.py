@@ -48,12 +48,18 @@ def fit_moments(
     terms = _moment_regressors(thin_signals, base)
     fits = {}
     ixx, iyy, izz, _ = base.inertia
+    rows = np.arange(len(thin_signals.airspeed))
     for axis, inertia, length in zip(AXES, (iyy, ixx, izz), (base.chord, base.span, base.span), strict=True):
         known_part, *columns = terms[axis]
         parameters = [parameter for parameter in PARAMETERS if parameter.group == axis]
         means, sds = [parameter.prior for parameter in parameters], [parameter.sd for parameter in parameters]
-        # With a single record, the parameter "pitch-offset" is the trim offset in pitch.
-        trims = _record_indicators(thin_signals) if axis != "pitch" or len(thin_signals.edges) > 2 else []
+        # A trim is a column that is 1 in its record and 0 elsewhere.  With a single record, the parameter
+        # "pitch-offset" is the trim offset in pitch.
+        ranges = zip(thin_signals.edges[:-1], thin_signals.edges[1:], strict=True)
+        if axis == "pitch" and len(thin_signals.edges) <= 2:
+            trims = []
+        else:
+            trims = [((rows >= start_row) & (rows < end_row)).astype(float) for start_row, end_row in ranges]
         columns, means, sds = [*columns, *trims], [*means, *(0.0 for _ in trims)], [*sds, *(_TRIM_SD for _ in trims)]
         scale = pressure * length / inertia
         equation = np.column_stack(
@@ -64,15 +70,6 @@ def fit_moments(
             equation[:, 1:], equation[:, 0], np.array(means), prior_factor * np.array(sds), thin_signals.block
         )
     return fits
-
-
-def _record_indicators(signals: Signals) -> list[Floats]:
-    """Return for each record a column (n,) that is 1 in this record and 0 elsewhere."""
-    rows = np.arange(len(signals.airspeed))
-    return [
-        ((rows >= start_row) & (rows < end_row)).astype(float)
-        for start_row, end_row in zip(signals.edges[:-1], signals.edges[1:], strict=True)
-    ]
 
 
 def required_moments(signals: Signals, base: BaseModel, motor: Motor) -> dict[Group, Floats]:

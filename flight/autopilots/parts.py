@@ -525,6 +525,12 @@ PX4_DEFAULT_LIMITS = FeasibilityLimits()
 MissionDialect = Literal["planfly", "ardupilot", "px4"]
 
 
+# No lambda, because an autopilot keeps its `checks`, and is pickled for the processes of a campaign.
+def _no_unsimulated_settings(mission: MissionParts) -> list[str]:
+    """Return no sentence, because all settings are simulated."""
+    return []
+
+
 @dataclass(frozen=True)
 class MissionChecks:
     """Reading and checks of missions, and the settings on which they depend; by default nothing is refused.
@@ -552,7 +558,7 @@ class MissionChecks:
     any_inclusion_suffices: bool = False
     battery_failsafes: tuple[BatteryFailsafe, ...] = ()
     return_time_failsafe: ReturnTimeFailsafe | None = None
-    describe_unsimulated_settings: Callable[[MissionParts], list[str]] = lambda mission: []
+    describe_unsimulated_settings: Callable[[MissionParts], list[str]] = _no_unsimulated_settings
     parameter_notes: tuple[str, ...] = ()
 
 

@@ -147,7 +147,24 @@ class CompiledModel:
         for round_number in range(PROOF_STEPS // _PROOF_STRIDE):
             if differing:
                 break
-            self._perturb_inputs(initial_numbers, round_number)
+            # Perturb commands and gusts equally in JSBSim and in the compiled model, with new signs in each round. In
+            # the later rounds the ground touches the contacts.
+            perturbations = [_PROOF_SURFACE_RAD] * 3 + [_PROOF_THROTTLE] + [_PROOF_GUST_FPS] * 3
+            scales = [command.above for command in self._fdm.aircraft.model.commands] + [1.0] * 3
+            names = [*(command.name for command in self._fdm.aircraft.model.commands), *GUST]
+            for k, (name, perturbation, scale) in enumerate(zip(names, perturbations, scales, strict=True)):
+                # A Gray code of five bits gives the signs: from one round to the next only one bit changes. The last
+                # two of the seven inputs (two gusts) share the bits of the first two.
+                sign = 1.0 if (round_number ^ (round_number >> 1)) >> k % 5 & 1 else -1.0
+                register = self.properties[name]
+                self.numbers[register] = initial_numbers[register] + sign * perturbation * scale
+                self._fdm.properties.set(name, self.numbers[register])
+            if len(self.contacts) and round_number >= _PROOF_GROUND_ROUND:
+                # The ground is raised until the lowest point of the aircraft touches it.
+                depths = (self.contacts["arm"] @ self.frames[0].local_to_body)[:, 2]
+                frame = self.frames[0]
+                frame.terrain = frame.geodetic_altitude - float(depths.max()) + _PROOF_DEPTH_FT
+                self._fdm.properties.set(TERRAIN, frame.terrain)
             self._fdm.step(_PROOF_STRIDE)
             step_repeatedly(*self.arrays, _PROOF_STRIDE)
             differing = self.differing_properties()
@@ -204,11 +221,15 @@ class CompiledModel:
                 )
             numbers[force.axes : force.axes + len(axes)] = axes
         for block in self._program.actuators:
-            numbers[block.first_register : block.first_register + LOWER_LIMIT] = _actuator_numbers(
-                numbers[block.source], *block[2:], frame.dt
-            )
+            # The registers of an actuator up to `LOWER_LIMIT`, with its output equal to its input.
+            output, lag = numbers[block.source], frame.dt * block.lag
+            numbers[block.first_register : block.first_register + LOWER_LIMIT] = [
+                *[output] * 3,
+                lag / (2.0 + lag),
+                (2.0 - lag) / (2.0 + lag),
+                frame.dt * block.rate,
+            ]
         # JSBSim has no property for the friction forces of a contact on the ground.
-        read_property, frame = self._fdm.properties.read, self.frames[0]
         frame.centre, frame.terrain = centre, self._fdm.terrain_amsl / FOOT
         for contact, data in zip(self.contacts, self._program.contacts, strict=True):
             if read_property(f"{data.base}/WOW"):
@@ -220,30 +241,6 @@ class CompiledModel:
         arms = np.linalg.norm(self.contacts["arm"], axis=1)
         frame.contact_reach = float(np.max(arms, initial=0.0)) + _REACH_MARGIN_FT
         initialise_attitude(self.frames, self._fdm.attitudes())
-
-    def _perturb_inputs(self, initial_registers: Floats, round_number: int) -> None:
-        """Perturb commands and gusts equally in JSBSim and in the compiled model, with new signs in each round.
-
-        From round `_PROOF_GROUND_ROUND` on, the ground touches the contacts of a model that has any.
-
-        initial_registers: values of the compiled model's registers before the first round.
-        """
-        perturbations = [_PROOF_SURFACE_RAD] * 3 + [_PROOF_THROTTLE] + [_PROOF_GUST_FPS] * 3
-        scales = [command.above for command in self._fdm.aircraft.model.commands] + [1.0] * 3
-        names = [*(command.name for command in self._fdm.aircraft.model.commands), *GUST]
-        for k, (name, perturbation, scale) in enumerate(zip(names, perturbations, scales, strict=True)):
-            # A Gray code of five bits gives the signs: from one round to the next only one bit changes. The last two
-            # of the seven inputs (two gusts) share the bits of the first two.
-            sign = 1.0 if (round_number ^ (round_number >> 1)) >> k % 5 & 1 else -1.0
-            register = self.properties[name]
-            self.numbers[register] = initial_registers[register] + sign * perturbation * scale
-            self._fdm.properties.set(name, self.numbers[register])
-        if len(self.contacts) and round_number >= _PROOF_GROUND_ROUND:
-            # The ground is raised until the lowest point of the aircraft touches it.
-            depths = (self.contacts["arm"] @ self.frames[0].local_to_body)[:, 2]
-            frame = self.frames[0]
-            frame.terrain = frame.geodetic_altitude - float(depths.max()) + _PROOF_DEPTH_FT
-            self._fdm.properties.set(TERRAIN, frame.terrain)
 
     def differing_properties(self) -> list[str]:
         """Return the properties that currently differ in any bit."""
@@ -288,15 +285,3 @@ def _inertia_matrices(xx: float, yy: float, zz: float, xy: float, xz: float, yz:
     k4, k5, k6 = (zz * xx - ixz * ixz) * factor, (xy * ixz + yz * xx) * factor, (xx * yy - xy * xy) * factor
     matrix = [[xx, -xy, -ixz], [-xy, yy, -yz], [-ixz, -yz, zz]]
     return np.array(matrix), np.array([[k1, k2, k3], [k2, k4, k5], [k3, k5, k6]])
-
-
-def _actuator_numbers(source: float, lag: float, rate: float, dt: float) -> list[float]:
-    """Return the registers of an actuator up to `LOWER_LIMIT`, with its output equal to its input.
-
-    source: input of the actuator.
-    lag: rate of the lag, 1/s; NaN without a lag.
-    rate: rate limit, 1/s.
-    dt: time step, s.
-    """
-    divisor = 2.0 + dt * lag
-    return [source, source, source, dt * lag / divisor, (2.0 - dt * lag) / divisor, dt * rate]

@@ -59,7 +59,7 @@ class _Reader:
         self._parser = expat.ParserCreate()
         self._parser.StartElementHandler = self._start_element
         self._parser.EndElementHandler = self._end_element
-        self._parser.CharacterDataHandler = self._collect_text
+        self._parser.CharacterDataHandler = lambda text: self._text.append(text)
         self._parser.StartDoctypeDeclHandler = self._check_doctype
 
     def read(self) -> None:
@@ -145,10 +145,6 @@ class _Reader:
             self.created_names.add(match[1])
         elif name in _READING_ELEMENTS:
             self.used_names.setdefault(match[1], self._parser.CurrentLineNumber)
-
-    def _collect_text(self, text: str) -> None:
-        """Keep a piece of an element's text until the element ends."""
-        self._text.append(text)
 
 
 def check_model(

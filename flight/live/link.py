@@ -461,7 +461,13 @@ class Link:
                 self.dropped.others += 1
                 continue
             if self._signing is not None and (reason := self._signing.find_refusal(frame, self._wall())):
-                self._count_dropped(reason)
+                dropped = self.dropped
+                dropped.unsigned += reason is RefusalReason.UNSIGNED
+                dropped.forged += reason is RefusalReason.FORGED
+                dropped.replayed += reason is RefusalReason.REPLAYED
+                dropped.old += reason is RefusalReason.OLD
+                dropped.future += reason is RefusalReason.FUTURE
+                dropped.streams += reason is RefusalReason.STREAMS
                 if reason is RefusalReason.FUTURE:
                     self._notice_clock_ahead(source[0])
                 continue
@@ -511,16 +517,6 @@ class Link:
         """Return the notices about senders that are not answered, and clear them."""
         notices, self._notices = self._notices, []
         return notices
-
-    def _count_dropped(self, reason: RefusalReason) -> None:
-        """Count a frame that was dropped because of its signature."""
-        dropped = self.dropped
-        dropped.unsigned += reason is RefusalReason.UNSIGNED
-        dropped.forged += reason is RefusalReason.FORGED
-        dropped.replayed += reason is RefusalReason.REPLAYED
-        dropped.old += reason is RefusalReason.OLD
-        dropped.future += reason is RefusalReason.FUTURE
-        dropped.streams += reason is RefusalReason.STREAMS
 
     def _register_peer(self, source: Address, system: int, component: int) -> Peer | None:
         """Return the station at an address, which may be new; None if the table of stations is full.

@@ -136,8 +136,13 @@ def uploaded_mission(lists: dict[MissionType, tuple[MissionItem, ...]], vehicle_
     """
     items = lists[MissionType.MISSION]
     home = vehicle_home
-    if items and _is_home(items[0]):
-        home_item = items[0]
+    home_item = items[0] if items else None
+    if (
+        home_item is not None
+        and home_item.command == Command.NAV_WAYPOINT
+        and is_located(home_item.command, home_item.frame)
+        and (home_item.frame in AMSL or not any(home_item.params))
+    ):
         home = Home(home_item.lat_deg, home_item.lon_deg, home_item.alt) if home_item.has_position else vehicle_home
         items = items[1:]
         shift = 0
@@ -151,13 +156,6 @@ def uploaded_mission(lists: dict[MissionType, tuple[MissionItem, ...]], vehicle_
         source="upload",
     )
     return renumber_items(mission), shift
-
-
-def _is_home(item: MissionItem) -> bool:
-    """Return True if item 0 of an upload is home: a waypoint with an altitude AMSL or without parameters."""
-    if item.command != Command.NAV_WAYPOINT or not is_located(item.command, item.frame):
-        return False
-    return item.frame in AMSL or not any(item.params)
 
 
 def mission_lists(mission: Mission) -> tuple[tuple[MissionItem, ...], ...]:
@@ -492,10 +490,6 @@ class MissionServer:
         )
         return [MissionReply(station, item)]
 
-    def _on_clear_request(self, message: Any, station: Station, kind: MissionType, now: float) -> list[MissionReply]:
-        """Clear the list that MISSION_CLEAR_ALL names."""
-        return self._clear_lists(station, (kind,), kind, now)
-
     def _clear_lists(
         self, station: Station, kinds: tuple[MissionType, ...], acknowledged_type: int, now: float
     ) -> list[MissionReply]:
@@ -583,6 +577,6 @@ _HANDLERS = {
     "MISSION_REQUEST_LIST": MissionServer._send_count,
     "MISSION_REQUEST_INT": MissionServer._send_item,
     "MISSION_REQUEST": MissionServer._send_item,
-    "MISSION_CLEAR_ALL": MissionServer._on_clear_request,
+    "MISSION_CLEAR_ALL": lambda server, _message, station, kind, now: server._clear_lists(station, (kind,), kind, now),
     "MISSION_ACK": MissionServer._cancel_upload,
 }

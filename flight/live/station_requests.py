@@ -275,7 +275,14 @@ class Requests:
                 reply, command = self.arming.set_mode(int(message.custom_mode)), mavlink.MAVLINK_MSG_ID_SET_MODE
                 return self._acknowledge(peer, message.get_srcSystem(), message.get_srcComponent(), command, reply)
             case "MISSION_SET_CURRENT":
-                return self._on_mission_set_current(message, peer, now)
+                reply = self.set_start_item(int(message.seq))
+                if reply.result == ACCEPTED:
+                    return [PeerMessage(peer, telemetry_message("MISSION_CURRENT", self.status))]
+                # MISSION_SET_CURRENT cannot be refused, and MAVSDK repeats it at each MISSION_CURRENT of another item,
+                # without end. MAVSDK gives up if no MISSION_CURRENT arrives during its timeout. A MISSION_CURRENT that
+                # was sent before the refusal still causes one repetition.
+                peer.due["MISSION_CURRENT"] = now + _MISSION_CURRENT_PAUSE_S
+                return [StatusText(reply.text, WARNING)]
             case "SET_POSITION_TARGET_GLOBAL_INT" | "SET_POSITION_TARGET_LOCAL_NED":
                 return [StatusText(_NO_GUIDED_TARGET_TEXT, WARNING)]
             case "REQUEST_DATA_STREAM":
@@ -395,20 +402,6 @@ class Requests:
             peer.periods[name] = min(_MAX_PERIOD_S, max(_MIN_PERIOD_S, interval / 1e6)) if interval else PERIODS[name]
             peer.due[name] = now
         return CommandResult(ACCEPTED)
-
-    def _on_mission_set_current(self, message: Any, peer: Peer, now: float) -> list[Response]:
-        """Set the item at which the mission starts or continues (MISSION_SET_CURRENT).
-
-        After a refusal the station gets no MISSION_CURRENT for `_MISSION_CURRENT_PAUSE_S`.
-        """
-        reply = self.set_start_item(int(message.seq))
-        if reply.result == ACCEPTED:
-            return [PeerMessage(peer, telemetry_message("MISSION_CURRENT", self.status))]
-        # MISSION_SET_CURRENT cannot be refused, and MAVSDK repeats it at each MISSION_CURRENT of another item, without
-        # end. MAVSDK gives up if no MISSION_CURRENT arrives during its timeout. A MISSION_CURRENT that was sent before
-        # the refusal still causes one repetition.
-        peer.due["MISSION_CURRENT"] = now + _MISSION_CURRENT_PAUSE_S
-        return [StatusText(reply.text, WARNING)]
 
     @staticmethod
     def _acknowledge(peer: Peer, system: int, component: int, number: int, reply: CommandResult) -> list[Response]:

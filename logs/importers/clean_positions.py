@@ -150,7 +150,16 @@ def clean_positions(series: LogSeries, earlier_jumps: tuple[float, ...] = ()) ->
     ([0.0, 1.0, 2.0, 3.0, 4.0, 9.0], 1, 1, (Gap(start=4.0, end=9.0),))
     """
     time, values = series.time, series.values
-    is_usable = _find_usable_rows(time, values)
+    # A position at latitude 0 and longitude 0 is invalid.
+    latitude, longitude, altitude = values.T
+    with np.errstate(invalid="ignore"):
+        has_position = (
+            (np.abs(latitude) <= 90.0) & (np.abs(longitude) <= 180.0) & ((latitude != 0.0) | (longitude != 0.0))
+        )
+        # A row without altitude is unusable, unless no row has one.
+        has_valid_altitude = ~np.isfinite(altitude) | ((altitude > _MIN_ALTITUDE_M) & (altitude < _MAX_ALTITUDE_M))
+        is_known = np.isfinite(altitude) if np.isfinite(altitude).any() else np.ones(altitude.size, bool)
+        is_usable = np.asarray((time >= 0.0) & (time < 1e9) & has_position & has_valid_altitude & is_known)
     unusable = int(is_usable.size - is_usable.sum())
     time, values = time[is_usable], values[is_usable]
     order = np.argsort(time, kind="stable")
@@ -199,20 +208,6 @@ def measure_steps(lat: Floats, lon: Floats) -> Floats:
     return np.hypot(north, east * DEGREE_LENGTH_M * np.cos(np.radians(0.5 * (lat[1:] + lat[:-1]))))
 
 
-def _find_usable_rows(time: Floats, values: Floats) -> Flags:
-    """Return a mask (n,): True for rows with a valid time, position and altitude.
-
-    A position at latitude 0 and longitude 0 is invalid.  Rows without an altitude are valid only if all rows lack one.
-    """
-    lat, lon, up = values.T
-    with np.errstate(invalid="ignore"):
-        has_position = (np.abs(lat) <= 90.0) & (np.abs(lon) <= 180.0) & ((lat != 0.0) | (lon != 0.0))
-        # A row without altitude is unusable, unless no row has one.
-        has_valid_altitude = ~np.isfinite(up) | ((up > _MIN_ALTITUDE_M) & (up < _MAX_ALTITUDE_M))
-        is_known = np.isfinite(up) if np.isfinite(up).any() else np.ones(up.size, bool)
-        return np.asarray((time >= 0.0) & (time < 1e9) & has_position & has_valid_altitude & is_known)
-
-
 def _find_glitches(time: Floats, values: Floats) -> Flags:
     """Return a mask (n,): True for glitches.
 
@@ -237,7 +232,13 @@ def _find_glitches(time: Floats, values: Floats) -> Flags:
         for return_leap in leaps[k + 1 :].tolist():
             if return_leap - first_leap > MAX_GLITCH_ROWS:
                 break
-            if _is_reachable(time, values, first_leap, return_leap + 1, max_speed):
+            second = return_leap + 1
+            pair = [first_leap, second]
+            distance = float(measure_steps(values[pair, 0], values[pair, 1])[0])
+            height_change = abs(float(values[second, 2] - values[first_leap, 2]))
+            duration = float(time[second] - time[first_leap])
+            is_reachable = max(distance, 0.0 if math.isnan(height_change) else height_change) <= max_speed * duration
+            if is_reachable:
                 is_glitch[first_leap + 1 : return_leap + 1] = True
                 k = int(np.searchsorted(leaps, return_leap))
                 break
@@ -248,20 +249,6 @@ def _find_glitches(time: Floats, values: Floats) -> Flags:
                 is_glitch[-1] = True
         k += 1
     return is_glitch
-
-
-def _is_reachable(time: Floats, values: Floats, first: int, second: int, max_speed: float) -> bool:
-    """Return True if a vehicle can get from one row to another at `max_speed` (m/s).
-
-    The speed limits both the horizontal and the vertical motion.
-
-    first, second: numbers of the rows.
-    """
-    pair = [first, second]
-    distance = float(measure_steps(values[pair, 0], values[pair, 1])[0])
-    rise = abs(float(values[second, 2] - values[first, 2]))
-    duration = float(time[second] - time[first])
-    return max(distance, 0.0 if math.isnan(rise) else rise) <= max_speed * duration
 
 
 def _remove_forward_jumps(time: Floats, values: Floats) -> tuple[Floats, tuple[tuple[float, float], ...]]:

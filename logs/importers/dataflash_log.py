@@ -174,6 +174,11 @@ class _Reader:
             )
         commands = self._select_messages("CMD")
         command_times = self._compute_times(commands) if len(commands) else np.zeros(0)
+        messages = self._select_messages("PARM")
+        parameters: dict[str, float] = {}
+        if messages.has("Name", "Value"):
+            values = zip(messages.texts("Name"), messages.column("Value").tolist(), strict=True)
+            parameters = {name: value for name, value in values if name and math.isfinite(value)}
         return RawLog(
             source=self._source,
             format=FORMAT,
@@ -186,7 +191,7 @@ class _Reader:
             missions=tuple(
                 make_dataflash_missions(commands, command_times, self._select_messages("ORGN"), self._source)
             ),
-            parameters=self._read_parameters(),
+            parameters=parameters,
             events=tuple(self._read_events()),
             utc_start=self._find_utc_start(),
             clock_jumps=self._clock[2],
@@ -256,7 +261,8 @@ class _Reader:
         yield "wind", wind if wind is not None and np.any(wind.values) else None
         yield "airspeed", self._read_airspeed()
         yield "battery", self._read_battery()
-        yield "throttle", self._read_throttle()
+        throttles = (self._read_table("CTUN", (column,), 0.01) for column in ("ThO", "ThrOut"))
+        yield "throttle", next((series for series in throttles if series is not None and len(series.time)), None)
 
     def _read_first_table(self, choices: Iterable[tuple[str, tuple[str, ...]]], scale: float = 1.0) -> LogSeries | None:
         """Return the fields of the first of several messages that the log contains; None if it has none.
@@ -352,14 +358,6 @@ class _Reader:
                 return with_used_energy(battery)
         return None
 
-    def _read_throttle(self) -> LogSeries | None:
-        """Return the throttle, 0..1, (n, 1); None if not logged."""
-        for column in ("ThO", "ThrOut"):
-            throttle = self._read_table("CTUN", (column,), 0.01)
-            if throttle is not None and len(throttle.time):
-                return throttle
-        return None
-
     def _read_heights(self) -> Iterable[HeightSource]:
         """Yield the altitudes in the log other than the altitude of the position."""
         position = self._read_position()
@@ -383,14 +381,6 @@ class _Reader:
         for time, number in zip(self._compute_times(messages).tolist(), messages.rows[column].tolist(), strict=True):
             name, automatic = describe_plane_mode(int(number))
             yield ModeChange(time, name, automatic)
-
-    def _read_parameters(self) -> dict[str, float]:
-        """Return the last finite value of each parameter."""
-        messages = self._select_messages("PARM")
-        if not messages.has("Name", "Value"):
-            return {}
-        values = zip(messages.texts("Name"), messages.column("Value").tolist(), strict=True)
-        return {name: value for name, value in values if name and math.isfinite(value)}
 
     def _read_events(self) -> Iterable[tuple[float, str]]:
         """Yield the time (s) and the text of each MSG message."""

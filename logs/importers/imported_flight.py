@@ -75,7 +75,13 @@ def find_flight_spans(time: Floats, lat: Floats, lon: Floats) -> list[tuple[floa
         return []
     speed = measure_steps(lat, lon) / np.maximum(np.diff(time), 1e-3)
     width = max(1, int(_MEDIAN_WINDOW_S / max(1e-3, float(np.median(np.diff(time))))))
-    is_flying = _compute_running_median(speed, width) > MIN_FLYING_SPEED_MPS
+    # Running median; the end values are repeated.
+    median_speed = speed
+    if width >= 2 and speed.size > width:
+        half = width // 2
+        padded = np.pad(speed, (half, width - 1 - half), mode="edge")
+        median_speed = np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(padded, width), axis=1))
+    is_flying = median_speed > MIN_FLYING_SPEED_MPS
     spans: list[list[float]] = []
     for k in np.flatnonzero(is_flying).tolist():
         if spans and time[k] - spans[-1][1] <= MAX_SLOW_TIME_S:
@@ -83,15 +89,6 @@ def find_flight_spans(time: Floats, lat: Floats, lon: Floats) -> list[tuple[floa
         else:
             spans.append([float(time[k]), float(time[k + 1])])
     return [(start, end) for start, end in spans if end - start >= MIN_FLIGHT_TIME_S]
-
-
-def _compute_running_median(values: Floats, width: int) -> Floats:
-    """Return the median of the `width` values around each value, (n,); end values are repeated."""
-    if width < 2 or values.size <= width:
-        return values
-    half = width // 2
-    padded = np.pad(values, (half, width - 1 - half), mode="edge")
-    return np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(padded, width), axis=1))
 
 
 def find_flight_parts(
@@ -255,7 +252,16 @@ def make_flight(raw: RawLog, number: int | None = None) -> LoggedFlight:
     positions = clean_positions(series, raw.clock_jumps)
     spans = find_flight_spans(positions.time, positions.lat, positions.lon)
     if not spans:
-        raise LogError(f"{raw.source}: contains no flight: {_explain_missing_flight(positions)}", file=raw.source)
+        if positions.time.size < 2:
+            unusable_count = positions.faults.unusable
+            reason = f"{count_text(positions.time.size, 'usable position')}" + (
+                f"; {count_text(unusable_count, 'row')} without a valid position or time" if unusable_count else ""
+            )
+        else:
+            duration = positions.time[-1] - positions.time[0]
+            limit_text = f"{MIN_FLYING_SPEED_MPS:g} m/s for {MIN_FLIGHT_TIME_S:g} s"
+            reason = f"the ground speed never stayed above {limit_text} in the log's {duration:.0f} s"
+        raise LogError(f"{raw.source}: contains no flight: {reason}", file=raw.source)
     last = float(positions.time[-1])
     modes = [
         type(mode)(float(positions.to_steady_clock(np.array([mode.time]))[0]), mode.name, mode.automatic)
@@ -269,18 +275,6 @@ def make_flight(raw: RawLog, number: int | None = None) -> LoggedFlight:
         index = number - 1
     other_flights = tuple((part.start, part.along_mission) for k, part in enumerate(parts) if k != index)
     return _extract_flight(raw, positions, parts[index], index + 1, len(parts), other_flights)
-
-
-def _explain_missing_flight(positions: CleanPositions) -> str:
-    """Return the reason why a log contains no flight, for a message."""
-    if positions.time.size < 2:
-        unusable_count = positions.faults.unusable
-        return f"{count_text(positions.time.size, 'usable position')}" + (
-            f"; {count_text(unusable_count, 'row')} without a valid position or time" if unusable_count else ""
-        )
-    duration = positions.time[-1] - positions.time[0]
-    limit_text = f"{MIN_FLYING_SPEED_MPS:g} m/s for {MIN_FLIGHT_TIME_S:g} s"
-    return f"the ground speed never stayed above {limit_text} in the log's {duration:.0f} s"
 
 
 def _extract_flight(
@@ -305,6 +299,17 @@ def _extract_flight(
     if np.isfinite(up).all():
         available_quantities.append("heights")
     start = part.stretches[0].start if part.stretches else part.start
+    offsets = []
+    for other in raw.heights:
+        other_time = positions.to_steady_clock(other.series.time)
+        is_compared = (
+            (other_time >= start) & (other_time <= start + _COMPARED_TIME_S) & np.isfinite(other.series.values[:, 0])
+        )
+        if is_compared.any() and np.isfinite(positions.up).any():
+            altitudes = np.interp(other_time[is_compared], positions.time, positions.up)
+            offset = float(np.median(other.series.values[is_compared, 0] - altitudes))
+            offsets.append(HeightOffset(other.name, offset))
+    source = raw.series["position"].source
     return LoggedFlight(
         raw=raw,
         time=time,
@@ -315,7 +320,7 @@ def _extract_flight(
         holds=tuple(available_quantities),
         stretches=part.stretches,
         mission=raw.missions[part.mission] if part.mission >= 0 else None,
-        heights=_compare_heights(raw, positions, start),
+        heights=Heights(source, raw.datum, tuple(offsets)),
         gaps=find_gaps(time),
         faults=positions.faults,
         number=number,
@@ -368,25 +373,6 @@ def _interpolate_at(series: LogSeries | None, name: str, time: Floats, positions
         interpolated[:, :2] = np.remainder(interpolated[:, :2] + math.pi, 2.0 * math.pi) - math.pi
         interpolated[:, 2] = np.remainder(interpolated[:, 2], 2.0 * math.pi)
     return interpolated
-
-
-def _compare_heights(raw: RawLog, positions: CleanPositions, start: float) -> Heights:
-    """Return the source of the positions' altitude, and the offsets of other altitudes from it, m.
-
-    An offset is a median over the first `_COMPARED_TIME_S` seconds of the flight.
-
-    start: start of the flight, s.
-    """
-    offsets = []
-    for other in raw.heights:
-        time = positions.to_steady_clock(other.series.time)
-        is_compared = (time >= start) & (time <= start + _COMPARED_TIME_S) & np.isfinite(other.series.values[:, 0])
-        if is_compared.any() and np.isfinite(positions.up).any():
-            altitudes = np.interp(time[is_compared], positions.time, positions.up)
-            offset = float(np.median(other.series.values[is_compared, 0] - altitudes))
-            offsets.append(HeightOffset(other.name, offset))
-    source = raw.series["position"].source
-    return Heights(source, raw.datum, tuple(offsets))
 
 
 # ----------------------------------------------------------------------

@@ -94,6 +94,37 @@ class _DataflashMotionReader:
         program, vehicle = find_program_and_vehicle(texts, self._index.messages("VER"))
         velocity = self._read_first_samples((name, ("VN", "VE", "VD")) for name in ("XKF1", "NKF1"))
         inertial = self._read_first_samples((("IMU", ("AccX", "AccY", "AccZ", "GyrX", "GyrY", "GyrZ")),))
+        # Rows of a sensor that was not in use are left out.
+        messages = self._select_messages("ARSP")
+        if not messages.has("TimeUS", "Airspeed"):
+            measured_airspeed = Samples(np.zeros(0), np.zeros((0, 1)))
+        else:
+            is_used = messages.column("U") > 0 if messages.has("U") else np.ones(len(messages), np.bool_)
+            measured_airspeed = sort_samples(
+                messages.column("TimeUS")[is_used] * 1e-6, messages.column("Airspeed")[is_used, np.newaxis]
+            )
+        messages = self._select_messages("MODE")
+        column = "ModeNum" if messages.has("ModeNum") else "Mode"
+        modes = []
+        if messages.has("TimeUS", column) and messages.rows.dtype[column].kind != "S":
+            modes = list(
+                zip(
+                    (messages.column("TimeUS") * 1e-6).tolist(),
+                    messages.column(column).astype(int).tolist(),
+                    strict=True,
+                )
+            )
+        messages = self._select_messages("PARM")
+        parameters: dict[str, float] = {}
+        if messages.has("Name", "Value"):
+            values = zip(messages.texts("Name"), messages.column("Value").tolist(), strict=True)
+            parameters = {name: value for name, value in values if math.isfinite(value)}
+        home = find_logged_home(self._index.messages("ORGN"))
+        home_position = (
+            (home.lat_deg, home.lon_deg, home.alt)
+            if home is not None
+            else find_first_ground_position(self._read_first_samples((("POS", ("Lat", "Lng", "Alt")),)), velocity)
+        )
         return MotionLog(
             source=self._source,
             sha256=self._digest,
@@ -104,13 +135,13 @@ class _DataflashMotionReader:
             attitude=self._read_first_samples((("ATT", ("Roll", "Pitch", "Yaw")),), _DEGREE),
             velocity=velocity,
             wind=self._read_first_samples((name, ("VWN", "VWE")) for name in ("XKF2", "NKF2")),
-            airspeed=self._read_airspeed(),
+            airspeed=measured_airspeed,
             ratio=self._read_first_samples((("CTUN", ("E2T",)),)),
             height=self._read_first_samples((("POS", ("Alt",)),)),
             battery=self._read_first_samples((("BAT", ("Volt", "Curr")), ("CURR", ("Volt", "Curr")))),
-            modes=tuple(self._read_modes()),
-            parameters=self._read_parameters(),
-            home=self._find_home(velocity),
+            modes=tuple(modes),
+            parameters=parameters,
+            home=home_position,
         )
 
     def _select_messages(self, name: str) -> Messages:
@@ -142,39 +173,3 @@ class _DataflashMotionReader:
                     values[:, k] = messages.column(column)
             return sort_samples(messages.column("TimeUS") * 1e-6, values * scale)
         return Samples(np.zeros(0), np.zeros((0, 1)))
-
-    def _read_airspeed(self) -> Samples:
-        """Return the measured airspeed, m/s, (n, 1), without rows of a sensor that was not in use."""
-        messages = self._select_messages("ARSP")
-        if not messages.has("TimeUS", "Airspeed"):
-            return Samples(np.zeros(0), np.zeros((0, 1)))
-        is_used = messages.column("U") > 0 if messages.has("U") else np.ones(len(messages), np.bool_)
-        return sort_samples(messages.column("TimeUS")[is_used] * 1e-6, messages.column("Airspeed")[is_used, np.newaxis])
-
-    def _read_modes(self) -> list[tuple[float, int]]:
-        """Return the time (s) and the number of each mode change; [] for a log that states modes by name."""
-        messages = self._select_messages("MODE")
-        column = "ModeNum" if messages.has("ModeNum") else "Mode"
-        if not messages.has("TimeUS", column) or messages.rows.dtype[column].kind == "S":
-            return []
-        return list(
-            zip((messages.column("TimeUS") * 1e-6).tolist(), messages.column(column).astype(int).tolist(), strict=True)
-        )
-
-    def _read_parameters(self) -> dict[str, float]:
-        """Return the last finite value of each parameter."""
-        messages = self._select_messages("PARM")
-        if not messages.has("Name", "Value"):
-            return {}
-        values = zip(messages.texts("Name"), messages.column("Value").tolist(), strict=True)
-        return {name: value for name, value in values if math.isfinite(value)}
-
-    def _find_home(self, velocity: Samples) -> tuple[float, float, float] | None:
-        """Return latitude (deg), longitude (deg) and altitude (m) of home, or of the first position at rest.
-
-        Return None if the log has neither.
-        """
-        home = find_logged_home(self._index.messages("ORGN"))
-        if home is not None:
-            return home.lat_deg, home.lon_deg, home.alt
-        return find_first_ground_position(self._read_first_samples((("POS", ("Lat", "Lng", "Alt")),)), velocity)

@@ -274,7 +274,13 @@ class Topics:
         """Yield the name and the values of each series of a `RawLog`; None for a series that the log lacks."""
         position = self.table("vehicle_global_position", ("lat", "lon", "alt"), ("latitude", "longitude", "altitude"))
         yield "position", position if position is not None else self._read_gps_position()
-        yield "velocity", self._read_velocity()
+        velocity = self.table("vehicle_local_position", ("vy", "vx", "vz"))
+        if velocity is None:
+            velocity = self.table("vehicle_global_position", ("vel_e", "vel_n", "vel_d"))
+        ground_velocity = None
+        if velocity is not None:
+            ground_velocity = LogSeries(velocity.source, velocity.time, velocity.values * np.array([1.0, 1.0, -1.0]))
+        yield "velocity", ground_velocity
         yield "attitude", self.attitude()
         yield "airspeed", self._read_airspeed()
         winds = (self.table(topic, ("windspeed_east", "windspeed_north")) for topic in WIND_TOPICS)
@@ -295,15 +301,6 @@ class Topics:
                     topic, scaled_position.time, np.round(scaled_position.values * np.array([1e-7, 1e-7, 1e-3]), 7)
                 )
         return None
-
-    def _read_velocity(self) -> LogSeries | None:
-        """Return the ground velocity to east, north and up, m/s, (n, 3); None if not logged."""
-        velocity = self.table("vehicle_local_position", ("vy", "vx", "vz"))
-        if velocity is None:
-            velocity = self.table("vehicle_global_position", ("vel_e", "vel_n", "vel_d"))
-        if velocity is None:
-            return None
-        return LogSeries(velocity.source, velocity.time, velocity.values * np.array([1.0, 1.0, -1.0]))
 
     def attitude(self) -> LogSeries | None:
         """Return roll, pitch and yaw, rad, (n, 3); None if not logged."""
@@ -393,7 +390,14 @@ class Topics:
         """
         items = self._read_items()
         stamps = self._data.get("navigator_mission_item", {}).get("timestamp", [0.0])
-        total = self._read_mission_length(float(stamps[-1]) if items else math.inf)
+        mission_result = self._data.get("mission_result", {})
+        total = 0
+        if "seq_total" in mission_result:
+            rows_before = np.flatnonzero(
+                np.asarray(mission_result["timestamp"], dtype=np.float64) <= (float(stamps[-1]) if items else math.inf)
+            )
+            logged_total = float(mission_result["seq_total"][rows_before[-1] if rows_before.size else 0])
+            total = int(logged_total) if 0.0 <= logged_total <= _MAX_ITEMS else 0
         if not items and not total:
             return
         flown_items = renumber_px4_items([items[seq] for seq in sorted(items)])
@@ -426,15 +430,6 @@ class Topics:
             if item_problem(item) is None:
                 items.setdefault(item.seq, item)
         return items
-
-    def _read_mission_length(self, stamp: float) -> int:
-        """Return the number of items of the mission at a time (on the log's clock, us); 0 if not logged."""
-        data = self._data.get("mission_result", {})
-        if "seq_total" not in data:
-            return 0
-        rows_before = np.flatnonzero(np.asarray(data["timestamp"], dtype=np.float64) <= stamp)
-        total = float(data["seq_total"][rows_before[-1] if rows_before.size else 0])
-        return int(total) if 0.0 <= total <= _MAX_ITEMS else 0
 
     def home(self) -> Home | None:
         """Return the last valid home; None if not logged."""

@@ -95,6 +95,7 @@ def read_px4_motion(path: Path, digest: str) -> MotionLog:
         airspeed, ratio = _read_airspeed(topics)
         home, battery = topics.home(), topics.battery()
         height = NO_SAMPLES if not len(place.time) else Samples(place.time, place.values[:, 2:])
+        winds = (_read_samples(topics, topic, ("windspeed_north", "windspeed_east")) for topic in WIND_TOPICS)
         return MotionLog(
             source=str(path),
             sha256=digest,
@@ -104,7 +105,7 @@ def read_px4_motion(path: Path, digest: str) -> MotionLog:
             outputs=NO_SAMPLES,
             attitude=NO_SAMPLES if attitude is None else sort_samples(attitude.time, attitude.values),
             velocity=velocity,
-            wind=_read_wind(topics),
+            wind=next((wind for wind in winds if len(wind.time)), NO_SAMPLES),
             airspeed=airspeed,
             ratio=ratio,
             height=height,
@@ -153,15 +154,6 @@ def _read_inertial(topics: Topics) -> Samples:
     time = forces.time[has_rates]
     rate_columns = [np.interp(time, angular_rates.time, column) for column in angular_rates.values.T]
     return Samples(time, np.column_stack([forces.values[has_rates], *rate_columns]))
-
-
-def _read_wind(topics: Topics) -> Samples:
-    """Return the wind velocity to north and east, m/s, (n, 2), from the first topic that has rows."""
-    for topic in WIND_TOPICS:
-        wind = _read_samples(topics, topic, ("windspeed_north", "windspeed_east"))
-        if len(wind.time):
-            return wind
-    return NO_SAMPLES
 
 
 def _read_airspeed(topics: Topics) -> tuple[Samples, Samples]:

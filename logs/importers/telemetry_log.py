@@ -115,7 +115,11 @@ class TelemetryReader:
             )
             if message_number in self.wanted:
                 stamp = _STAMP.unpack_from(self.data, position)[0] * 1e-6
-                message = self._decode(bytes(self.data[position + _STAMP.size : position + length]))
+                payload = bytes(self.data[position + _STAMP.size : position + length])
+                try:
+                    message = self._decoder.decode(bytearray(payload))
+                except Exception:  # of any kind: the library raises errors of struct, its own and plain ones
+                    message = None
                 if message is None:
                     self.unreadable += 1
                 else:
@@ -142,13 +146,6 @@ class TelemetryReader:
             signature_size = _SIGNATURE if self.data[packet + 2] & _SIGNED else 0
             return _STAMP.size + _V2_FRAME + payload_size + signature_size
         return 0
-
-    def _decode(self, packet: bytes) -> Any:
-        """Return the message in a packet, or None if it cannot be decoded."""
-        try:
-            return self._decoder.decode(bytearray(packet))
-        except Exception:  # of any kind: the library raises errors of struct, its own and plain ones
-            return None
 
 
 # ----------------------------------------------------------------------
@@ -356,10 +353,13 @@ class VehicleMessages:
             name = _decode_text(message.param_id)
             if name and math.isfinite(message.param_value):
                 parameters[name] = float(message.param_value)
+        # ArduPilot's start message names its version; other programs are named by their autopilot.
+        texts = (_decode_text(message.text) for _, message in self._named_messages.get("STATUSTEXT", []))
+        autopilot = _NAMES.get(heartbeats[0].autopilot, "")
         return RawLog(
             source=self._source,
             format=FORMAT,
-            program=self._find_program(heartbeats[0]),
+            program=next((text for text in texts if "Ardu" in text and " V" in text), autopilot),
             vehicle=_TYPES.get(heartbeats[0].type, "unknown"),
             series=series,
             heights=tuple(self._read_heights()),
@@ -406,7 +406,15 @@ class VehicleMessages:
         else:
             yield "position", self._read_gps_position()
         yield "attitude", self.table("ATTITUDE", ("roll", "pitch", "yaw"))
-        yield "wind", self._read_wind()
+        wind = self.table("WIND", ("direction", "speed"))
+        if wind is not None and np.any(wind.values[:, 1]):
+            # The direction is the direction from which the wind blows.
+            course, speed = np.radians(wind.values[:, 0]), wind.values[:, 1]
+            velocity = np.stack([-speed * np.sin(course), -speed * np.cos(course)], axis=1)
+            yield "wind", LogSeries("WIND", wind.time, velocity)
+        else:
+            wind = self.table("WIND_COV", ("wind_y", "wind_x"))
+            yield "wind", wind if wind is not None and np.any(wind.values) else None
         hud = self.table("VFR_HUD", ("airspeed", "alt", "throttle", "groundspeed"))
         if hud is not None:
             # Some vehicles without an airspeed sensor send the ground speed instead.
@@ -416,7 +424,15 @@ class VehicleMessages:
                 ratio = np.array([eas_to_tas_ratio(float(height)) for height in up])
                 yield "airspeed", LogSeries("VFR_HUD", hud.time, hud.values[:, :1] * ratio[:, None])
             yield "throttle", LogSeries("VFR_HUD", hud.time, hud.values[:, 2:3] * 0.01)
-        yield "battery", self._read_battery_with_energy()
+        table = self._read_measured_table("BATTERY_STATUS", ("current_battery", "energy_consumed"))
+        if table is not None and np.any(table.values[:, 1] > 0.0):
+            # The current is sent in units of 10 mA, and the energy in hectojoules, of which 36 are 1 Wh.
+            current = np.maximum(table.values[:, 0] * 0.01, 0.0)
+            values = np.stack([current, table.values[:, 1] / 36.0], axis=1)
+            yield "battery", LogSeries(table.source, table.time, values)
+        else:
+            battery = self.battery()
+            yield "battery", None if battery is None else with_used_energy(battery)
 
     def _read_gps_position(self) -> LogSeries | None:
         """Return the GPS positions with a 3-D fix: latitude and longitude (deg) and altitude (m), (n, 3).
@@ -431,26 +447,6 @@ class VehicleMessages:
             return None
         scaled = np.round(table.values[has_fix, :3] * np.array([1e-7, 1e-7, 1e-3]), 7)
         return LogSeries("GPS_RAW_INT", table.time[has_fix], scaled)
-
-    def _read_wind(self) -> LogSeries | None:
-        """Return the wind velocity to east and north, m/s, (n, 2); None if it was not sent or is always 0."""
-        wind = self.table("WIND", ("direction", "speed"))
-        if wind is not None and np.any(wind.values[:, 1]):
-            # The direction is the direction from which the wind blows.
-            course, speed = np.radians(wind.values[:, 0]), wind.values[:, 1]
-            return LogSeries("WIND", wind.time, np.stack([-speed * np.sin(course), -speed * np.cos(course)], axis=1))
-        wind = self.table("WIND_COV", ("wind_y", "wind_x"))
-        return wind if wind is not None and np.any(wind.values) else None
-
-    def _read_battery_with_energy(self) -> LogSeries | None:
-        """Return the battery's current (A) and the energy used (Wh), (n, 2); None if neither was measured."""
-        table = self._read_measured_table("BATTERY_STATUS", ("current_battery", "energy_consumed"))
-        if table is not None and np.any(table.values[:, 1] > 0.0):
-            # The current is sent in units of 10 mA, and the energy in hectojoules, of which 36 are 1 Wh.
-            current = np.maximum(table.values[:, 0] * 0.01, 0.0)
-            return LogSeries(table.source, table.time, np.stack([current, table.values[:, 1] / 36.0], axis=1))
-        battery = self.battery()
-        return None if battery is None else with_used_energy(battery)
 
     def battery(self) -> LogSeries | None:
         """Return the battery's voltage (V) and current (A), (n, 2); None if the current was not measured."""
@@ -509,21 +505,21 @@ class VehicleMessages:
         for logged in combine_items(rows):
             mission = (_make_px4_mission if self.is_px4 else make_logged_mission)(logged, self._source, "mission items")
             if mission is not None:
-                yield replace(mission, mission=self._with_home(mission.mission))
-
-    def _with_home(self, mission: Mission) -> Mission:
-        """Replace a mission's home by the last home that the vehicle reported, if it reported any.
-
-        The home in an uploaded mission is only an assumption of the ground station.
-        """
-        reports = [
-            message for _, message in self._named_messages["HOME_POSITION"] if message.latitude or message.longitude
-        ]
-        if not reports:
-            return mission
-        report = reports[-1]
-        home = Home(report.latitude * 1e-7, report.longitude * 1e-7, report.altitude * 1e-3)
-        return Mission(home, mission.items, warnings=mission.warnings, source=mission.source)
+                # The home in an uploaded mission is only an assumption of the ground station; the last home that the
+                # vehicle reported replaces it.
+                reports = [
+                    message
+                    for _, message in self._named_messages["HOME_POSITION"]
+                    if message.latitude or message.longitude
+                ]
+                mission_with_home = mission.mission
+                if reports:
+                    report = reports[-1]
+                    home = Home(report.latitude * 1e-7, report.longitude * 1e-7, report.altitude * 1e-3)
+                    mission_with_home = Mission(
+                        home, mission.mission.items, warnings=mission.mission.warnings, source=mission.mission.source
+                    )
+                yield replace(mission, mission=mission_with_home)
 
     def mode_numbers(self) -> Iterator[tuple[float, int]]:
         """Yield the time and the mode number of each heartbeat of the vehicle."""
@@ -537,14 +533,6 @@ class VehicleMessages:
         return any(
             heartbeat.autopilot == _PX4 for _, heartbeat in self._named_messages["HEARTBEAT"] if _is_vehicle(heartbeat)
         )
-
-    def _find_program(self, heartbeat: Any) -> str:
-        """Return ArduPilot's start message with its version, or the autopilot's name; "" if unknown."""
-        for _, message in self._named_messages.get("STATUSTEXT", []):
-            text = _decode_text(message.text)
-            if "Ardu" in text and " V" in text:
-                return text
-        return _NAMES.get(heartbeat.autopilot, "")
 
 
 def _decode_text(value: str | bytes) -> str:

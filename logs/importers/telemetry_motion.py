@@ -6,7 +6,7 @@ import numpy as np
 
 from logs.importers.motion import OUTPUTS, MotionLog, Samples, find_first_ground_position, sort_samples
 from logs.importers.raw_log import LogSeries
-from logs.importers.telemetry_log import VehicleMessages, read_vehicle_messages
+from logs.importers.telemetry_log import read_vehicle_messages
 from logs.importers.wind_triangle import estimate_wind
 from world.arrays import Floats
 from world.errors import LogError
@@ -40,13 +40,26 @@ def read_telemetry_motion(path: Path, digest: str) -> MotionLog:
     wind = _select_columns(raw.series.get("wind"), [1, 0])
     if not len(wind.time):
         wind = estimate_wind(velocity, attitude, _select_columns(true_airspeed, [0]))
+    table = messages.table("RAW_IMU", ("time_usec", "xacc", "yacc", "zacc", "xgyro", "ygyro", "zgyro"))
+    inertial = NO_SAMPLES
+    if table is not None:
+        units = np.repeat([_STANDARD_GRAVITY_MPS2 * 1e-3, 1e-3], 3)
+        inertial = sort_samples(_correct_message_times(table.time, table.values[:, 0]), table.values[:, 1:] * units)
+    names = tuple(f"servo{k}_raw" for k in range(1, OUTPUTS + 1))
+    table = messages.table("SERVO_OUTPUT_RAW", ("time_usec", "port", *names))
+    if table is None:
+        outputs = Samples(np.zeros(0), np.zeros((0, OUTPUTS)))
+    else:
+        is_first_port = table.values[:, 1] == 0.0
+        times = _correct_message_times(table.time[is_first_port], table.values[is_first_port, 0])
+        outputs = sort_samples(times, table.values[is_first_port, 2:])
     return MotionLog(
         source=str(path),
         sha256=digest,
         program=raw.program,
         vehicle=raw.vehicle,
-        inertial=_read_inertial(messages),
-        outputs=_read_outputs(messages),
+        inertial=inertial,
+        outputs=outputs,
         attitude=attitude,
         velocity=velocity,
         wind=wind,
@@ -84,23 +97,3 @@ def _correct_message_times(time: Floats, microseconds: Floats) -> Floats:
     message_time = microseconds * 1e-6
     message_time = message_time + _WRAP_S * np.round((time - message_time) / _WRAP_S)
     return np.asarray(np.where(np.abs(message_time - time) < _MAX_CLOCK_DIFFERENCE_S, message_time, time))
-
-
-def _read_inertial(messages: VehicleMessages) -> Samples:
-    """Return specific force (m/s²) and angular rates (rad/s), (n, 6); no rows if the log lacks them."""
-    table = messages.table("RAW_IMU", ("time_usec", "xacc", "yacc", "zacc", "xgyro", "ygyro", "zgyro"))
-    if table is None:
-        return NO_SAMPLES
-    units = np.repeat([_STANDARD_GRAVITY_MPS2 * 1e-3, 1e-3], 3)
-    return sort_samples(_correct_message_times(table.time, table.values[:, 0]), table.values[:, 1:] * units)
-
-
-def _read_outputs(messages: VehicleMessages) -> Samples:
-    """Return the servo outputs of the first port, us, (n, OUTPUTS); no rows if the log lacks them."""
-    names = tuple(f"servo{k}_raw" for k in range(1, OUTPUTS + 1))
-    table = messages.table("SERVO_OUTPUT_RAW", ("time_usec", "port", *names))
-    if table is None:
-        return Samples(np.zeros(0), np.zeros((0, OUTPUTS)))
-    is_first_port = table.values[:, 1] == 0.0
-    times = _correct_message_times(table.time[is_first_port], table.values[is_first_port, 0])
-    return sort_samples(times, table.values[is_first_port, 2:])

@@ -196,6 +196,11 @@ def read_igc(path: Path) -> RawLog:
     start = float(time.min())
     pressure_heights = HeightSource("pressure altitude", "pressure", LogSeries("B", time - start, pressure[:, None]))
     recorder_line = next((line for line in lines if line.startswith("HFFTY")), "")
+    datum_line = next((line for line in lines if line.startswith(("HFALG", "HOALG"))), "")
+    # The specification assumes the ellipsoid for the GNSS altitude if nothing is stated.
+    datum: VerticalDatum = "ellipsoid" if has_gnss else "pressure"
+    if has_gnss and datum_line:
+        datum = next((datum for word, datum in _DATUMS.items() if word in datum_line[5:]), "unstated")
     return RawLog(
         source=str(path),
         format=IGC,
@@ -203,7 +208,7 @@ def read_igc(path: Path) -> RawLog:
         vehicle="unknown",
         series={"position": LogSeries(source, time - start, np.column_stack([table[:, 1:3], up]))},
         heights=(pressure_heights,) if has_gnss else (),
-        datum=_parse_datum(lines) if has_gnss else "pressure",
+        datum=datum,
         missions=_make_task(lines, str(path)),
         clock="start",
         utc_start=midnight + start,
@@ -251,15 +256,6 @@ def _parse_midnight(lines: list[str]) -> float:
             if 1 <= month <= 12 and 1 <= day <= 31:
                 return float(calendar.timegm((1900 + year if year >= 80 else 2000 + year, month, day, 0, 0, 0)))
     return math.nan
-
-
-def _parse_datum(lines: list[str]) -> VerticalDatum:
-    """Return the vertical datum of the GNSS altitude, from the file's HFALG or HOALG line."""
-    for line in lines:
-        if line.startswith("HFALG") or line.startswith("HOALG"):
-            return next((datum for word, datum in _DATUMS.items() if word in line[5:]), "unstated")
-    # The specification assumes the ellipsoid if nothing is stated.
-    return "ellipsoid"
 
 
 def _make_task(lines: list[str], source: str) -> tuple[LoggedMission, ...]:

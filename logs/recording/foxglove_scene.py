@@ -309,7 +309,7 @@ def zones_scene(time_ns: int, scenario: Scenario, waypoints: Floats) -> bytes:
 
 
 def returns_scene(time_ns: int, drawn_returns: DrawnReturns, terrain: Terrain | None) -> bytes:
-    """Encode the path coloured by the outcome of returns, the worst returns, and the footprint.
+    """Encode judged returns: the path coloured by their outcome, the worst returns, the glide footprint.
 
     The coloured line is drawn below the path, so that plan and track stay visible.
     """

@@ -79,7 +79,9 @@ class GrowingTrack:
 
 
 def thin_line(points: Floats, point_count: int) -> Floats:
-    """Thin the points (n, 3) of a line to `point_count` points that keep the line's shape and its ends.
+    """Thin the points (n, 3) of a line to `point_count` points, and keep its ends.
+
+    Repeatedly drops the points that are nearest to the straight line between their neighbours.
 
     >>> corner = np.array([[0.0, 0.0, 0.0], [5.0, 0.0, 0.0], [10.0, 0.0, 0.0], [10.0, 9.0, 0.0]])
     >>> thin_line(corner, 3)[:, :2].tolist()
@@ -110,7 +112,11 @@ _CHECK_INTERVAL_NS = 200_000_000
 
 
 class FlightEvents:
-    """Converter of flight events to Log messages, independent of the split of rows into blocks."""
+    """Converter of flight events to Log messages.
+
+    It remembers the last leg and the threats in range, so that the events do not depend on how the rows are split into
+    blocks.
+    """
 
     def __init__(self, setup: FlightSetup, channel: int) -> None:
         """Prepare for the flight of a setup.

@@ -289,7 +289,10 @@ def _record_bytes(record: McapRecord) -> bytes:
 
 
 def _message_index(channel: int, pairs: Index) -> bytes:
-    """Encode the index of a channel's messages in a chunk: pairs of log time and offset."""
+    """Encode the index of a channel's messages in a chunk.
+
+    pairs: log time (ns) of each message, and its offset in the chunk (bytes), (n, 2).
+    """
     data = np.ascontiguousarray(pairs, dtype="<u8").tobytes()
     header = channel.to_bytes(2, "little") + len(data).to_bytes(4, "little")
     return FRAME.pack(Opcode.MESSAGE_INDEX, _PAIRS_HEAD + len(data)) + header + data
@@ -465,7 +468,8 @@ def _merge_by_time(
     row_times: log times of the rows, ns.
     row_length, row_channel: size in bytes and channel of each row's message.
 
-    prefix_size: size of the bytes before the first message.
+    other_messages: messages in order of time, (m,) of `ENTRY`.
+    prefix_size: size of the bytes before the first message of the first chunk.
     limit: largest size of a chunk of several messages, bytes.
     """
     count = len(row_times) + len(other_messages)
@@ -529,9 +533,9 @@ def _copy_messages(entries: Entries, rows: Bytes, blob: Bytes, prefix: Bytes) ->
 def _index_messages(
     entries: Entries, firsts: Ints, prefix_size: int, max_channel: int
 ) -> tuple[Bytes, Chunks, ChannelIndexes]:
-    """Encode the message index records of each chunk by channel; return them, chunks and channels.
+    """Encode a message index record for each chunk and each channel with messages in it.
 
-    The chunks and channels are those of `Layout`.
+    Return the bytes of these records, and the arrays `chunks` and `channels` of `Layout`.
     entries: messages, (n,) of `ENTRY`.
     firsts: index of each chunk's first message, followed by n.
     prefix_size: size of the bytes before the first message.

@@ -232,7 +232,7 @@ class _MessageCollector:
         self._parser = state_class()
 
     def add(self, data: bytes) -> None:
-        """Add the records of one chunk. Raises one of `PARSE_ERRORS` or DecodeError."""
+        """Collect the state rows and events of one chunk. Raises one of `PARSE_ERRORS` or DecodeError."""
         self.chunks += 1
         position = 0
         while position < len(data):
@@ -268,7 +268,10 @@ class _MessageCollector:
             self._matcher = RowMatcher(channel.id)
 
     def _add_message(self, data: bytes, position: int, start: int, end: int) -> int:
-        """Add the message at ``position``, or all successive state rows from there; return the next position.
+        """Collect the message at ``position`` of the data, and return the position of the next record.
+
+        A state row is collected together with all state rows that follow it directly. Events that the recorder derives
+        from the rows, and messages of other channels, are skipped.
 
         start, end: range of the record's content in the data.
         """

@@ -84,11 +84,22 @@ _CHANNELS: dict[str, Any] = {
 }
 
 
+# Reason for the end of a flight that was interrupted.
+INTERRUPTED = "interrupted"
+
+
 class Recorder:
     """Writer of a flight log; as a context manager, it leaves a readable file if the flight raises.
 
     The setup is written first; then each whole second of flight is passed to the operating system, so that a killed
-    process loses at most the last second.
+    process loses at most the last second.  The log is locked against other processes, and a signal waits until a call
+    has ended.
+
+    The log of an interrupted flight ends with the last flown row and has no verdict; `planfly check` can judge it.  A
+    log without rows is removed.  After any other error, the log stays unfinished, and `planfly recover` can read its
+    rows.
+
+    end_reason: reason for the end that the log of an interrupted flight states.
 
     >>> import tempfile
     >>> from logs.recording.example_log import example_log
@@ -101,22 +112,34 @@ class Recorder:
     ...         recorder.event(12.0, "half way")
     ...         recorder.finish("completed")
     ...     log = read_log(path)
+    ...     try:
+    ...         with Recorder(path, flown.setup) as recorder:
+    ...             recorder.write_rows(track_rows(flown.track)[:100])
+    ...             raise KeyboardInterrupt
+    ...     except KeyboardInterrupt:
+    ...         left = read_log(path)
     >>> log.ended, len(log.track), log.events[0].text
     ('completed', 366, 'half way')
+    >>> left.complete, left.ended, len(left.track)
+    (True, 'interrupted', 100)
     """
 
     def __init__(self, path: Path, setup: FlightSetup, *, every: int = 1, batch: int = 1) -> None:
-        """Open ``path`` for writing (replacing it) and write the setup.  Raises OSError.
+        """Lock ``path``, open it for writing (replacing it) and write the setup.
 
         every: stride of the recorded rows: every n-th row, and the last row of the flight.
         batch: number of whole seconds of flight that are written at once.  A larger batch takes less time, but a killed
             process loses up to one batch.  The bytes of the file are the same.
+        Raises OSError, and PlanflyError if another process writes the file.
         """
+        self.end_reason = INTERRUPTED
+        self._path = path
+        self._is_open = False
+        self._locks = contextlib.ExitStack()
         self._batch_ns = batch * SECOND_NS
         self._every = every
         self._skipped_row: Rows | None = None  # newest row, if it was not recorded
         self._received_count = 0  # number of received rows, recorded or not
-        attachments = pack_setup(setup)
         self._terrain = setup.scenario.terrain
         self._pending_rows: list[Rows] = []  # rows to record
         self._events: list[MessageRecords] = []
@@ -124,17 +147,20 @@ class Recorder:
         self._last_ns = EPOCH_NS - 1  # log time of the last recorded row
         self._newest_ns = EPOCH_NS - 1  # log time of the last received row
         self._channels: dict[str, int] = {}
-        self._file = path.open("wb", buffering=_BUFFER_BYTES)
+        # Do not remove a symbolic link, even if its target does not exist.
+        file_existed = path.exists() or path.is_symlink()
         try:
-            # A thinned log should take little time: faster compression takes half the time for a quarter more bytes.
-            self._writer = ContainerWriter(self._file, PROFILE, 3 if every == 1 else -1)
-            self._write_setup(attachments, setup)
-        except OSError:
-            self._file.close()
+            with self._complete_write():
+                path.touch()
+                # Take the lock before the file is emptied, so that a log locked by another process is not changed.
+                self._locks.enter_context(lock_path(path))
+                self._open_file(setup)
+        except BaseException as error:
+            # A signal may have arrived while the log was opened.
+            self.__exit__(type(error), error, None)
+            if not file_existed:
+                path.unlink(missing_ok=True)
             raise
-        self._poses = Poses(setup.scenario.origin, self._channels)
-        self._flight_events = FlightEvents(setup, self._channels[EVENT_TOPIC])
-        self._is_open = True
 
     def __enter__(self) -> Self:
         """Return the recorder itself."""
@@ -143,17 +169,39 @@ class Recorder:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Close the file, without a result if `finish` was not called."""
-        if kind is not None:
-            self.abandon()
-        elif self._is_open:
-            self._close_file()
+        """Close a log that is still open, with an end if the flight was interrupted, and release its lock."""
+        with self._locks, delay_signals():
+            if not self._is_open:
+                return
+            is_interrupted = kind is not None and issubclass(kind, KeyboardInterrupt)
+            if is_interrupted and self._received_count:
+                self.finish(self.end_reason)
+            elif kind is None:
+                self._close_file()
+            else:
+                if is_interrupted:
+                    Path(os.path.realpath(self._path)).unlink(missing_ok=True)
+                self.abandon()
 
     def abandon(self) -> None:
         """Close the file after an error, without a result, and ignore errors while closing."""
         if self._is_open:
             with contextlib.suppress(OSError):
                 self._close_file()
+
+    @contextlib.contextmanager
+    def _complete_write(self) -> Iterator[None]:
+        """Delay signals until the end of the block, and name the file in its errors.
+
+        The OSError of a full disk, for example, names no file.
+        """
+        try:
+            with delay_signals():
+                yield
+        except OSError as error:
+            if error.filename is not None or error.errno is None:
+                raise
+            raise OSError(error.errno, error.strerror, str(self._path)) from error
 
     def write(self, block: Track) -> None:
         """Append rows; raise ValueError unless their times increase across all blocks and are at least 0 s."""
@@ -166,22 +214,23 @@ class Recorder:
         """
         if not len(rows):
             return
-        times = np.ascontiguousarray(rows["time"])
-        newest = last_log_time(times, self._newest_ns, EPOCH_NS, MAX_TIME_S)
-        if newest == OUT_OF_RANGE:
-            raise ValueError(f"time {times[0]}..{times[-1]} s: expected 0..{MAX_TIME_S:g}")
-        if newest == NOT_INCREASING:
-            raise ValueError(f"rows from {times[0]} s on: times must increase by at least 1 ns a row")
-        self._newest_ns = newest
-        # Keep every n-th row, from the first row of the flight.
-        recorded_rows = rows[-self._received_count % self._every :: self._every]
-        self._received_count += len(rows)
-        self._skipped_row = rows[-1:] if (self._received_count - 1) % self._every else None
-        if len(recorded_rows):
-            self._append_rows(recorded_rows)
+        with self._complete_write():
+            times = np.ascontiguousarray(rows["time"])
+            newest = last_log_time(times, self._newest_ns, EPOCH_NS, MAX_TIME_S)
+            if newest == OUT_OF_RANGE:
+                raise ValueError(f"time {times[0]}..{times[-1]} s: expected 0..{MAX_TIME_S:g}")
+            if newest == NOT_INCREASING:
+                raise ValueError(f"rows from {times[0]} s on: times must increase by at least 1 ns a row")
+            self._newest_ns = newest
+            # Keep every n-th row, from the first row of the flight.
+            recorded_rows = rows[-self._received_count % self._every :: self._every]
+            self._received_count += len(rows)
+            self._skipped_row = rows[-1:] if (self._received_count - 1) % self._every else None
+            if len(recorded_rows):
+                self._append_rows(recorded_rows)
 
     def _append_rows(self, rows: Rows) -> None:
-        """Add rows to the rows to be written, and write all complete batches."""
+        """Queue rows, and write the complete seconds of the queue whenever a batch is full."""
         self._pending_rows.append(rows)
         previous_ns, self._last_ns = self._last_ns, round(rows["time"][-1] * 1e9) + EPOCH_NS
         if self._last_ns // self._batch_ns > previous_ns // self._batch_ns:
@@ -221,29 +270,45 @@ class Recorder:
         returns: DrawnReturns | None = None,
     ) -> None:
         """Write the end of the flight, the verdict, reference flights and returns, and close the file."""
-        if self._skipped_row is not None:
-            self._append_rows(self._skipped_row)
-            self._skipped_row = None
-        self._write_pending(None)
-        end = max(self._last_ns, EPOCH_NS)
-        self._write_messages([*self._poses.whole_track_records(end)])
-        if returns is not None:
-            self._add_scene(RETURNS_TOPIC, scene.returns_scene(EPOCH_NS, returns, self._terrain))
-        if reference is not None:
-            self._write_attachment(REFERENCE_FILE, reference_flights_json(reference).encode(), end)
-        if verdict is not None:
-            self._write_attachment(VERDICT_FILE, verdict_json(verdict).encode(), end)
-        result = {
-            "schema": RESULT_SCHEMA,
-            "ended": end_reason,
-            "rows": self._written_count,
-            "end_time_s": (end - EPOCH_NS) / 1e9,
-        }
-        self._write_attachment(RESULT_FILE, (json.dumps(result, indent=1) + "\n").encode(), end)
-        self._close_file()
+        with self._complete_write():
+            if self._skipped_row is not None:
+                self._append_rows(self._skipped_row)
+                self._skipped_row = None
+            self._write_pending(None)
+            end = max(self._last_ns, EPOCH_NS)
+            self._write_messages([*self._poses.whole_track_records(end)])
+            if returns is not None:
+                self._add_scene(RETURNS_TOPIC, scene.returns_scene(EPOCH_NS, returns, self._terrain))
+            if reference is not None:
+                self._write_attachment(REFERENCE_FILE, reference_flights_json(reference).encode(), end)
+            if verdict is not None:
+                self._write_attachment(VERDICT_FILE, verdict_json(verdict).encode(), end)
+            result = {
+                "schema": RESULT_SCHEMA,
+                "ended": end_reason,
+                "rows": self._written_count,
+                "end_time_s": (end - EPOCH_NS) / 1e9,
+            }
+            self._write_attachment(RESULT_FILE, (json.dumps(result, indent=1) + "\n").encode(), end)
+            self._close_file()
+
+    def _open_file(self, setup: FlightSetup) -> None:
+        """Open the file, replacing it, and write the setup."""
+        attachments = pack_setup(setup)
+        self._file = self._path.open("wb", buffering=_BUFFER_BYTES)
+        try:
+            # A thinned log should take little time: faster compression takes half the time for a quarter more bytes.
+            self._writer = ContainerWriter(self._file, PROFILE, 3 if self._every == 1 else -1)
+            self._write_setup(attachments, setup)
+        except OSError:
+            self._file.close()
+            raise
+        self._poses = Poses(setup.scenario.origin, self._channels)
+        self._flight_events = FlightEvents(setup, self._channels[EVENT_TOPIC])
+        self._is_open = True
 
     def _write_setup(self, attachments: dict[str, bytes], setup: FlightSetup) -> None:
-        """Write the attachments, register all channels, and write the static scenes and point clouds of the setup."""
+        """Write the attachments, all channels, and the static scenes and point clouds of the setup."""
         for name, data in attachments.items():
             self._write_attachment(name, data, EPOCH_NS)
         self._channels[STATE_TOPIC] = self._writer.add_channel(STATE_TOPIC, STATE_NAME, state_schema())
@@ -276,21 +341,19 @@ class Recorder:
         return self._channels[topic]
 
     def _add_scene(self, topic: str, update: bytes) -> None:
-        """Write a scene that is known only at the end of the flight, but is shown from the start."""
+        """Write a scene with the log time of the start, so that viewers show it during the whole flight."""
         self._write_messages([single_record(self._add_scene_channel(topic), EPOCH_NS, update)])
         self._writer.flush()
 
     def _close_file(self) -> None:
-        """Write pending rows and events, the summary and the end of the file."""
+        """Write pending rows and events, the summary and the end of the file, and release its lock."""
         self._is_open = False
-        try:
+        with self._locks, self._file:
             self._write_pending(None)
             self._writer.write_end()
-        finally:
-            self._file.close()
 
     def _write_attachment(self, name: str, data: bytes, log_time: int) -> None:
-        """Write an attachment with the media type of its name."""
+        """Write an attachment; the suffix of its name determines its media type."""
         self._writer.write_attachment(name, media_type(name), data, log_time)
 
     def _write_pending(self, end_ns: int | None) -> None:
@@ -327,100 +390,8 @@ class Recorder:
             self._writer.write_chunk(content)
 
 
-# Reason for the end of a flight that was interrupted.
-INTERRUPTED = "interrupted"
-
-
-class CrashSafeRecorder(Recorder):
-    """Recorder that leaves a valid log after Ctrl-C, and locks the log against other processes.
-
-    The log of an interrupted flight ends with the last flown row and has no verdict; `planfly check` can judge it.  A
-    log without rows is removed.  After any other error, the log stays unfinished, and `planfly recover` can read its
-    rows.
-
-    end_reason: reason for the end that the log of an interrupted flight states.
-
-    >>> import tempfile
-    >>> from logs.recording.example_log import example_log
-    >>> from logs.recording.reader import read_log
-    >>> flown = example_log()
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     path = Path(folder) / "flight.mcap"
-    ...     try:
-    ...         with CrashSafeRecorder(path, flown.setup) as recorder:
-    ...             recorder.write_rows(track_rows(flown.track)[:100])
-    ...             raise KeyboardInterrupt
-    ...     except KeyboardInterrupt:
-    ...         left = read_log(path)
-    >>> left.complete, left.ended, len(left.track)
-    (True, 'interrupted', 100)
-    """
-
-    def __init__(self, path: Path, setup: FlightSetup, *, every: int = 1, batch: int = 1) -> None:
-        """Lock ``path``, then open it as `Recorder` does.  Raises OSError."""
-        self.end_reason = INTERRUPTED
-        self._path = path
-        self._is_open = False
-        self._locks = contextlib.ExitStack()
-        # Do not remove a symbolic link, even if its target does not exist.
-        file_existed = path.exists() or path.is_symlink()
-        try:
-            with delay_signals(), self._errors_with_file_name():
-                path.touch()
-                # Take the lock before the file is emptied, so that a log locked by another process is not changed.
-                self._locks.enter_context(lock_path(path))
-                super().__init__(path, setup, every=every, batch=batch)
-        except BaseException as error:
-            # A signal may have arrived while the log was opened.
-            self.__exit__(type(error), error, None)
-            if not file_existed:
-                path.unlink(missing_ok=True)
-            raise
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Close a log that is still open, with an end if the flight was interrupted, and release its lock."""
-        with self._locks, delay_signals():
-            if not self._is_open:
-                return
-            is_interrupted = kind is not None and issubclass(kind, KeyboardInterrupt)
-            if is_interrupted and self._received_count:
-                super().finish(self.end_reason)
-            else:
-                self.abandon()
-            if is_interrupted and not self._received_count:
-                Path(os.path.realpath(self._path)).unlink(missing_ok=True)
-
-    def write_rows(self, rows: Rows) -> None:
-        """Record rows of the flight, even if a signal arrives."""
-        with delay_signals(), self._errors_with_file_name():
-            super().write_rows(rows)
-
-    def finish(
-        self,
-        end_reason: str,
-        verdict: Verdict | None = None,
-        reference: ReferenceFlights | None = None,
-        returns: DrawnReturns | None = None,
-    ) -> None:
-        """Write the results of a judged flight, and close the log, even if a signal arrives."""
-        with delay_signals(), self._errors_with_file_name():
-            super().finish(end_reason, verdict, reference, returns)
-
-    @contextlib.contextmanager
-    def _errors_with_file_name(self) -> Iterator[None]:
-        """Add the file name to an OSError without one, such as the error of a full disk."""
-        try:
-            yield
-        except OSError as error:
-            if error.filename is not None or error.errno is None:
-                raise
-            raise OSError(error.errno, error.strerror, str(self._path)) from error
-
-
 def _chunk_contents(layout: Layout) -> Iterator[ChunkContent]:
-    """Yield the content of each chunk of a layout."""
+    """Cut the bytes of a layout into its chunks, and yield each chunk with its message indexes."""
     records, index = memoryview(layout.records), layout.index.tobytes()  # type: ignore[arg-type]  # an array is a buffer
     # Lists are faster than arrays here: reading a field of one chunk from an array takes a microsecond.
     bounds = {name: layout.chunks[name].tolist() for name in CHUNK.names or ()}

@@ -170,7 +170,7 @@ def unpack_terrain(attachments: dict[str, bytes], source: str) -> Terrain:
 
 
 def _row_blocks(rows: int, cols: int) -> list[tuple[int, int]]:
-    """Return the first row of the terrain's heights in each attachment, and the row after the last."""
+    """Divide the rows of the terrain among attachments; return (first row, row after the last) of each."""
     step = max(1, _MAX_PART_HEIGHTS // cols)
     return [(first, min(rows, first + step)) for first in range(0, rows, step)]
 
@@ -275,7 +275,7 @@ def pack_forecast(wind: Wind) -> dict[str, bytes]:
 def unpack_forecast(attachments: dict[str, bytes], source: str, wind: Wind, *, is_in_forecast: bool) -> Wind:
     """Add the forecast in the attachments to a wind; return the wind unchanged without a forecast.
 
-    is_in_forecast: True if the scenario names a forecast.
+    is_in_forecast: True if the scenario names a forecast, so that the attachments must contain it.
     Raises LogError for an attachment that is missing or has the wrong content.
     """
     if FORECAST_FILE not in attachments:
@@ -525,7 +525,7 @@ def _read_plan(attachments: dict[str, bytes], source: str, terrain: Terrain | No
 
 
 def _check_terrain_is_stored(spec: Any, terrain: Terrain | None, file_name: str) -> None:
-    """Raise LogError if the scenario of a log names an elevation file, but the log has no terrain."""
+    """Raise LogError if a log has no terrain, unless its scenario has terrain of the kind "none"."""
     terrain_table = spec.get("terrain") if isinstance(spec, dict) else None
     kind = terrain_table.get("kind") if isinstance(terrain_table, dict) else None
     if terrain is None and kind != "none":

@@ -55,7 +55,7 @@ class SetupModel(BaseModel):
 
     @classmethod
     def from_dataclass(cls, value: object) -> Self:
-        """Make the table of a dataclass from the dataclass's fields."""
+        """Make a table from an object of the dataclass that it stores."""
         return cls.model_validate(value, from_attributes=True, by_alias=False, by_name=True)
 
     def fault(self, file: str, field: str, message: str) -> LogError:
@@ -142,7 +142,7 @@ class MissionTable(SetupModel):
 
 
 class RouteTable(SetupModel):
-    """A `Route` as a table: one column per field of its points, one value per waypoint (airspeed: leg)."""
+    """A `Route` as a table, with a column for each field of its points."""
 
     name = "route"
     position: Annotated[list[_Position], Field(min_length=2, alias="waypoints_east_north_amsl_m"), _LISTED]

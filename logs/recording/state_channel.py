@@ -49,8 +49,9 @@ def submessage_dtype(names: Sequence[str]) -> np.dtype[np.void]:
 
 
 def fill_doubles(out: Encoded, names: Sequence[str], values: Floats) -> None:
-    """Write values (n, m), each after its protobuf tag, into `out`, (n,).
+    """Fill the n records of `out` with m doubles each, every double after its protobuf tag.
 
+    values: doubles of each record, (n, m).
     names: names of the m fields, which have the numbers 1 to m.
     """
     for field_number, (name, column) in enumerate(zip(names, values.T, strict=True), 1):
@@ -128,7 +129,7 @@ class StateField(NamedTuple):
 
 
 def _make_fields() -> tuple[StateField, ...]:
-    """Return all fields of the message after `row`, in order."""
+    """List the fields of the state message in order, without its first field `row`."""
     fields = []
     for source, names in COLUMN_NAMES.items():
         kind = "<f8" if source in _DOUBLES else "<i4" if source == "leg" else "<f4"
@@ -250,7 +251,7 @@ def encode_rows(rows: NDArray[np.record], first_row: int, channel: int) -> State
 
 
 def join_records(arrays: list[StateRecords], kind: np.dtype[np.void]) -> StateRecords:
-    """Join arrays of one structured type, which is `kind`.
+    """Join structured arrays that all have the type `kind`.
 
     They are joined as bytes, because numpy would compare the structured types name by name, which takes longer.
     """
@@ -269,7 +270,7 @@ def decode_rows(records: StateRecords) -> Track:
 
 
 def parse_row(data: bytes, parser: "type[Message]") -> StateRecords:
-    """Read one message in any layout that protobuf allows, as (1,) of `RECORD`.
+    """Parse one state message in any layout that protobuf allows; return it as (1,) of `RECORD`.
 
     Raises google.protobuf.message.DecodeError for an invalid message.
     """
@@ -296,10 +297,10 @@ def _count_matching(raw: Bytes, columns: NDArray[np.int64], expected: Bytes) -> 
 
 
 class RowMatcher:
-    """Finder of successive state messages of the known layout in the bytes of a chunk."""
+    """Finder of state messages in the layout of `RECORD`, which numpy can read without parsing each one."""
 
     def __init__(self, channel: int) -> None:
-        """Prepare for a file.
+        """Store the bytes that all state messages of a file have in common: opcode, length, channel and tags.
 
         channel: MCAP channel of the file's state messages.
         """
@@ -313,7 +314,7 @@ class RowMatcher:
         self._expected = sample.view(np.uint8)[self._columns]
 
     def match(self, data: bytes, offset: int) -> StateRecords:
-        """Return the records from byte `offset` on, up to the first without the expected layout, (n,) of `RECORD`."""
+        """Return the records from byte `offset` on that have the expected layout, (n,) of `RECORD`."""
         count = (len(data) - offset) // RECORD.itemsize
         raw = np.frombuffer(data, np.uint8, count * RECORD.itemsize, offset).reshape(count, RECORD.itemsize)
         matching_count = _count_matching(raw, self._columns, self._expected)

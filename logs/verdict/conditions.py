@@ -97,13 +97,19 @@ def plan_conditions(scenario: Scenario, aircraft: str, airspeed: float, autopilo
         if flight_table.autopilot_from is None or flight_table.steering.autopilot == DEFAULT_AUTOPILOT
         else f"; taken from {flight_table.autopilot_from}, because no autopilot was named"
     )
+    # Source of the cruise airspeed, in this order: scenario, parameter file, aircraft.
+    if scenario.flight.airspeed_mps is not None:
+        airspeed_source: AirspeedSource = "scenario"
+    else:
+        stated_airspeed = autopilot.stated_value(autopilot.speeds.cruise_parameter)
+        airspeed_source = "aircraft" if stated_airspeed is None else "parameters"
     return Conditions(
         aircraft=aircraft,
         mass_kg=mass,
         aircraft_named=not flight_table.aircraft_by_default,
         airspeed_mps=airspeed,
         airspeed_kind="equivalent" if autopilot.speeds.equivalent else "true",
-        airspeed_source=_airspeed_source(scenario, autopilot),
+        airspeed_source=airspeed_source,
         wind_mps=math.hypot(east, north) if has_field else wind.speed,
         wind_from_deg=round(
             math.degrees(math.atan2(-east, -north) if has_field else wind.from_course) % 360.0, 3 if has_field else 9
@@ -120,14 +126,6 @@ def plan_conditions(scenario: Scenario, aircraft: str, airspeed: float, autopilo
         wind_amsl_m=wind.reference_amsl if gradient else None,
         unused_parameters=() if autopilot.parameters is None else autopilot.parameters.unused,
     )
-
-
-def _airspeed_source(scenario: Scenario, autopilot: Autopilot) -> AirspeedSource:
-    """Return the source of the cruise airspeed, in this order: scenario, parameter file, aircraft."""
-    if scenario.flight.airspeed_mps is not None:
-        return "scenario"
-    stated_airspeed = autopilot.stated_value(autopilot.speeds.cruise_parameter)
-    return "aircraft" if stated_airspeed is None else "parameters"
 
 
 def judging_conditions(setup: FlightSetup) -> Conditions:

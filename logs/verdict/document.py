@@ -140,7 +140,7 @@ def level_document(level: LevelAnswer) -> LevelDocument:
 
 
 def deciding_document(deciding: DecidingParameter) -> DecidingDocument:
-    """Return the autopilot parameter that decides if the flight passes, with its text, as it is written to JSON."""
+    """Return the parameter that decides if the flight passes as a document, including its text."""
     data = {field.name: getattr(deciding, field.name) for field in fields(deciding)}
     return DecidingDocument(**data, text=deciding_text(deciding))
 

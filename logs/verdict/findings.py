@@ -127,7 +127,7 @@ class Finding:
 
     @property
     def shown_limit(self) -> float | None:
-        """Limit to show beside the value: extended by its tolerance, unless `tolerance_note` states the tolerance."""
+        """Limit to show next to the value; includes the tolerance unless `tolerance_note` states it."""
         return self.limit if self.tolerance_note else self.effective_limit
 
     @property

@@ -36,7 +36,7 @@ def event_phrase(noun: str, finding: Finding) -> str:
 
 
 def return_phrase(noun: str, finding: Finding) -> str:
-    """Return the brief reason of a return after the last item; otherwise a phrase with the reason."""
+    """Return a phrase with the brief reason of a failed return, and its place unless that is a waypoint."""
     if finding.place.kind == "waypoint":
         return shorten_statement(finding.brief)
     return reason_phrase(noun, finding)

@@ -19,7 +19,6 @@ from logs.verdict.places import AirframeAnswer, Disagreement, LevelAnswer, Refer
 from logs.verdict.rule_words import FRONT_OVERLAP, GROUND_RULES, SIDE_OVERLAP
 from logs.verdict.rules.registry import (
     blocking_item_findings,
-    geometric_findings,
     run_rules,
     with_passing_suggestions,
     with_suggestions,
@@ -89,7 +88,7 @@ def judge_flight(
 
 
 def with_reference(verdict: Verdict, requirements: RouteRequirements, reference: ReferenceFlights) -> Verdict:
-    """Add the results of reference flights to a verdict: the airframe's answer and the suggestions that passed.
+    """Add the airframe's answer and the suggestions that passed, from reference flights, to a verdict.
 
     A verdict on a flight that never began is returned unchanged.
     """
@@ -115,7 +114,8 @@ def _level_answers(
     """
     levels, notes = [], setup_notes(requirements.setup, flight_findings)
     if requirements.envelope:
-        geometric = (*blocking_item_findings(requirements.setup), *geometric_findings(requirements, flight_findings))
+        route_findings = run_rules(requirements, None, geometric=True, flight_findings=flight_findings)
+        geometric = (*blocking_item_findings(requirements.setup), *route_findings)
         has_failed = any(finding.ok is False for finding in geometric)
         passes = not has_failed and not undecided_findings(geometric)
         disagreements = _disagreements("geometry", geometric, flight_findings)
@@ -155,7 +155,7 @@ def _airframe_level(airframe: AirframeAnswer, flight_findings: tuple[Finding, ..
 def _disagreements(
     level: str, level_findings: Sequence[Finding], flight_findings: Sequence[Finding]
 ) -> tuple[Disagreement, ...]:
-    """Return the findings that a level and the flight judge differently, in the order of the level's findings.
+    """Return the findings that a level and the flight judge differently, in the level's order.
 
     A flown landing is judged by the rule of `FLOWN_COUNTERPARTS`.
 

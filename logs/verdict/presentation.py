@@ -32,7 +32,7 @@ _SHOWN_WORDS = tuple(
 
 
 def finding_words(finding: Finding) -> RuleWords:
-    """Return the texts of a finding's rule, or of the part of the rule that it is shown with."""
+    """Return the texts with which a finding is shown: those of its rule, or of the overlap of photos."""
     is_overlap = finding.rule == _OVERLAP_WORDS.name and finding.check in (FRONT_OVERLAP, SIDE_OVERLAP)
     return _OVERLAP_WORDS if is_overlap else RULE_WORDS[finding.rule]
 

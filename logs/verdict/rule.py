@@ -32,7 +32,8 @@ class Judge(Protocol):
 ItemsJudge = Callable[[FlightSetup], list[Finding]]
 # Function that judges how a flight ended (reason for its end) and whether its log is complete.
 EndJudge = Callable[[RouteRequirements, AlignedTrack | None, str, bool], list[Finding]]
-# Function that judges all stretches of an imported flight together, and whether planfly's own log is complete.
+# Function that judges together all parts of an imported flight that followed the mission, and whether planfly's own log
+# is complete.
 ImportedEndJudge = Callable[[FlightSetup, Sequence[FlownLegs], bool], Finding]
 # Function that replaces findings of other rules, or adds to their reasons, after all rules have judged.
 Merge = Callable[[RouteRequirements, AlignedTrack | None, Sequence[Finding]], tuple[Finding, ...]]
@@ -68,8 +69,8 @@ class Rule:
     tolerances: names of the constants in `logs.verdict.tolerances` that the rule and its measures use.
 
     Judging functions, each None if the rule has none:
-    judge: judges the planned path and the flown track, and an imported flight stretch by stretch, as far as the log
-        meets ``log``.
+    judge: judges the planned path, the flown track, and each part of an imported flight that followed the mission, as
+        far as the log contains the data that ``log`` names.
     judge_items, judge_end, judge_imported_end, merge, suggest: see their types.
 
     log: data that the rule needs from an imported log.

@@ -262,8 +262,8 @@ RULE_WORDS: dict[str, RuleWords] = {
         RuleWords(
             name="touchdown",
             title="touchdown",
-            question="Does the aircraft touch down and come to rest on the strip, on a final clear of ground, missiles"
-            " and zones?",
+            question="Does the aircraft touch down and come to rest on the strip, on a final approach clear of ground,"
+            " missiles and zones?",
             margin=Margin("distance from the strip's center", "m", 20.0),
             phrase=reason_phrase,
             unjudged="touchdown",

@@ -255,7 +255,7 @@ def suggest_gentler_landing(
 def _gentler_arc(requirements: RouteRequirements, leg: int) -> tuple[Suggestion, ...]:
     """Suggest gentler legs around a fly-by arc that is too steep at a leg's end.
 
-    Return () if no arc at the leg is too steep, or if no leg has the arc's slope direction.
+    Return () if no arc at the leg is too steep, or if neither leg climbs or descends like the arc.
     """
     arc = steep_arc(requirements, leg)
     if arc is None:
@@ -342,7 +342,7 @@ def suggest_larger_loiter(
 
 
 def _longer_legs(requirements: RouteRequirements, corner: int) -> list[_SizedSuggestion]:
-    """Suggest legs at a corner that are long enough for its and the neighbouring turns; [] if all fit."""
+    """Suggest longer legs at a corner, with room for its turn and the neighbouring turns; [] if all fit."""
     needed_before = (
         requirements.length_before[corner]
         + requirements.length_after[corner - 1]
@@ -421,8 +421,9 @@ def _level_speeds(requirements: RouteRequirements, altitude: float, current_spee
 
 
 def _slope_speed(requirements: RouteRequirements, leg: int, slope: float) -> float | None:
-    """Return the nearest other commanded airspeed at which the aircraft holds a slope, m/s, or None.
+    """Return the commanded airspeed closest to the present one at which the aircraft holds a slope, m/s.
 
+    Return None if it certainly holds the slope at no other airspeed.
     slope: absolute value of the slope, rad.
     """
     course = float(requirements.courses[leg])
@@ -485,7 +486,7 @@ def _round_to_meter(length: float) -> float:
 def suggest_wider_berth(
     requirements: RouteRequirements, aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
-    """Suggest passing a missile at a greater distance, outside its sphere; return () if none applies."""
+    """Suggest passing a missile at a greater distance, outside its sphere; return () for any other place."""
     missile = finding.place.index
     if missile is None or finding.place.kind != "missile":
         return ()
@@ -580,7 +581,7 @@ def _suggest_other_frame(setup: FlightSetup, frame: Frame) -> tuple[Suggestion, 
 
 
 def _suggest_lower_reading(setup: FlightSetup) -> tuple[Suggestion, ...]:
-    """Suggest two corrections that lower a path: home set on the ground, and heights above home read as AMSL."""
+    """Suggest setting home on the ground, and reading heights above home as AMSL, if these lower the path."""
     home_on_ground = _suggest_home_on_ground(setup) if home_height(setup) > 0.0 else ()
     return (*home_on_ground, *_suggest_other_frame(setup, Frame.GLOBAL))
 
@@ -635,7 +636,7 @@ RTL_ALTITUDE_STEP_M = 5.0
 
 
 def _suggest_higher_return(requirements: RouteRequirements, shortfall: float) -> tuple[Suggestion, ...]:
-    """Suggest a higher altitude of an RTL, by the autopilot's parameters, a higher start of it, or both.
+    """Suggest flying an RTL higher: by a parameter, by raising the waypoint where it begins, or by both.
 
     shortfall: missing height above ground, m; each change alone may need more.
     """
@@ -762,7 +763,7 @@ def _suggest_landing_against_wind(
 def suggest_staying_inside(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
-    """Suggest lower altitudes, then a path further inside the area; return () for a path that stays inside."""
+    """Suggest lower altitudes, then a path further inside the area; () for a path that stays inside."""
     if finding.margin is None or not finding.margin < 0.0:
         return ()
     inset = _round_to_meter(-finding.margin + SUGGESTION_LENGTH_MARGIN_M)

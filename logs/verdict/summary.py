@@ -229,7 +229,7 @@ def _near_miss_notes(findings: Sequence[Finding]) -> list[str]:
 
 
 def _altitude_notes(findings: Sequence[Finding]) -> list[str]:
-    """Return notes on the worst altitude errors among the passed checks of waypoints and of ground-following legs."""
+    """Return notes on the worst altitude errors at passed waypoints and on ground-following legs."""
     waypoint_errors = _passing_errors(findings, "waypoint", "height error")
     # The slope rule judges how well a leg follows the ground, because its slope is the slope of the ground.
     leg_errors = _passing_errors(findings, "slope", GROUND_FOLLOWING_ERROR)
@@ -240,10 +240,7 @@ def _altitude_notes(findings: Sequence[Finding]) -> list[str]:
 
 
 def _passing_errors(findings: Sequence[Finding], rule: str, fact_name: str) -> list[tuple[float, Place]]:
-    """Return value and place of one fact from the findings of a rule that did not fail.
-
-    fact_name: name of the fact.
-    """
+    """Return value and place of one fact from all findings of a rule, except from failed findings."""
     return [
         (fact.value, finding.place)
         for finding in findings
@@ -253,7 +250,10 @@ def _passing_errors(findings: Sequence[Finding], rule: str, fact_name: str) -> l
 
 
 def _worst_error_notes(errors: Sequence[tuple[float, Place]], verb: str, reference: str) -> list[str]:
-    """Return a note on the largest altitude error (m), if it is notable; otherwise []."""
+    """Return a note on the largest altitude error (m), if it is notable; otherwise [].
+
+    verb, reference: words of the note, such as "passed" and "its altitude" in "item 3 passed 30 m above its altitude".
+    """
     notable = [(error, place) for error, place in errors if abs(error) > NOTABLE_HEIGHT_ERROR_M]
     if not notable:
         return []

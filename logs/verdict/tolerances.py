@@ -312,7 +312,7 @@ RUNWAY_MARGIN_M = 10.0
 # `GO_AROUND_CLEARANCE_M`.
 GROUND_LEG_CLEARANCE_M = GO_AROUND_CLEARANCE_M
 # m.  Largest distance from home, or from the landing point, at which `GROUND_LEG_CLEARANCE_M` applies: the length of
-# the longest final that a plan has.  Beyond it, the scenario's requirement applies to these legs, too.
+# the longest final approach that a plan has.  Beyond it, the scenario's requirement applies to these legs, too.
 FIELD_RADIUS_M = 2000.0
 # rad.  After a take-off the first leg's corridor applies once the aircraft's course is within this of the leg's course.
 RUNWAY_COURSE_TOLERANCE_RAD = math.radians(10.0)
@@ -327,8 +327,8 @@ TOUCHDOWN_ERROR_M = 30.0
 # m.  In turbulence a landing is undecided if it leaves less of the strip than this. 42 touchdowns of ArduPlane were
 # 27 m shorter to 46 m longer than simulated, with an 11 kg Aerosonde as well as a 2 kg wing.
 GUST_TOUCHDOWN_ERROR_M = 50.0
-# m.  A final that is simulated lower above ground than this, before its flare may begin, is undecided: five ArduPlane
-# finals reached their flares within 2 m of the simulated height.
+# m.  A final approach that is simulated lower above ground than this, before its flare may begin, is undecided: five
+# ArduPlane approaches reached their flares within 2 m of the simulated height.
 FINAL_APPROACH_CLEARANCE_M = 3.0
 # m/s.  A faster sink towards the ground leaves a touchdown undecided: 15 ArduPlane landings touched down at 0.5 to
 # 4.2 m/s, and an aircraft that a flare drops from a height touches down faster than any of them.

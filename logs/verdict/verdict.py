@@ -30,8 +30,8 @@ class Verdict:
 
     findings: findings of all rules, in the order in which they are listed.
     flyable: True if the verdict is complete and no finding failed.
-    complete: True if the plan was feasible, flown to its end, and recorded in full (at the geometric level: if the plan
-    was feasible, or if a person brought the mission). Given waypoints need not be feasible.
+    complete: True if the plan was feasible, flown to its end, and recorded in full; at the geometric level, True unless
+    planfly made the plan and found none that is feasible.
     lines: the summary for a person; its first line, the headline, answers the question.
     level: "flown", "geometric" (from the envelope, without a flight) or "plan" (no feasible plan, so nothing was
     flown).

@@ -195,9 +195,9 @@ def _other_change_text(change: Change) -> str:
 
 
 def _changed_texts(change: Change, digits: int = 0) -> tuple[str, str]:
-    """Return the magnitudes of the wanted and the current value, with enough digits to show that they differ.
+    """Return the magnitudes of wanted and current value, with enough digits to show that they differ.
 
-    digits: smallest number of digits after the point, if they differ in these.
+    digits: minimum number of digits after the decimal point.
 
     >>> _changed_texts(Change("rise", Place("leg", 1), -86.4, -86.0, "m"))
     ('86.0 m', '86.4 m')
@@ -440,7 +440,7 @@ def shorten_statement(statement: str) -> str:
 
 
 def text_after(text: str, prefixes: Sequence[str]) -> str:
-    """Return a text without the first of `prefixes` that it has, and without the punctuation after the prefix.
+    """Return a text without the prefix with which it begins, and without the punctuation after the prefix.
 
     >>> text_after("not flyable: slope on leg 1", ("Not flyable, and incomplete", "not flyable"))
     'slope on leg 1'
@@ -468,7 +468,7 @@ def energy_left_text(energy: float) -> str:
 
 
 def _with_unit(digits: str, unit: str) -> str:
-    """Join the digits of a number and its unit; a counted unit is in the singular after 1."""
+    """Join the digits of a number and its unit, such as "12 m", "1 leg" or "2 legs"."""
     return digits + (" leg" if (digits, unit) == ("1", "legs") else _unit_suffix(unit))
 
 

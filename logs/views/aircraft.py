@@ -273,25 +273,23 @@ def draw_step_responses(aircraft: Aircraft, steps: Sequence[StepResponse]) -> Fi
                 panel.grid(color=theme.colour("grid"), linewidth=0.5)
                 panel.set_axisbelow(True)
             column_box = axes[0, column].get_position()
-            figure.text(column_box.x0, column_box.y1 + 0.035, _step_title(step), fontsize=9.0, fontweight="bold")
+            control = step.control
+            if step.control == "throttle":
+                size_text = f"{100.0 * step.size:+.0f} %"
+            else:
+                # Directions of a positive and of a negative step.
+                direction_names = {
+                    "elevator": ("down", "up"),
+                    "aileron": ("to roll right", "to roll left"),
+                    "rudder": ("to yaw left", "to yaw right"),
+                }
+                size_text = f"{abs(math.degrees(step.size)):.1f}° {direction_names[step.control][step.size < 0.0]}"
+            title = f"{control} {size_text}" + (
+                f", {step.hold_time:.0f} s" if math.isfinite(step.hold_time) else ", held"
+            )
+            figure.text(column_box.x0, column_box.y1 + 0.035, title, fontsize=9.0, fontweight="bold")
             axes[-1, column].set_xlabel("time (s)")
     return figure
-
-
-def _step_title(step: StepResponse) -> str:
-    """Return the title of a step: the control, the step's size and direction, and the time it is held."""
-    name = step.control
-    if step.control == "throttle":
-        size_text = f"{100.0 * step.size:+.0f} %"
-    else:
-        # Directions of a positive and of a negative step.
-        direction_names = {
-            "elevator": ("down", "up"),
-            "aileron": ("to roll right", "to roll left"),
-            "rudder": ("to yaw left", "to yaw right"),
-        }
-        size_text = f"{abs(math.degrees(step.size)):.1f}° {direction_names[step.control][step.size < 0.0]}"
-    return f"{name} {size_text}" + (f", {step.hold_time:.0f} s" if math.isfinite(step.hold_time) else ", held")
 
 
 def _add_legend_above(axes: Any, title: str, columns: int) -> None:

@@ -9,7 +9,6 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
-from numpy.typing import NDArray
 
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
@@ -286,17 +285,6 @@ def _make_legend_handle(kind: LayerKind, role: str, text: str) -> Any:
     return make_legend_handle(LegendEntry(text, (Layer(kind, text, role, empty, empty),)))
 
 
-def _find_hidden_points(projection: Projection, terrain: Terrain | None, points: Floats) -> NDArray[np.bool_]:
-    """Return a mask (n,): True for points (n, 3) that the ground hides from the viewer."""
-    is_hidden = np.zeros(len(points), dtype=bool)
-    if terrain is None:
-        return is_hidden
-    for distance in np.geomspace(2.0 * terrain.spacing, 15_000.0, 70):
-        sight_points = points + distance * projection.toward
-        is_hidden |= terrain.height(sight_points[:, 0], sight_points[:, 1]) > sight_points[:, 2]
-    return is_hidden
-
-
 def _draw_paths(
     axes: Any,
     projection: Projection,
@@ -367,7 +355,12 @@ def _draw_path(
     order: matplotlib's zorder.
     """
     projected = projection.project(points)
-    is_hidden = _find_hidden_points(projection, terrain, points)
+    # Points that the ground hides from the viewer.
+    is_hidden = np.zeros(len(points), dtype=bool)
+    if terrain is not None:
+        for distance in np.geomspace(2.0 * terrain.spacing, 15_000.0, 70):
+            sight_points = points + distance * projection.toward
+            is_hidden |= terrain.height(sight_points[:, 0], sight_points[:, 1]) > sight_points[:, 2]
     visible_part = np.where(is_hidden[:, None], np.nan, projected[:, :2])
     # Include the neighbours of hidden rows, so that the two parts meet.
     is_near_hidden = is_hidden | np.roll(is_hidden, 1) | np.roll(is_hidden, -1)

@@ -341,22 +341,18 @@ def _draw_panel(axes: Any, chart: Chart, panel: Panel, *, has_leg_numbers: bool)
             "fontsize": 7,
         }
         axes.annotate(panel.note, (1.0, 1.0), (0, 3), color=theme.colour("limit"), **text_options)
-    axes.set_ylabel(panel.label if chart.print_height > 2.0 else "\n".join(_wrap_title(panel)))
+    axis_label = panel.label
+    if chart.print_height <= 2.0:
+        # A third line would be cut off at the left edge of the picture.
+        title = panel.title.replace(" +", "\N{NO-BREAK SPACE}+")
+        text = f"{title} ({panel.unit})" if panel.unit else title
+        wrappings = (textwrap.wrap(text, width) for width in range(_PANEL_TITLE_WIDTH, len(text) + _PANEL_TITLE_WIDTH))
+        lines = next(lines for lines in wrappings if len(lines) <= _MAX_PANEL_TITLE_LINES)
+        axis_label = "\n".join(lines).replace("\N{NO-BREAK SPACE}", " ")
+    axes.set_ylabel(axis_label)
     axes.yaxis.set_label_coords(-_LABEL / (WIDTH * axes.get_position().width), 0.5)
     axes.grid(visible=True, axis="both" if chart.shared else "y")
     axes.set_axisbelow(True)
-
-
-def _wrap_title(panel: Panel) -> list[str]:
-    """Wrap a panel's title and unit to at most two lines.
-
-    A third line would be cut off at the left edge of the picture.
-    """
-    title = panel.title.replace(" +", "\N{NO-BREAK SPACE}+")
-    text = f"{title} ({panel.unit})" if panel.unit else title
-    wrappings = (textwrap.wrap(text, width) for width in range(_PANEL_TITLE_WIDTH, len(text) + _PANEL_TITLE_WIDTH))
-    lines = next(lines for lines in wrappings if len(lines) <= _MAX_PANEL_TITLE_LINES)
-    return [line.replace("\N{NO-BREAK SPACE}", " ") for line in lines]
 
 
 def _draw_marks(axes: Any, marks: Sequence[tuple[float, str]], *, has_leg_numbers: bool) -> None:

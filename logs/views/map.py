@@ -145,7 +145,12 @@ def map_chart(
             )
         name = "route of the mission" if plan_waypoints is None or has_different_plan else "planned path"
         layers += [*path_layers, Layer("line", name, "planned", route[:, 0], route[:, 1], quiet=True)]
-    layers += [_make_track_layer(drawn_track) for drawn_track in tracks]
+    for drawn_track in tracks:
+        # A track is thinned to what a map can show.
+        count = len(drawn_track.track)
+        rows = np.union1d(np.arange(0, count, max(1, count // _MAX_POINTS)), [count - 1])
+        east, north, _ = drawn_track.track.position[rows].T
+        layers.append(Layer("line", drawn_track.label, drawn_track.role, east, north, flight=drawn_track.flight))
     for drawn_track in tracks if failed.threats else ():
         is_inside = find_rows_inside_threats(failed, scenario.threats, drawn_track.track)
         if is_inside.any():
@@ -184,8 +189,14 @@ def scenario_map(
     failing_threats: indices of the threats whose rule fails.
     """
     east, north = extent
+    edge_layers = []
+    if not scenario.external:
+        (west_edge, east_edge), (south_edge, north_edge) = scenario.bounds.tolist()
+        x = np.array([west_edge, east_edge, east_edge, west_edge, west_edge])
+        y = np.array([south_edge, south_edge, north_edge, north_edge, south_edge])
+        edge_layers = [Layer("line", "edge of the area", "area", x, y, quiet=True)]
     area_layers = [
-        *_make_area_edge_layers(scenario),
+        *edge_layers,
         *threat_circles(scenario.threats, route, failing_threats),
         *zone_shapes(scenario.zones),
     ]
@@ -248,27 +259,6 @@ def map_extent(scenario: Scenario, route: Floats | None, paths: Sequence[Floats]
     middle = 0.5 * (min_corner + max_corner)
     (west, south), (east, north) = (middle - 0.5 * size).tolist(), (middle + 0.5 * size).tolist()
     return (west, east), (south, north)
-
-
-def _make_area_edge_layers(scenario: Scenario) -> list[Layer]:
-    """Return the layer of the edge of the scenario's area; [] for a mission without a scenario.
-
-    The bounds that planfly makes around such a mission do not limit the flight.
-    """
-    if scenario.external:
-        return []
-    (west, east), (south, north) = scenario.bounds.tolist()
-    x = np.array([west, east, east, west, west])
-    y = np.array([south, south, north, north, south])
-    return [Layer("line", "edge of the area", "area", x, y, quiet=True)]
-
-
-def _make_track_layer(drawn_track: DrawnTrack) -> Layer:
-    """Make the layer of a flown track, thinned to what a map can show."""
-    count = len(drawn_track.track)
-    rows = np.union1d(np.arange(0, count, max(1, count // _MAX_POINTS)), [count - 1])
-    east, north, _ = drawn_track.track.position[rows].T
-    return Layer("line", drawn_track.label, drawn_track.role, east, north, flight=drawn_track.flight)
 
 
 def _make_waypoint_layers(

@@ -13,7 +13,7 @@ from flight.autopilots.catalog import autopilot_classes, program_classes
 from flight.dynamics.characteristics import Mode, StepResponse, TrimRow, level_flight_modes, step_responses, trim_table
 from flight.dynamics.envelope_tables import load_envelope
 from flight.dynamics.model_check import shipped_model
-from planfly.runtime.first_start import api_function
+from planfly.api.api_function import api_function
 from planfly.runtime.stages import stage
 from planfly.workflow.output_paths import check_output_folder, expand_path_pattern, prepare_folder
 from planfly.workflow.uav import check_level_flight

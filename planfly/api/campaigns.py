@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Unpack, cast
 
 from logs.verdict.tolerances import ENERGY_RESERVE_FRACTION
+from planfly.api.api_function import api_function
 from planfly.arguments import check_arguments
 from planfly.campaigns.campaign_base import CampaignBase, is_mission_file, open_campaign
 from planfly.campaigns.campaign_result import (
@@ -52,7 +53,6 @@ from planfly.flight_options import (
     select_mission_options,
 )
 from planfly.kernel_units.unit_kernels import PLANNING_AND_FLYING
-from planfly.runtime.first_start import api_function
 from planfly.runtime.process_setup import end_repeated_call
 from planfly.runtime.stages import report_line, stage
 from planfly.workflow.output_paths import check_output_folder, replace_files
@@ -336,7 +336,7 @@ def campaign_flight(
     index: number of the flight, from 0.  out: the campaign's folder.
     Raises a `planfly.PlanflyError` for bad input, and if the result of the flight differs from the table.
     """
-    check_arguments(index=index, seed=options["seed"])
+    check_arguments(index=index)
     folder = Path(out)
     goal = continued_goal(folder, options["flights"], options["prove"], options["at_least"], options["confidence"])
     directory = OutputDirectory(folder, CAMPAIGN_DATABASE, resume=True, overwrite=False)

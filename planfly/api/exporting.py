@@ -27,12 +27,12 @@ from logs.views.exports.map_files import (
     return_lines,
     track_line,
 )
+from planfly.api.api_function import api_function
 from planfly.arguments import check_arguments
 from planfly.flight_logs import is_log, loss_text
 from planfly.flight_options import FencePaths, MissionOptions, read_named_fences
 from planfly.plan_fence import add_plan_fence
 from planfly.rtl.return_summary import return_summary
-from planfly.runtime.first_start import api_function
 from planfly.runtime.stages import stage
 from planfly.workflow.open_flight import PLAN_FILE, open_flight
 from planfly.workflow.output_paths import check_output_file

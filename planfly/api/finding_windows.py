@@ -7,6 +7,7 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Unpack
 
+from planfly.api.api_function import api_function
 from planfly.api.campaigns import answer_command_line, make_workers, open_sample
 from planfly.arguments import check_arguments
 from planfly.campaigns.campaign_base import CampaignBase
@@ -22,7 +23,6 @@ from planfly.campaigns.find_window import (
 )
 from planfly.flight_options import WindowOptions
 from planfly.kernel_units.unit_kernels import PLANNING_AND_FLYING
-from planfly.runtime.first_start import api_function
 from planfly.runtime.stages import stage
 from planfly.workflow.output_paths import check_output_folder, replace_files
 from planner.plan import Plan

@@ -14,6 +14,7 @@ from logs.recording.reader import FlightLog, read_log
 from logs.verdict.judge_flight import judge_flight
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.verdict import Verdict
+from planfly.api.api_function import api_function
 from planfly.arguments import check_arguments
 from planfly.flight_logs import is_log, judge_log, loss_text
 from planfly.flight_options import (
@@ -30,7 +31,6 @@ from planfly.flight_options import (
 )
 from planfly.kernel_units.unit_kernels import FLYING, PLANNING_AND_FLYING
 from planfly.rtl.return_summary import ReturnSummary, return_summary
-from planfly.runtime.first_start import api_function
 from planfly.runtime.stages import report_replaced, stage
 from planfly.workflow import pipeline
 from planfly.workflow.flight_limits import FlightLimits, computing_time_key, length_and_duration_text
@@ -154,8 +154,6 @@ def fly(
     ('completed', True, 4.0)
     """
     limits = FlightLimits(options["max_hours"], options["max_log"])
-    checked_options = {name: options[name] for name in ("seed", "log_hz", "max_hours", "max_log", "engine")}
-    check_arguments(**checked_options)
     program = None if options["sitl"] is None else check_program(options["sitl"])
     setup = open_flight(mission, options, program, options["engine"])
     target = None if log is None else _prepare_log_file(log, setup, mission, program, overwrite)

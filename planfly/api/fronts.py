@@ -8,12 +8,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Unpack
 
+from planfly.api.api_function import api_function
 from planfly.api.planning import stop_condition
 from planfly.arguments import RANGES, check_arguments
 from planfly.flight_options import FlightOptions, load_scenario_with_options
 from planfly.kernel_units.unit_kernels import FRONT_PLANNING
 from planfly.planning.pareto_plans import make_pareto_plans
-from planfly.runtime.first_start import api_function
 from planfly.runtime.stages import stage
 from planfly.workflow.output_paths import RUN_FOLDER, clean_folder, expand_path_pattern
 from planfly.workflow.uav import choose_seed, load_uav

@@ -13,6 +13,7 @@ from aircraft.identification.flight_record import FlightRecord
 from aircraft.identification.prediction import PredictedLog
 from logs.importers.motion import MotionLog
 from logs.importers.motion_log import read_motion
+from planfly.api.api_function import api_function
 from planfly.arguments import check_arguments
 from planfly.identification.base_numbers import base_model, scale_base_model
 from planfly.identification.checks import check_battery, check_commands, check_estimate, check_power
@@ -32,7 +33,6 @@ from planfly.identification.records import (
 )
 from planfly.identification.servos import ServoOutput, read_servos
 from planfly.identification.wide_quantities import WideQuantity, wide_quantities
-from planfly.runtime.first_start import api_function
 from planfly.runtime.stages import stage
 from planfly.workflow.data_sheets import parse_sheet
 from world.arrays import Floats

@@ -13,10 +13,10 @@ from logs.recording.recover import recover_log
 from logs.verdict.imported.model_comparison import Reflight
 from logs.verdict.judge_flight import judge_flight
 from logs.views.report.text import list_not_reflown, refly_lines
+from planfly.api.api_function import api_function
 from planfly.arguments import check_arguments
 from planfly.flight_options import LogOptions
 from planfly.kernel_units.unit_kernels import FLYING
-from planfly.runtime.first_start import api_function
 from planfly.runtime.stages import stage
 from planfly.workflow.imported_flights import ImportedFlight, fly_again, import_flight
 from planfly.workflow.output_paths import (
@@ -59,7 +59,6 @@ def read_imported(log: str | Path, **options: Unpack[LogOptions]) -> ImportedFli
         if (value := dict(options)[name]) is not None:
             allowed = "not allowed for an imported flight, which is judged with the autopilot and the speeds of its log"
             raise ScenarioError.of_argument(name, value, allowed, shown="", file=log)
-    check_arguments(flight=options["flight"], datum=options["datum"])
     return import_flight(Path(log), options)
 
 

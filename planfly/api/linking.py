@@ -17,12 +17,12 @@ from logs.verdict.returns.judge_returns import Returns
 from logs.verdict.returns.returns_text import range_text
 from logs.verdict.rules.link_rule import duration_text, judge_link, period_text
 from logs.verdict.wording import place_text
+from planfly.api.api_function import api_function
 from planfly.api.flying import judge
 from planfly.arguments import check_arguments, parse_position
 from planfly.flight_options import LinkOptions, select_log_and_mission_options
 from planfly.kernel_units.unit_kernels import FLYING
 from planfly.rtl.jsbsim_returns import fly_return
-from planfly.runtime.first_start import api_function
 from planfly.runtime.stages import stage
 from planfly.workflow.open_flight import with_ground_at_station
 from planfly.workflow.output_paths import check_output_folder, replace_files

@@ -11,11 +11,11 @@ from numpy.typing import ArrayLike
 
 from flight.autopilots.catalog import load_autopilot
 from logs.verdict.conditions import Conditions, plan_conditions
+from planfly.api.api_function import api_function
 from planfly.arguments import check_arguments
 from planfly.flight_options import PlanOptions, load_scenario_with_options
 from planfly.kernel_units.unit_kernels import PLANNING
 from planfly.planning.expected_failures import expected_failures
-from planfly.runtime.first_start import api_function
 from planfly.runtime.stages import stage
 from planfly.threat_tables import GivenThreats, threat_tables
 from planfly.workflow.make_plan import make_given_plan, make_plan
@@ -77,7 +77,6 @@ def plan(
     >>> planfly.plan("tight", waypoints=mine)
     <Plan tight: 22 waypoints, not feasible, ...>
     """
-    check_arguments(seed=options["seed"], budget=options["budget"], seconds=options["seconds"])
     world = _with_budget(load_scenario_with_options(scenario, options), options["budget"])
     if waypoints is None:
         return _search_and_write(
@@ -174,7 +173,7 @@ def replan(
     >>> again.flown_legs, bool((again.waypoints[:4] == path.waypoints[:4]).all())
     (3, True)
     """
-    check_arguments(seed=options["seed"], budget=options["budget"], seconds=options["seconds"], at_leg=at_leg)
+    check_arguments(at_leg=at_leg)
     world = _with_budget(load_scenario_with_options(scenario, options), options["budget"])
     old_plan = old if isinstance(old, Plan) else read_plan(Path(old))
     check_same_mission(world, old_plan)

@@ -17,6 +17,7 @@ from logs.importers.motion import MotionLog
 from logs.importers.motion_log import read_motion
 from logs.recording.reader import read_log
 from logs.verdict.imported.model_comparison import Reflight
+from planfly.api.api_function import api_function
 from planfly.api.identifying import read_records_and_outputs
 from planfly.api.imported import read_imported
 from planfly.arguments import check_arguments
@@ -27,7 +28,6 @@ from planfly.flight_options import LogOptions, option_defaults
 from planfly.identification.base_numbers import varied_model
 from planfly.identification.records import MIN_CHECK_SECONDS
 from planfly.kernel_units.unit_kernels import FLYING
-from planfly.runtime.first_start import api_function
 from planfly.runtime.stages import stage
 from planfly.workflow.imported_flights import DrawnFlight, fly_draws
 from planfly.workflow.output_paths import PREDICT_FILES, check_output_folder, clean_folder
@@ -114,7 +114,7 @@ def predict(
     """
     if options["aircraft"] is None:
         raise PlanflyError.of_argument("aircraft", None, "name the aircraft that predicts the flight", shown="")
-    check_arguments(flight=options["flight"], datum=options["datum"], start=start)
+    check_arguments(start=start)
     if out is not None:
         check_output_folder(Path(out), overwrite)
     name = str(options["aircraft"])

@@ -10,9 +10,9 @@ from logs.recording.reader import FlightLog, read_log
 from logs.views.replay.instruments import Instruments, make_instruments
 from logs.views.replay.timeline import TimelineEntry
 from logs.views.replay.timeline import timeline as list_timeline
+from planfly.api.api_function import api_function
 from planfly.api.serving import link_access
 from planfly.arguments import check_arguments
-from planfly.runtime.first_start import api_function
 from world.argument_types import checks_types
 from world.errors import LogError
 from world.extras import requires_extra

@@ -10,9 +10,9 @@ from logs.recording.foxglove_scene import layout_text
 from logs.recording.reader import FlightLog, LogEvent, read_log
 from logs.verdict.verdict import Verdict
 from logs.views.report.compare import Comparison, compare_logs, write_comparison
+from planfly.api.api_function import api_function
 from planfly.flight_logs import judge_log
 from planfly.rtl.return_summary import return_summary
-from planfly.runtime.first_start import api_function
 from planfly.runtime.stages import stage
 from planfly.workflow.open_flight import open_flight
 from planfly.workflow.output_paths import COMPARE_FILES, LOG_FIGURES, check_output_file, clean_folder

@@ -35,6 +35,7 @@ from logs.verdict.returns.returns_text import (
 from logs.verdict.returns.suggest_returns import Remedy, is_improvement, suggest_parameters, suggest_rally_points
 from logs.verdict.suggestions import home_height, home_height_text
 from logs.views.exports.map_files import glide_shapes, kml_text, map_zones, plan_line, return_lines, track_line
+from planfly.api.api_function import api_function
 from planfly.api.flying import check_keywords_not_given, check_program
 from planfly.arguments import check_arguments
 from planfly.flight_logs import is_log
@@ -48,7 +49,6 @@ from planfly.rtl.sitl_returns import (
     check_returns_as_arduplane,
     fly_by_program,
 )
-from planfly.runtime.first_start import api_function
 from planfly.runtime.stages import stage
 from planfly.workflow.open_flight import open_flight
 from planfly.workflow.output_paths import RETURN_FILES, check_output_folder, clean_folder
@@ -236,7 +236,7 @@ def returns(
     >>> found.safe, found.returns.ranges[0].worst.target.name, found.glides.each[0].reach
     (False, 'home', 'home')
     """
-    check_arguments(every=every, points=points, seed=options["seed"], flight=options["flight"], datum=options["datum"])
+    check_arguments(every=every, points=points)
     path = Path(what) if isinstance(what, str | Path) else None
     request = _check_request(every, suggest, out, sitl, points, overwrite=overwrite)
     if path is not None and is_imported_log(path):

@@ -14,13 +14,13 @@ from flight.simulation.setup import EngineChoice
 from logs.recording.setup_attachments import package_versions
 from logs.verdict.judge_flight import judge_plan_only
 from logs.verdict.verdict import Verdict, verdict_json
+from planfly.api.api_function import api_function
 from planfly.api.exporting import format_judging_parameters
 from planfly.api.flying import check_program
 from planfly.arguments import check_arguments
 from planfly.flight_options import RunOptions, load_scenario_with_options, option_defaults
 from planfly.kernel_units.unit_kernels import GLIDING, PLANNING_AND_FLYING
 from planfly.rtl.return_summary import ReturnSummary, return_summary
-from planfly.runtime.first_start import api_function
 from planfly.runtime.stages import report_replaced, stage
 from planfly.workflow.flight_limits import FlightLimits, computing_time_key, length_and_duration_text
 from planfly.workflow.make_plan import make_plan, planning_conditions
@@ -158,10 +158,7 @@ def run(
     (False, 1, ['plan.json', 'mission.waypoints', 'mission.plan'])
     """
     limits = FlightLimits(options["max_hours"], options["max_log"])
-    check_arguments(
-        seed=seed, refine=refine, log_hz=options["log_hz"], max_hours=limits.hours, max_log=limits.megabytes
-    )
-    check_arguments(engine=options["engine"])
+    check_arguments(seed=seed, refine=refine)
     program = None if options["sitl"] is None else check_program(options["sitl"])
     world = load_scenario_with_options(scenario, options, program)
     chosen_seed, uav = choose_seed(world, seed), load_uav(world)

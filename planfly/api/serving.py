@@ -5,10 +5,10 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Unpack
 
+from planfly.api.api_function import api_function
 from planfly.arguments import check_arguments
 from planfly.flight_options import MissionOptions
 from planfly.kernel_units.unit_kernels import FLYING
-from planfly.runtime.first_start import api_function
 from planfly.runtime.process_setup import end_repeated_call
 from world.errors import FlightError, PlanflyError
 from world.extras import requires_extra
@@ -60,7 +60,7 @@ def serve(
     from planfly.live.served_vehicle import serve_vehicle
 
     access = link_access(to, bind, allow, sign_key)
-    check_arguments(served_speed=speed, seed=options["seed"])
+    check_arguments(served_speed=speed)
     serve_options = ServeOptions("" if mission is None else str(mission), speed, Path(log), options)
     flights = load_served_scenario(serve_options)
     if serve_options.logs.exists() and not serve_options.logs.is_dir():

@@ -29,12 +29,12 @@ from logs.verdict.measures.track_alignment import align_track
 from logs.verdict.measures.waypoint_circles import circles_text, waypoint_circles
 from logs.verdict.verdict import Verdict
 from logs.views.surveys import survey_chart
+from planfly.api.api_function import api_function
 from planfly.api.flying import check_keywords_not_given
-from planfly.arguments import CAMERA_FORMAT, check_arguments, is_valid_camera
+from planfly.arguments import CAMERA_FORMAT, is_valid_camera
 from planfly.flight_logs import is_log
 from planfly.flight_options import MissionOptions
 from planfly.kernel_units.unit_kernels import FLYING
-from planfly.runtime.first_start import api_function
 from planfly.runtime.stages import stage
 from planfly.surveys.survey_remedies import NearMiss, SurveyRemedy, find_survey_remedies
 from planfly.surveys.survey_text import (
@@ -196,7 +196,6 @@ def survey(
     options: options of a mission, see `planfly.fly`.
     Raises a `planfly.PlanflyError` for bad input, and for a mission without a survey.
     """
-    check_arguments(seed=options["seed"])
     user_camera = _parse_camera(camera)
     fixed_options: dict[str, Any] = {**options, "fence": options["fence"] or None, "suggest": suggest or None}
     if out is not None:

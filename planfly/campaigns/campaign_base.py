@@ -11,7 +11,6 @@ from typing import Any, Literal, NamedTuple, TypeGuard
 import numpy as np
 
 from aircraft.catalog import Aircraft, model_hash
-from aircraft.path_limits import Limits
 from aircraft.uncertainty import DRAWS_FILE, read_draws
 from flight.dynamics.fdm import Fdm, Variation
 from flight.dynamics.trim import steady_flight
@@ -22,7 +21,7 @@ from flight.simulation.setup import FlightSetup, make_limits
 from logs.verdict.conditions import Conditions, judging_conditions
 from planfly.campaigns.campaign_inputs import describe_differences, flatten_inputs, hash_input
 from planfly.campaigns.dispersions import DEFAULT_DISPERSIONS_NAME, QUANTITIES_OF_DRAWS, Dispersions, Draw, SpreadError
-from planfly.flight_options import MissionOptions, NamedFences, load_scenario_with_options, read_named_fences
+from planfly.flight_options import MissionOptions, load_scenario_with_options, read_named_fences
 from planfly.workflow.make_plan import Advance, make_plan
 from planfly.workflow.open_flight import make_setup, mission_of_plan, open_flight
 from planfly.workflow.pipeline import OffNominal
@@ -158,7 +157,15 @@ def open_campaign(
     fences, seed = read_named_fences(options.get("fence") or ()), options.get("seed")
     scenario = fences.add_to_scenario(load_scenario_with_options(target, options))
     has_plan_file = plan_file is not None and plan_file.is_file()
-    plan = read_plan(plan_file) if has_plan_file and plan_file is not None else _make_plan(scenario, seed, advance)
+    if has_plan_file and plan_file is not None:
+        plan = read_plan(plan_file)
+    else:
+        plan = make_plan(scenario, load_uav(scenario), choose_seed(scenario, seed), advance=advance)
+        if not plan.feasible:
+            raise MissionError(
+                f"{scenario.name}: no feasible plan was found, so there is no mission to fly; `planfly plan` shows why",
+                file=scenario.name,
+            )
     if has_plan_file and plan.scenario.to_json() != scenario.to_json():
         differences = describe_differences(*(flatten_inputs(opened.to_json()) for opened in (plan.scenario, scenario)))
         name = target if isinstance(target, str) else scenario.name
@@ -166,7 +173,15 @@ def open_campaign(
         raise MissionError(message, file=str(plan_file))
     if plan_file is not None and not has_plan_file:
         write_atomically(plan_file, plan_json(plan))
-    return _check_base(_make_base_from_plan(plan, fences, dispersions, choose_seed(scenario, seed)))
+    campaign_seed = choose_seed(scenario, seed)
+    plan_scenario = plan.scenario
+    uav = load_uav(plan_scenario)
+    mission = fences.add_to_mission(mission_of_plan(plan, uav))
+    placed_mission = place_stops(mission, plan_scenario.origin, plan_scenario.terrain)
+    dispersions = with_aircraft_draws(dispersions, uav.aircraft)
+    return _check_base(
+        CampaignBase(plan_scenario, uav, mission, placed_mission, plan, dispersions, campaign_seed, plan_scenario.name)
+    )
 
 
 def campaign_of_setup(setup: FlightSetup, dispersions: Dispersions) -> CampaignBase:
@@ -196,30 +211,6 @@ def _check_base(base: CampaignBase) -> CampaignBase:
     return base
 
 
-def _make_plan(scenario: Scenario, seed: int | None, advance: Advance | None) -> Plan:
-    """Plan a path in a scenario.  Raises MissionError if no feasible path is found."""
-    plan = make_plan(scenario, load_uav(scenario), choose_seed(scenario, seed), advance=advance)
-    if not plan.feasible:
-        raise MissionError(
-            f"{scenario.name}: no feasible plan was found, so there is no mission to fly; `planfly plan` shows why",
-            file=scenario.name,
-        )
-    return plan
-
-
-def _make_base_from_plan(plan: Plan, fences: NamedFences, dispersions: Dispersions, seed: int) -> CampaignBase:
-    """Return the base of a campaign that flies the mission of a plan.
-
-    seed: seed of the campaign.
-    """
-    scenario = plan.scenario
-    uav = load_uav(scenario)
-    mission = fences.add_to_mission(mission_of_plan(plan, uav))
-    placed_mission = place_stops(mission, scenario.origin, scenario.terrain)
-    dispersions = with_aircraft_draws(dispersions, uav.aircraft)
-    return CampaignBase(scenario, uav, mission, placed_mission, plan, dispersions, seed, scenario.name)
-
-
 def check_level_flight_at_medians(base: CampaignBase) -> None:
     """Raise SpreadError if the aircraft cannot fly level at the medians of the dispersions.
 
@@ -231,7 +222,13 @@ def check_level_flight_at_medians(base: CampaignBase) -> None:
     )
     aircraft = base.uav.aircraft
     check_level_flight(aircraft, base.uav.limits.envelope)
-    _check_draws(base)
+    draws = base.dispersions.draws
+    if draws is not None:
+        try:
+            Fdm(base.uav.aircraft, variation=Variation(properties=draws.properties(0)))
+        except FlightError as error:
+            message = f"{draws.source}: these draws belong to another aircraft: {error}"
+            raise SpreadError(message, file=draws.source, field=error.field) from error
     try:
         model = Fdm(aircraft, motor_braking=base.scenario.flight.motor_braking, variation=variation)
     except FlightError as error:
@@ -259,18 +256,6 @@ def check_level_flight_at_medians(base: CampaignBase) -> None:
 
 # Dispersed quantity that varies a property of a JSBSim model.
 _VARIED_PROPERTIES = {"aero/drag-factor": "drag", "aero/control-factor": "control_power"}
-
-
-def _check_draws(base: CampaignBase) -> None:
-    """Raise SpreadError if the draws set properties that the aircraft's model does not have."""
-    draws = base.dispersions.draws
-    if draws is None:
-        return
-    try:
-        Fdm(base.uav.aircraft, variation=Variation(properties=draws.properties(0)))
-    except FlightError as error:
-        message = f"{draws.source}: these draws belong to another aircraft: {error}"
-        raise SpreadError(message, file=draws.source, field=error.field) from error
 
 
 def with_aircraft_draws(dispersions: Dispersions, aircraft: Aircraft) -> Dispersions:
@@ -341,10 +326,23 @@ def vary_flight(base: CampaignBase, draw: Draw, wind: GivenWind | None = None) -
             plan = None if plan is None else replace(plan, scenario=with_ground(plan.scenario, terrain))
         home_error = _terrain_error_at_home(base, terrain)
         if home_error:
-            mission, placed = _with_moved_home(base, home_error)
+            # An autopilot measures the altitude of home where it is armed, so heights above home shift with it.
+            # ArduPlane also corrects its terrain data by their error at home (`AP_Terrain::update_reference_offset`),
+            # so heights above terrain shift by the same amount. Altitudes AMSL do not change.
+            mission, shifted_terrain = base.mission, base.scenario.terrain
+            if mission.home is not None:
+                mission = replace(mission, home=replace(mission.home, alt=mission.home.alt + home_error))
+            if shifted_terrain is not None:
+                shifted_terrain = replace(shifted_terrain, heights=shifted_terrain.heights + np.float32(home_error))
+            placed = place_stops(mission, base.scenario.origin, shifted_terrain, vertical_legs=base.plan is None)
     battery = base.uav.battery * values["battery"]
     draws = base.dispersions.draws
-    limits = _limits_in_wind(base.uav, scenario, is_drawn=draws is not None)
+    uav_limits = base.uav.limits
+    # The performance of a drawn aircraft is known exactly: its standard deviations are 0.
+    exact_envelope = replace(uav_limits.envelope, climb_sd=0.0, descent_sd=0.0, fastest_sd=0.0, power_sd=0.0)
+    envelope = exact_envelope if draws is not None else uav_limits.envelope
+    wind_limits = make_limits(scenario, envelope, uav_limits.airspeed, max_turn_bank(scenario, base.uav.autopilot))
+    limits = with_tracking_error(wind_limits, base.uav.autopilot, scenario)
     uav = replace(base.uav, limits=limits, battery=battery)
     setup = make_setup(scenario, uav, mission, draw.seed, plan=plan, placed=placed)
     properties = () if draws is None else draws.properties(draw.seed)
@@ -421,32 +419,3 @@ def _terrain_error_at_home(base: CampaignBase, varied_terrain: Terrain) -> float
     east, north = to_map(base.scenario.origin, home.lat_deg, home.lon_deg)
     error = float(varied_terrain.height(east, north)) - float(terrain.height(east, north))
     return 0.0 if math.isnan(error) else error
-
-
-def _with_moved_home(base: CampaignBase, home_error: float) -> tuple[Mission, PlacedMission]:
-    """Return a campaign's mission with home's altitude shifted by an error, and its stops with map positions.
-
-    An autopilot measures the altitude of home where it is armed, so heights above home shift with it.  ArduPlane also
-    corrects its terrain data by their error at home (`AP_Terrain::update_reference_offset`), so heights above terrain
-    shift by the same amount.  Altitudes AMSL do not change.
-    home_error: m.
-    """
-    mission, terrain = base.mission, base.scenario.terrain
-    if mission.home is not None:
-        mission = replace(mission, home=replace(mission.home, alt=mission.home.alt + home_error))
-    if terrain is not None:
-        terrain = replace(terrain, heights=terrain.heights + np.float32(home_error))
-    return mission, place_stops(mission, base.scenario.origin, terrain, vertical_legs=base.plan is None)
-
-
-def _limits_in_wind(uav: Uav, scenario: Scenario, *, is_drawn: bool) -> Limits:
-    """Return the UAV's limits in the wind of a scenario.
-
-    is_drawn: True if the model of the flight's aircraft is drawn at random.
-    """
-    uav_limits = uav.limits
-    # The performance of a drawn aircraft is known exactly: its standard deviations are 0.
-    exact_envelope = replace(uav_limits.envelope, climb_sd=0.0, descent_sd=0.0, fastest_sd=0.0, power_sd=0.0)
-    envelope = exact_envelope if is_drawn else uav_limits.envelope
-    limits = make_limits(scenario, envelope, uav_limits.airspeed, max_turn_bank(scenario, uav.autopilot))
-    return with_tracking_error(limits, uav.autopilot, scenario)

@@ -48,13 +48,15 @@ def difference_texts(stored: Mapping[str, Any], current: Mapping[str, Any]) -> l
     """Return a text for each input that differs, as in `describe_differences`."""
     names = [name for name in dict.fromkeys((*stored, *current)) if stored.get(name) != current.get(name)]
     # A number that was converted between units differs by rounding: name it only if nothing else differs.
-    names = [name for name in names if not _differs_by_rounding(stored.get(name), current.get(name))] or names
+    rounded_names = {
+        name
+        for name in names
+        if isinstance(stored.get(name), float)
+        and isinstance(current.get(name), float)
+        and math.isclose(stored[name], current[name], rel_tol=1e-12)
+    }
+    names = [name for name in names if name not in rounded_names] or names
     return [_difference_text(name, stored.get(name), current.get(name)) for name in names]
-
-
-def _differs_by_rounding(stored: Any, current: Any) -> bool:
-    """Return True if two values are numbers that are equal within rounding."""
-    return isinstance(stored, float) and isinstance(current, float) and math.isclose(stored, current, rel_tol=1e-12)
 
 
 def _difference_text(name: str, stored: Any, current: Any) -> str:

@@ -242,24 +242,11 @@ def parse_dispersions(text: str, name: str) -> Dispersions:
                 f"cannot be combined with [{_DRAWS_TABLE}] draws",
                 shown="",
             )
-    return Dispersions(varying, name, _read_named_draws(aircraft, name))
-
-
-def _read_named_draws(aircraft_table: Any, name: str) -> Draws:
-    """Read the file of draws of aircraft properties that a dispersions file names.
-
-    aircraft_table: table of the dispersions file; the path in it is relative to the dispersions file.
-    name: name of the dispersions file.
-    """
-    file_name = aircraft_table.get("draws") if isinstance(aircraft_table, dict) else None
-    if (
-        not isinstance(file_name, str)
-        or not file_name
-        or (isinstance(aircraft_table, dict) and len(aircraft_table) > 1)
-    ):
+    file_name = aircraft.get("draws") if isinstance(aircraft, dict) else None
+    if not isinstance(file_name, str) or not file_name or (isinstance(aircraft, dict) and len(aircraft) > 1):
         allowed = 'expected only a file of draws, such as draws = "mine/draws.csv"'
-        raise SpreadError.at(name, f"{_DRAWS_TABLE}.draws", aircraft_table, allowed, shown="")
-    return read_draws(Path(name).parent / Path(file_name).expanduser(), SpreadError)
+        raise SpreadError.at(name, f"{_DRAWS_TABLE}.draws", aircraft, allowed, shown="")
+    return Dispersions(varying, name, read_draws(Path(name).parent / Path(file_name).expanduser(), SpreadError))
 
 
 def _parse_quantity(quantity: Quantity, quantity_table: Any, name: str) -> VaryingQuantity:
@@ -283,7 +270,10 @@ def _parse_quantity(quantity: Quantity, quantity_table: Any, name: str) -> Varyi
     varying = VaryingQuantity(
         quantity, str(distribution), tuple((key, float(value)) for key, value in parameters.items()), source
     )
-    fraction = _compute_fraction_inside(varying, name)
+    fraction = varying.fraction_inside
+    if math.isnan(fraction):
+        allowed = f"these parameters are invalid for {varying.distribution}"
+        raise SpreadError.at(name, varying.quantity.name, _call_text(varying), allowed)
     if not fraction >= MIN_FRACTION_INSIDE:
         allowed = (
             f"only {100.0 * fraction:.1f} % of the distribution lies within {quantity.low:g}..{quantity.high:g}"
@@ -339,18 +329,6 @@ def _check_parameters(distribution: str, entries: dict[str, Any], name: str, qua
     if missing:
         reason_missing = f"missing; {distribution} needs {', '.join(shape_parameters)}"
         raise SpreadError.at(name, f"{quantity}.{missing[0]}", None, reason_missing, shown="")
-
-
-def _compute_fraction_inside(varying: VaryingQuantity, name: str) -> float:
-    """Return the fraction of a distribution within the quantity's range.
-
-    Raises SpreadError for parameters that are invalid for the distribution.
-    """
-    fraction = varying.fraction_inside
-    if math.isnan(fraction):
-        allowed = f"these parameters are invalid for {varying.distribution}"
-        raise SpreadError.at(name, varying.quantity.name, _call_text(varying), allowed)
-    return fraction
 
 
 def _call_text(varying: VaryingQuantity) -> str:

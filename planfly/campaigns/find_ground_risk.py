@@ -454,7 +454,22 @@ def find_ground_risk(base: CampaignBase, goal: GroundRiskGoal, workers: Workers,
         least_area = path.buffer(min_geography_half_width(aircraft.wing_span))
         read_population(goal.population, goal.unit, scenario.origin, least_area)
     rows = _fly_excursions(base, goal, path, workers, advance)
-    glide_ratio = _best_glide_ratio(base) if goal.glide else None
+    # Best glide ratio in calm air: the horizontal distance divided by the lost height.
+    glide_ratio = None
+    if goal.glide:
+        from flight.autopilots.point_mass import make_point_mass
+
+        setup = base.nominal_setup()
+        model = make_point_mass(aircraft, setup.envelope, setup.airspeed, Wind())
+        if not model.glides:
+            message = f"{aircraft.name}: its model has no trim with the throttle closed, so its glide is unknown"
+            raise FlightError(message, file=aircraft.name)
+        altitude = float(setup.route.positions[0, 2])
+        airspeeds = np.linspace(aircraft.airspeed_min, aircraft.airspeed_max, 20)
+        glide_ratio = max(
+            1.0 / float(glide_slopes(model, float(airspeed), altitude, altitude + 1.0).table.min())
+            for airspeed in airspeeds
+        )
     return with_ground_class(make_volumes(base, goal, path, rows, glide_ratio))
 
 
@@ -517,26 +532,6 @@ def _fly_excursions(
     if not rows:
         raise FlightError(f"{base.name}: no flight could be flown", file=base.name)
     return tuple(rows[index] for index in sorted(rows))
-
-
-def _best_glide_ratio(base: CampaignBase) -> float:
-    """Return the best glide ratio in calm air, the horizontal distance divided by the lost height.
-
-    Raises FlightError for a model without trims with the throttle closed.
-    """
-    from flight.autopilots.point_mass import make_point_mass
-
-    aircraft, setup = base.uav.aircraft, base.nominal_setup()
-    model = make_point_mass(aircraft, setup.envelope, setup.airspeed, Wind())
-    if not model.glides:
-        message = f"{aircraft.name}: its model has no trim with the throttle closed, so its glide is unknown"
-        raise FlightError(message, file=aircraft.name)
-    altitude = float(setup.route.positions[0, 2])
-    airspeeds = np.linspace(aircraft.airspeed_min, aircraft.airspeed_max, 20)
-    return max(
-        1.0 / float(glide_slopes(model, float(airspeed), altitude, altitude + 1.0).table.min())
-        for airspeed in airspeeds
-    )
 
 
 def make_volumes(

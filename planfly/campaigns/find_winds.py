@@ -394,7 +394,21 @@ class _Search:
         boundaries = tuple(direction.boundary() for direction in self.directions)
         conditions = replace(self._base.conditions(), wind_mps=None, wind_from_deg=None)
         calm_failures = self._calm_failures(boundaries)
-        failures = self._failures_by_direction(boundaries)
+        # Failures of each direction in winds up to the upper bound of its boundary. If no flight failed in such a
+        # wind, they are those in the weakest wind in which a flight failed.
+        failures_by_direction = []
+        for number, boundary in enumerate(boundaries):
+            # After a search that ended in calm air, `_failed` is shorter than `flown`.
+            failed_flights = [
+                (speed, failed)
+                for (direction, speed, _), failed in zip(self.flown, self._failed, strict=False)
+                if direction == number and failed
+            ]
+            max_speed = max(boundary.high, min((speed for speed, _ in failed_flights), default=0.0))
+            failures_by_direction.append(
+                count_failures(failed for speed, failed in failed_flights if speed <= max_speed)
+            )
+        failures = tuple(failures_by_direction)
         return WindsResult(
             self.goal,
             boundaries,
@@ -415,23 +429,6 @@ class _Search:
         failed = [row.failures for row in rows if row.outcome != "undecided"]
         calm = CalmFailures(0.0, len(rows), len(failed), count_failures(failed))
         return replace(self.result(), boundaries=boundaries, calm=calm, failures=())
-
-    def _failures_by_direction(self, boundaries: tuple[WindBoundary, ...]) -> tuple[tuple[RuleFailures, ...], ...]:
-        """Return the failures of each direction in winds up to the upper bound of its boundary.
-
-        If no flight failed in such a wind, the failures are those in the weakest wind in which a flight failed.
-        """
-        failures = []
-        for number, boundary in enumerate(boundaries):
-            # After a search that ended in calm air, `_failed` is shorter than `flown`.
-            failed_flights = [
-                (speed, failed)
-                for (direction, speed, _), failed in zip(self.flown, self._failed, strict=False)
-                if direction == number and failed
-            ]
-            max_speed = max(boundary.high, min((speed for speed, _ in failed_flights), default=0.0))
-            failures.append(count_failures(failed for speed, failed in failed_flights if speed <= max_speed))
-        return tuple(failures)
 
     def _calm_failures(self, boundaries: tuple[WindBoundary, ...]) -> CalmFailures | None:
         """Return the failures in the weakest flown wind of the directions whose boundary is calm air.

@@ -74,7 +74,14 @@ def risk_lines(result: GroundRiskResult) -> list[str]:
         f" {result.footprint.area / 1e6:.2f} km²",
     ]
     if result.population is not None:
-        lines.append(_population_line(result.population))
+        population = result.population
+        lat, lon = population.max_position
+        population_line = (
+            f"population: {density_text(population)}, at {lat:.5f}, {lon:.5f};"
+            f" mean {format_density(population.mean_density)}"
+            f" (cells of {population.cell_size:.0f} m of {population.source})"
+        )
+        lines.append(population_line)
     if result.entered_zones:
         lines.append(f"zones below or in the operational volume: {', '.join(result.entered_zones)}")
     lines += _flight_lines(result)
@@ -84,16 +91,6 @@ def risk_lines(result: GroundRiskResult) -> list[str]:
 def _share_text(result: GroundRiskResult) -> str:
     """Return a text on the fraction of the flights that stay in the flight geography."""
     return f"{result.goal.probability:.0%} of {count_text(len(result.rows), 'flight')}"
-
-
-def _population_line(population: Population) -> str:
-    """Return the line on the population of the footprint."""
-    lat, lon = population.max_position
-    return (
-        f"population: {density_text(population)}, at {lat:.5f}, {lon:.5f};"
-        f" mean {format_density(population.mean_density)}"
-        f" (cells of {population.cell_size:.0f} m of {population.source})"
-    )
 
 
 def _flight_lines(result: GroundRiskResult) -> list[str]:

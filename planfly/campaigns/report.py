@@ -527,22 +527,6 @@ def _deciding_rules(winds: WindsResult) -> list[str]:
     return [deciding_rule(by_rule) for by_rule in winds.failures] or [""] * len(winds.boundaries)
 
 
-def _deciding_lines(winds: WindsResult) -> list[str]:
-    """Return a line about the rules that fail the most flights, each with its directions; [] without failures."""
-    directions_by_rule: dict[str, list[str]] = {}
-    first = 0
-    for rule, group in groupby(_deciding_rules(winds)):
-        last = first + len(list(group)) - 1
-        text = f"{winds.from_deg(first):g}°" + (f" to {winds.from_deg(last):g}°" if last > first else "")
-        directions_by_rule.setdefault(rule, []).append(text)
-        first = last + 1
-    directions_by_rule.pop("", None)
-    if not directions_by_rule:
-        return []
-    texts = (f"{RULE_WORDS[rule].title} from {', '.join(texts)}" for rule, texts in directions_by_rule.items())
-    return [f"most frequent failure in winds up to the boundary: {'; '.join(texts)}"]
-
-
 def _lines_without_failures(winds: WindsResult) -> list[str]:
     """Return a line about the directions in which no flight failed; [] if there are none.
 
@@ -638,12 +622,24 @@ def wind_lines(winds: WindsResult) -> list[str]:
             f"in {wind}, {calm.failed_count} of {count_text(calm.flights, 'flight')} fail",
             *failure_lines(calm.by_rule),
         ]
+    directions_by_rule: dict[str, list[str]] = {}
+    first = 0
+    for rule, group in groupby(_deciding_rules(winds)):
+        last = first + len(list(group)) - 1
+        text = f"{winds.from_deg(first):g}°" + (f" to {winds.from_deg(last):g}°" if last > first else "")
+        directions_by_rule.setdefault(rule, []).append(text)
+        first = last + 1
+    directions_by_rule.pop("", None)
+    deciding_lines = []
+    if directions_by_rule:
+        texts = (f"{RULE_WORDS[rule].title} from {', '.join(texts)}" for rule, texts in directions_by_rule.items())
+        deciding_lines = [f"most frequent failure in winds up to the boundary: {'; '.join(texts)}"]
     return [
         *answer_lines,
         *calm_lines,
         *_flown_bound_lines(winds),
         *(() if winds.conditions is None else flown_lines(winds.conditions)),
-        *_deciding_lines(winds),
+        *deciding_lines,
         *_lines_without_failures(winds),
         *_lost_lines(winds),
         flights_text,

@@ -183,6 +183,12 @@ def summarise_campaign(base: CampaignBase, goal: Goal, estimate: Estimate, store
         known_margins = store.column(words.margin_column)
         margins[rule] = np.where(has_failed & ~(known_margins < 0.0), -np.inf, known_margins)
     is_undecided = estimate.answer == "undecided" and estimate.tally.flown > 0
+    # Reason why the mission fails as a whole in nominal conditions.
+    mission_fault = ""
+    if any(failures.rule == "mission" for failures in by_rule):
+        findings = mission_findings(base.nominal_setup())
+        reasons = (finding.reason for finding in findings if finding.ok is False and finding.place.item is None)
+        mission_fault = next(reasons, "")
     return CampaignSummary(
         name=base.name,
         seed=base.seed,
@@ -207,14 +213,8 @@ def summarise_campaign(base: CampaignBase, goal: Goal, estimate: Estimate, store
         deciding_flights=Estimator(goal).deciding_flights(estimate.tally) if is_undecided else None,
         unjudged_return=missing_home_text(base.nominal_setup()),
         undecided_text=next(filter(None, store.texts("undecided_text")), ""),
-        mission_fault=_mission_fault(base) if any(failures.rule == "mission" for failures in by_rule) else "",
+        mission_fault=mission_fault,
     )
-
-
-def _mission_fault(base: CampaignBase) -> str:
-    """Return the reason why a mission fails as a whole in nominal conditions; "" if it does not."""
-    findings = mission_findings(base.nominal_setup())
-    return next((finding.reason for finding in findings if finding.ok is False and finding.place.item is None), "")
 
 
 def _margin_quantile(margins: Floats) -> float | None:
@@ -298,23 +298,18 @@ def _rule_sensitivities(base: CampaignBase, store: Store, margins: Floats) -> tu
     lower_limit = min(0.0, float(np.min(margins[np.isfinite(margins)], initial=0.0)))
     margin = np.maximum(margins[is_judged], lower_limit)
     sensitivities = []
-    for name, all_values in _drawn_values(base, store).items():
+    drawn_values = {varying.quantity.name: store.column(varying.quantity.name) for varying in base.dispersions.varying}
+    draws = base.dispersions.draws
+    if draws is not None:
+        # As texts, because the seeds have more digits than a float.
+        rows = [draws.row(int(seed)) for seed in store.texts("seed")]
+        drawn_values |= dict(zip(draws.names, draws.values[rows].T, strict=True))
+    for name, all_values in drawn_values.items():
         values = all_values[is_judged]
         index = first_order_index(values, margin)
         p_value = chance_probability(values, margin)
         sensitivities.append(Sensitivity(name, index, rank_slope(values, margin), p_value))
     return tuple(sorted(sensitivities, key=lambda sensitivity: -sensitivity.index))
-
-
-def _drawn_values(base: CampaignBase, store: Store) -> dict[str, Floats]:
-    """Return the values of each varying quantity and of each drawn property of the aircraft, (n,), keyed by name."""
-    values = {varying.quantity.name: store.column(varying.quantity.name) for varying in base.dispersions.varying}
-    draws = base.dispersions.draws
-    if draws is not None:
-        # As texts, because the seeds have more digits than a float.
-        rows = [draws.row(int(seed)) for seed in store.texts("seed")]
-        values |= dict(zip(draws.names, draws.values[rows].T, strict=True))
-    return values
 
 
 def summary_json(summary: CampaignSummary) -> str:

@@ -1,1 +1,1 @@
-"""Commands of planfly, one module each, with a function of the same name that `registry` finds."""
+"""Commands of planfly, one module each, whose functions `registry` lists."""

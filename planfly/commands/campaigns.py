@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from planfly.commands.registry import call_api
 from planfly.terminal.arguments import complete_mission_or_scenario, file_completer, number_parser, with_completer
 from planfly.terminal.command_parser import CommandParser, LineParser
 from planfly.terminal.exit_codes import FLYABLE, INCOMPLETE, NOT_FLYABLE
@@ -17,6 +16,7 @@ from planfly.terminal.options import (
     add_result_options,
     add_steering_options,
     add_world_options,
+    call_api,
 )
 from planfly.terminal.output import write_error_if_requested, write_json_if_requested, write_suite_if_requested
 from planfly.workflow.output_paths import RESULTS
@@ -129,8 +129,8 @@ def _add_shared_options(parser: CommandParser) -> None:
     parser.add_argument(
         "--resume",
         action="store_true",
-        help="continue the campaign in --out, with its options unless they are given; an option that contradicts them "
-        "is refused",
+        help="continue the campaign in --out with the options of its flights; an option that contradicts them is "
+        "refused",
     )
     add_result_options(
         parser,

@@ -6,7 +6,6 @@ from dataclasses import fields
 from typing import TYPE_CHECKING
 
 from planfly.arguments import CHOICES
-from planfly.commands.registry import call_api
 from planfly.terminal.arguments import (
     IMPORTED_LOG_SUFFIXES,
     MISSION_SUFFIXES,
@@ -22,6 +21,7 @@ from planfly.terminal.options import (
     add_imported_log_options,
     add_result_options,
     add_world_options,
+    call_api,
 )
 from planfly.terminal.output import write_json_if_requested, write_junit_if_requested
 from planfly.terminal.results import print_warnings

@@ -4,7 +4,6 @@ import argparse
 import shlex
 from typing import TYPE_CHECKING
 
-from planfly.commands.registry import call_api
 from planfly.terminal.arguments import MISSION_SUFFIXES, file_completer, number_parser, with_completer
 from planfly.terminal.command_parser import LineParser, colour_text
 from planfly.terminal.exit_codes import verdict_code
@@ -13,6 +12,7 @@ from planfly.terminal.options import (
     add_log_rate_option,
     add_result_options,
     add_world_options,
+    call_api,
 )
 from planfly.terminal.output import write_json_if_requested, write_junit_if_requested
 from planfly.terminal.results import print_engine, print_warnings

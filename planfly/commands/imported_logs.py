@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from planfly.commands.check import LOGS
-from planfly.commands.registry import call_api
 from planfly.terminal.arguments import IMPORTED_LOG_SUFFIXES, complete_aircraft, file_completer, with_completer
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import FLYABLE, INCOMPLETE, verdict_code
@@ -15,6 +14,7 @@ from planfly.terminal.options import (
     add_result_options,
     add_turbulence_option,
     add_world_options,
+    call_api,
 )
 from planfly.terminal.output import write_json_if_requested, write_junit_if_requested
 from planfly.terminal.results import warn_about_incomplete_log

@@ -5,7 +5,6 @@ from typing import TYPE_CHECKING
 
 from planfly.arguments import CHOICES
 from planfly.commands.check import add_mission_or_log_argument
-from planfly.commands.registry import call_api
 from planfly.terminal.arguments import number_parser, parse_position
 from planfly.terminal.command_parser import LineParser, colour_text
 from planfly.terminal.exit_codes import FLYABLE, INCOMPLETE, NOT_FLYABLE
@@ -15,6 +14,7 @@ from planfly.terminal.options import (
     add_result_options,
     add_steering_options,
     add_world_options,
+    call_api,
 )
 from planfly.terminal.output import write_json_if_requested
 

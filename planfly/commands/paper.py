@@ -5,11 +5,10 @@ from dataclasses import asdict
 from pathlib import Path
 
 from planfly.arguments import CHOICES
-from planfly.commands.registry import call_api
 from planfly.terminal.arguments import number_parser, parse_problems
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import FLYABLE
-from planfly.terminal.options import add_result_options
+from planfly.terminal.options import add_result_options, call_api
 from planfly.terminal.output import write_json_if_requested
 from planfly.workflow.output_paths import RESULTS
 

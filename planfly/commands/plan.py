@@ -7,7 +7,6 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import TYPE_CHECKING
 
-from planfly.commands.registry import call_api
 from planfly.terminal.arguments import file_completer, number_parser, parse_budget, parse_threat, with_completer
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.dispersed_flights import check_flights_option, fly_dispersed
@@ -18,6 +17,7 @@ from planfly.terminal.options import (
     add_flights_option,
     add_result_options,
     add_scenario_argument,
+    call_api,
 )
 from planfly.terminal.output import write_json_if_requested
 from planfly.terminal.results import print_warnings

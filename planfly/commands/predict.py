@@ -5,7 +5,6 @@ import math
 from typing import TYPE_CHECKING
 
 from planfly.commands.check import LOGS
-from planfly.commands.registry import call_api
 from planfly.terminal.arguments import IMPORTED_LOG_SUFFIXES, file_completer, number_parser, with_completer
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import FLYABLE
@@ -14,6 +13,7 @@ from planfly.terminal.options import (
     add_imported_log_options,
     add_result_options,
     add_world_options,
+    call_api,
 )
 from planfly.terminal.output import write_json_if_requested
 

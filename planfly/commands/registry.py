@@ -1,46 +1,63 @@
 """List the commands, from which the parser, the help, the schemas and the dispatch are made.
 
-A command is a module of this package with two functions: ``add_NAME_parser`` adds its parser to the parser of the
-command line, and ``NAME`` takes the parsed arguments, calls the API (`call_api`), writes the results to standard output
-and the progress to standard error, and returns the exit code. The API compiles the kernels that it needs.
-All modules are light: the code that a command needs is imported when the command runs.
+A command is two functions of a module of this package: ``add_NAME_parser`` adds its parser to the parser of the
+command line, and ``NAME`` takes the parsed arguments, calls the API (`planfly.terminal.options.call_api`), writes the
+results to standard output and the progress to standard error, and returns the exit code. The API compiles the kernels
+that it needs. All modules are light: the code that a command needs is imported when the command runs.
 """
 
 import argparse
-import inspect
 import json
 from collections.abc import Callable
 from importlib import import_module
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 from planfly._version import __version__
+from planfly.commands import (
+    aircraft,
+    battery,
+    campaigns,
+    check,
+    compare,
+    export,
+    fly,
+    ground_risk,
+    imported_logs,
+    link,
+    new,
+    paper,
+    plan,
+    predict,
+    recover,
+    replay,
+    report,
+    returns,
+    run,
+    serve,
+    shell,
+    studio,
+    survey,
+    terrain,
+    window,
+)
 from planfly.terminal.command_parser import LineParser
-
-Result = TypeVar("Result")
 
 
 class Command(NamedTuple):
     """A command of planfly.
 
     section: the heading above the command in ``planfly --help``.
+    add_parser: adds the parser of the command to that of the command line.
+    run: executes the command, and returns the exit code.
     answer: class of the answer with --json, in `planfly.terminal.answers`, or "MODULE.CLASS" in `planfly.terminal`; ""
         for a command without --json.
-    module, function: names in this package; "" if they equal the name of the command.
     """
 
     name: str
     section: str
+    add_parser: Callable[[LineParser], None]
+    run: Callable[[argparse.Namespace], int]
     answer: str = ""
-    module: str = ""
-    function: str = ""
-
-    def load(self, name_format: str = "{}") -> Any:
-        """Import the command's module, and return the function of this command.
-
-        name_format: "{}" for the function that executes the command, "add_{}_parser" for the one that adds its parser.
-        """
-        module = import_module(f"planfly.commands.{self.module or self.name}")
-        return getattr(module, name_format.format(self.function or self.name))
 
 
 # Section titles of the help.
@@ -53,35 +70,41 @@ _HELP = "help"
 
 # All commands, in the order of the help.
 COMMANDS = (
-    Command("run", _PLAN_AND_FLY, "RunAnswer"),
-    Command("plan", _PLAN_AND_FLY, "plan_answers.PlanDocument"),
-    Command("export", _PLAN_AND_FLY, "ExportAnswer"),
-    Command("fly", _PLAN_AND_FLY, "FlyAnswer"),
-    Command("studio", _PLAN_AND_FLY),
-    Command("serve", _PLAN_AND_FLY),
-    Command("check", _JUDGE_AND_SHOW, "verdict_answers.CheckDocument"),
-    Command("returns", _JUDGE_AND_SHOW, "returns_answers.ReturnsAnswer"),
-    Command("link", _JUDGE_AND_SHOW, "link_answers.LinkAnswer"),
-    Command("survey", _JUDGE_AND_SHOW, "survey_answers.SurveyAnswer"),
-    Command("report", _JUDGE_AND_SHOW, "ReportAnswer"),
-    Command("compare", _JUDGE_AND_SHOW, "CompareDocument"),
-    Command("replay", _JUDGE_AND_SHOW, "ReplayAnswer"),
-    Command("recover", _JUDGE_AND_SHOW, "RecoverAnswer"),
-    Command("import", _AUTOPILOT_LOGS, "ImportAnswer", "imported_logs", "import_log"),
-    Command("refly", _AUTOPILOT_LOGS, "ReflyAnswer", "imported_logs"),
-    Command("predict", _AUTOPILOT_LOGS, "PredictAnswer"),
-    Command("campaign", _MANY_FLIGHTS, "CampaignDocument", "campaigns"),
-    Command("winds", _MANY_FLIGHTS, "WindsDocument", "campaigns"),
-    Command("battery", _MANY_FLIGHTS, "battery_answers.BatteryAnswer"),
-    Command("window", _MANY_FLIGHTS, "window_answers.WindowAnswer"),
-    Command("ground-risk", _MANY_FLIGHTS, "ground_risk_answers.GroundRiskAnswer", "ground_risk", "ground_risk"),
-    Command("paper", _MANY_FLIGHTS, "PaperAnswer"),
-    Command("aircraft", _AIRCRAFT, "AircraftAnswer"),
-    Command("scenarios", _AIRCRAFT, "ScenariosAnswer", "shell"),
-    Command("new", _AIRCRAFT, "NewAnswer"),
-    Command("terrain", _AIRCRAFT, "TerrainAnswer"),
-    Command("help", _HELP, module="shell", function="show_help"),
-    Command("completion", _HELP, module="shell"),
+    Command("run", _PLAN_AND_FLY, run.add_run_parser, run.run, "RunAnswer"),
+    Command("plan", _PLAN_AND_FLY, plan.add_plan_parser, plan.plan, "plan_answers.PlanDocument"),
+    Command("export", _PLAN_AND_FLY, export.add_export_parser, export.export, "ExportAnswer"),
+    Command("fly", _PLAN_AND_FLY, fly.add_fly_parser, fly.fly, "FlyAnswer"),
+    Command("studio", _PLAN_AND_FLY, studio.add_studio_parser, studio.studio),
+    Command("serve", _PLAN_AND_FLY, serve.add_serve_parser, serve.serve),
+    Command("check", _JUDGE_AND_SHOW, check.add_check_parser, check.check, "verdict_answers.CheckDocument"),
+    Command("returns", _JUDGE_AND_SHOW, returns.add_returns_parser, returns.returns, "returns_answers.ReturnsAnswer"),
+    Command("link", _JUDGE_AND_SHOW, link.add_link_parser, link.link, "link_answers.LinkAnswer"),
+    Command("survey", _JUDGE_AND_SHOW, survey.add_survey_parser, survey.survey, "survey_answers.SurveyAnswer"),
+    Command("report", _JUDGE_AND_SHOW, report.add_report_parser, report.report, "ReportAnswer"),
+    Command("compare", _JUDGE_AND_SHOW, compare.add_compare_parser, compare.compare, "CompareDocument"),
+    Command("replay", _JUDGE_AND_SHOW, replay.add_replay_parser, replay.replay, "ReplayAnswer"),
+    Command("recover", _JUDGE_AND_SHOW, recover.add_recover_parser, recover.recover, "RecoverAnswer"),
+    Command("import", _AUTOPILOT_LOGS, imported_logs.add_import_log_parser, imported_logs.import_log, "ImportAnswer"),
+    Command("refly", _AUTOPILOT_LOGS, imported_logs.add_refly_parser, imported_logs.refly, "ReflyAnswer"),
+    Command("predict", _AUTOPILOT_LOGS, predict.add_predict_parser, predict.predict, "PredictAnswer"),
+    Command("campaign", _MANY_FLIGHTS, campaigns.add_campaign_parser, campaigns.campaign, "CampaignDocument"),
+    Command("winds", _MANY_FLIGHTS, campaigns.add_winds_parser, campaigns.winds, "WindsDocument"),
+    Command("battery", _MANY_FLIGHTS, battery.add_battery_parser, battery.battery, "battery_answers.BatteryAnswer"),
+    Command("window", _MANY_FLIGHTS, window.add_window_parser, window.window, "window_answers.WindowAnswer"),
+    Command(
+        "ground-risk",
+        _MANY_FLIGHTS,
+        ground_risk.add_ground_risk_parser,
+        ground_risk.ground_risk,
+        "ground_risk_answers.GroundRiskAnswer",
+    ),
+    Command("paper", _MANY_FLIGHTS, paper.add_paper_parser, paper.paper, "PaperAnswer"),
+    Command("aircraft", _AIRCRAFT, aircraft.add_aircraft_parser, aircraft.aircraft, "AircraftAnswer"),
+    Command("scenarios", _AIRCRAFT, shell.add_scenarios_parser, shell.scenarios, "ScenariosAnswer"),
+    Command("new", _AIRCRAFT, new.add_new_parser, new.new, "NewAnswer"),
+    Command("terrain", _AIRCRAFT, terrain.add_terrain_parser, terrain.terrain, "TerrainAnswer"),
+    Command("help", _HELP, shell.add_show_help_parser, shell.show_help),
+    Command("completion", _HELP, shell.add_completion_parser, shell.completion),
 )
 # The same by name.
 COMMANDS_BY_NAME = {command.name: command for command in COMMANDS}
@@ -103,22 +126,8 @@ def build_parser() -> LineParser:
     )
     for command in COMMANDS:
         parser.start_section(command.section)
-        command.load("add_{}_parser")(parser)
+        command.add_parser(parser)
     return parser
-
-
-def call_api(function: Callable[..., Result], args: argparse.Namespace, **overrides: Any) -> Result:
-    """Call a function of the API with the options that match its keywords, and return its result.
-
-    An option that was not given (None) leaves its keyword at the default.
-    overrides: keywords that override the options.
-
-    >>> call_api(lambda *, seed=1, out="here": (seed, out), argparse.Namespace(seed=3, out=None, json=None))
-    (3, 'here')
-    """
-    parameters = inspect.signature(function).parameters
-    options = {name: value for name, value in vars(args).items() if name in parameters} | overrides
-    return function(**{name: value for name, value in options.items() if value is not None})
 
 
 # ----------------------------------------------------------------------

@@ -7,7 +7,6 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from planfly.commands.registry import call_api
 from planfly.terminal.arguments import number_parser, parse_time_or_stations
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.control_characters import escape_controls
@@ -16,6 +15,7 @@ from planfly.terminal.options import (
     add_log_argument,
     add_result_options,
     add_vehicle_link_options,
+    call_api,
     print_and_flush,
     watch_stop_signals,
 )

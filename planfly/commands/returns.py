@@ -5,7 +5,6 @@ import math
 from typing import TYPE_CHECKING
 
 from planfly.commands.check import add_mission_or_log_argument
-from planfly.commands.registry import call_api
 from planfly.terminal.arguments import (
     number_parser,
 )
@@ -18,6 +17,7 @@ from planfly.terminal.options import (
     add_sitl_option,
     add_steering_options,
     add_world_options,
+    call_api,
 )
 from planfly.terminal.output import write_json_if_requested
 

@@ -4,7 +4,6 @@ import argparse
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from planfly.commands.registry import call_api
 from planfly.terminal.arguments import number_parser
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.dispersed_flights import check_flights_option, fly_dispersed
@@ -16,6 +15,7 @@ from planfly.terminal.options import (
     add_result_options,
     add_scenario_argument,
     add_terrain_option,
+    call_api,
 )
 from planfly.terminal.output import write_json_if_requested, write_junit_if_requested
 from planfly.terminal.results import print_engine

@@ -2,7 +2,6 @@
 
 import argparse
 
-from planfly.commands.registry import call_api
 from planfly.terminal.arguments import MISSION_SUFFIXES, file_completer, number_parser, with_completer
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import FLYABLE
@@ -11,6 +10,7 @@ from planfly.terminal.options import (
     add_steering_options,
     add_vehicle_link_options,
     add_world_options,
+    call_api,
     print_and_flush,
     watch_stop_signals,
 )

@@ -2,7 +2,6 @@
 
 import argparse
 
-from planfly.commands.registry import call_api
 from planfly.terminal.arguments import (
     IMPORTED_LOG_SUFFIXES,
     MISSION_SUFFIXES,
@@ -16,6 +15,7 @@ from planfly.terminal.options import (
     add_aircraft_and_wind_options,
     add_autopilot_options,
     add_world_options,
+    call_api,
     print_and_flush,
     watch_stop_signals,
 )

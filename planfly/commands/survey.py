@@ -5,7 +5,6 @@ from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING
 
-from planfly.commands.registry import call_api
 from planfly.terminal.arguments import MISSION_SUFFIXES, file_completer, number_parser, parse_camera, with_completer
 from planfly.terminal.command_parser import LineParser, colour_text
 from planfly.terminal.exit_codes import NOT_FLYABLE, verdict_code
@@ -14,6 +13,7 @@ from planfly.terminal.options import (
     add_result_options,
     add_steering_options,
     add_world_options,
+    call_api,
 )
 from planfly.terminal.output import write_json_if_requested
 

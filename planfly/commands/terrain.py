@@ -3,11 +3,10 @@
 import argparse
 import shlex
 
-from planfly.commands.registry import call_api
 from planfly.terminal.arguments import MISSION_SUFFIXES, file_completer, number_parser, parse_area, with_completer
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import FLYABLE
-from planfly.terminal.options import add_result_options
+from planfly.terminal.options import add_result_options, call_api
 from planfly.terminal.output import write_json_if_requested
 from planfly.terminal.results import print_warnings
 

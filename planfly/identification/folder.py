@@ -172,8 +172,16 @@ def make_folder_files(identified: Identified, name: str, battery: tuple[float, f
             rates = parameters.get("TECS_CLMB_MAX", math.inf), parameters.get("TECS_SINK_MAX", math.inf)
             mission = make_identification_mission(aircraft, envelope, *home, max_rates=rates)
             files["identify.waypoints"] = waypoints_text(mission)
+    log, base_file = identified.logs[-1], identified.base.folder / AIRCRAFT_FILE
+    parameters = select_flown_parameters(log)
+    if not parameters:
+        parameter_file = {AIRCRAFT_FILE: base_file.read_text(encoding="utf-8")} if base_file.is_file() else {}
+    else:
+        lines = [f"# Parameters of {Path(log.source).name} that determine flight; hardware parameters are left out."]
+        lines += [f"{name} {value:.9g}" for name, value in sorted(parameters.items())]
+        parameter_file = {AIRCRAFT_FILE: "\n".join(lines) + "\n"}
     return files | {
-        **_format_parameter_file(identified),
+        **parameter_file,
         "ardupilot.toml": _format_servo_file(identified.outputs),
         "posterior.toml": format_posterior(identified),
         "draws.csv": draws_text(identified.aircraft_draws()),
@@ -275,20 +283,6 @@ def select_flown_parameters(log: MotionLog) -> dict[str, float]:
     }
     flight_parameters = other_parameters | law_parameters.by_origin("file")
     return {name: value for name, value in flight_parameters.items() if not name.startswith(_HARDWARE_PREFIXES)}
-
-
-def _format_parameter_file(identified: Identified) -> dict[str, str]:
-    """Return the text of ``ardupilot.parm`` by this file name, from the parameters of the last log.
-
-    For a log without parameters the base's file is copied; if the base has no such file, the result is empty.
-    """
-    log, base_file = identified.logs[-1], identified.base.folder / AIRCRAFT_FILE
-    parameters = select_flown_parameters(log)
-    if not parameters:
-        return {AIRCRAFT_FILE: base_file.read_text(encoding="utf-8")} if base_file.is_file() else {}
-    lines = [f"# Parameters of {Path(log.source).name} that determine flight; hardware parameters are left out."]
-    lines += [f"{name} {value:.9g}" for name, value in sorted(parameters.items())]
-    return {AIRCRAFT_FILE: "\n".join(lines) + "\n"}
 
 
 def _format_servo_file(outputs: Mapping[str, ServoOutput]) -> str:

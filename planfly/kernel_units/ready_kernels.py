@@ -1,11 +1,11 @@
 """Run a unit of work to compile its kernels, and report the kernels that are ready."""
 
 import functools
-import os
 import tomllib
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 
@@ -112,7 +112,7 @@ def _compile_flight_kernels() -> None:
     setup = make_setup(scenario, uav, parse_mission(MISSION_TEXT, "field.waypoints"), 1)
     flight = fly_and_judge(setup)
     returns_line(setup, flight.track)
-    with Recorder(Path(os.devnull), setup) as recorder:
+    with TemporaryDirectory() as folder, Recorder(Path(folder) / "flight.mcap", setup) as recorder:
         recorder.write(flight.track)
         recorder.finish(flight.ended, flight.verdict)
 

@@ -45,25 +45,18 @@ def expected_failures(plan: Plan, uav: Uav) -> tuple[str, ...]:
     """
     if not plan.safe:
         return ()
-    return tuple(text for text in (_loose_limits_text(plan, uav), _short_strip_text(plan)) if text)
-
-
-def _loose_limits_text(plan: Plan, uav: Uav) -> str:
-    """Describe the first part of a plan that the scenario's limits allow but the aircraft cannot fly.
-
-    Return "" if there is no such part.
-    """
+    # The first part of the plan that the scenario's limits allow but the aircraft cannot fly.
     limits = uav.limits
     aircraft_limits = replace(limits, max_turn=None, max_climb=None, max_dive=None, tracking=None)
-    if (limits.max_turn, limits.max_climb, limits.max_dive) == (None, None, None):
-        return ""
-    problems = certify(make_problem(plan.scenario, aircraft_limits), plan.waypoints).problems
-    if not problems:
-        return ""
-    return (
-        "flights are expected to fail: the limits of the scenario are looser than the limits of the aircraft"
-        f' ({problems[0]}). To plan within both, write "aircraft" instead of the numbers in [limits]'
-    )
+    loose_limits_text = ""
+    if (limits.max_turn, limits.max_climb, limits.max_dive) != (None, None, None):
+        problems = certify(make_problem(plan.scenario, aircraft_limits), plan.waypoints).problems
+        if problems:
+            loose_limits_text = (
+                "flights are expected to fail: the limits of the scenario are looser than the limits of the aircraft"
+                f' ({problems[0]}). To plan within both, write "aircraft" instead of the numbers in [limits]'
+            )
+    return tuple(text for text in (loose_limits_text, _short_strip_text(plan)) if text)
 
 
 def _short_strip_text(plan: Plan) -> str:

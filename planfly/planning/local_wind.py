@@ -66,7 +66,14 @@ def ensure_local_wind(plan: Plan, uav: Uav, search: Callable[[Uav], Plan] | None
     ratio, searches = 1.0, 0
     map_ratio = max_ground_speed_ratio(scenario, uav.limits.airspeed, float(requirements.path.times[-1]))
     while search is not None and ratio < map_ratio:
-        path_ratio = _path_ground_speed_ratio(requirements) if searches < _PATH_SEARCHES else ratio
+        path_ratio = ratio
+        if searches < _PATH_SEARCHES:
+            path, airspeed = requirements.path, float(requirements.route.leg_airspeeds.min())
+            steps = np.diff(path.points, axis=0)
+            samples = np.column_stack([path.points[:-1] + 0.5 * steps, 0.5 * (path.times[:-1] + path.times[1:])])
+            path_ratio = _ground_speed_ratio(
+                requirements.setup.scenario, airspeed, samples, np.arctan2(steps[:, 0], steps[:, 1])
+            )
         ratio = path_ratio if ratio < path_ratio < map_ratio else map_ratio
         searches = searches + 1
         other_plan = search(replace(uav, limits=limits_at_ground_speed(uav.limits, ratio)))
@@ -76,7 +83,10 @@ def ensure_local_wind(plan: Plan, uav: Uav, search: Callable[[Uav], Plan] | None
         if not _wind_failures(other_plan, requirements):
             return other_plan
     certificate = plan.certificate
-    problems = tuple(f"in the local wind of the forecast: {_failure_text(failure)}" for failure in failures)
+    reasons = (
+        failure.reason if failure.placed else f"{place_text(failure.place)}: {failure.reason}" for failure in failures
+    )
+    problems = tuple(f"in the local wind of the forecast: {reason}" for reason in reasons)
     return replace(plan, certificate=replace(certificate, problems=(*certificate.problems, *problems)))
 
 
@@ -90,11 +100,6 @@ def _wind_failures(plan: Plan, requirements: RouteRequirements) -> list[Finding]
     judges = [judge for name in _RULES if (judge := RULES[name].judge) is not None]
     findings = [finding for judge in judges for finding in judge(requirements, None, geometric=True)]
     return [finding for finding in findings if finding.ok is False and (finding.place.index or 0) >= plan.flown_legs]
-
-
-def _failure_text(failure: Finding) -> str:
-    """Return the reason of a failed finding with its place."""
-    return failure.reason if failure.placed else f"{place_text(failure.place)}: {failure.reason}"
 
 
 def limits_at_ground_speed(limits: Limits, ratio: float) -> Limits:
@@ -132,14 +137,6 @@ def max_ground_speed_ratio(scenario: Scenario, airspeed: float, duration: float)
     samples = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 4)
     courses = np.linspace(0.0, 2.0 * math.pi, _COURSE_COUNT, endpoint=False)
     return _ground_speed_ratio(scenario, airspeed, samples, courses[:, np.newaxis])
-
-
-def _path_ground_speed_ratio(requirements: RouteRequirements) -> float:
-    """Return the largest ratio of local-wind to mean-wind ground speed along a planned path, at least 1."""
-    path, airspeed = requirements.path, float(requirements.route.leg_airspeeds.min())
-    steps = np.diff(path.points, axis=0)
-    samples = np.column_stack([path.points[:-1] + 0.5 * steps, 0.5 * (path.times[:-1] + path.times[1:])])
-    return _ground_speed_ratio(requirements.setup.scenario, airspeed, samples, np.arctan2(steps[:, 0], steps[:, 1]))
 
 
 def _ground_speed_ratio(scenario: Scenario, airspeed: float, samples: Floats, courses: Floats) -> float:

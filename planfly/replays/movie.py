@@ -79,23 +79,6 @@ def _yield_frames(film: MovieFrames) -> Iterator[Image.Image]:
             advance(number, len(film), f"frame {number} of {len(film)}")
 
 
-def _make_palette(frame: Image.Image) -> Image.Image:
-    """Return an image whose palette is used for all frames of a film.
-
-    The palette has the exact drawing colours, and the main colours of `frame`.  If all colours were chosen by area,
-    thin lines and small marks would get the colours of the ground.
-    """
-    drawing_colours = [ImageColor.getrgb(colour)[:3] for colour in palette_colours()]
-    blended_palette = frame.quantize(_TRANSPARENT - len(drawing_colours), dither=Image.Dither.NONE).getpalette() or []
-    palette = [component for colour in drawing_colours for component in colour] + blended_palette[
-        : 3 * (_TRANSPARENT - len(drawing_colours))
-    ]
-    palette_image = Image.new("P", (1, 1))
-    # The rest of the 256 entries repeats the first entry.
-    palette_image.putpalette(palette + palette[:3] * (256 - len(palette) // 3))
-    return palette_image
-
-
 def _apply_palette(frame: Image.Image, palette: Image.Image) -> Image.Image:
     """Return a frame with its colours replaced by the nearest colours of a palette.
 
@@ -115,7 +98,19 @@ def _encode_gif(film: MovieFrames) -> bytes:
     """
     images = _yield_frames(film)
     first_frame = next(images)
-    palette = _make_palette(first_frame)
+    # The palette has the exact drawing colours, and the main colours of the first frame. If all colours were chosen by
+    # area, thin lines and small marks would get the colours of the ground.
+    drawing_colours = [ImageColor.getrgb(colour)[:3] for colour in palette_colours()]
+    blended_palette = (
+        first_frame.quantize(_TRANSPARENT - len(drawing_colours), dither=Image.Dither.NONE).getpalette() or []
+    )
+    entries = [component for colour in drawing_colours for component in colour] + blended_palette[
+        : 3 * (_TRANSPARENT - len(drawing_colours))
+    ]
+    palette_image = Image.new("P", (1, 1))
+    # The rest of the 256 entries repeats the first entry.
+    palette_image.putpalette(entries + entries[:3] * (256 - len(entries) // 3))
+    palette = palette_image
     first_image = _apply_palette(first_frame, palette)
     previous, later_images = np.asarray(first_image), []
     for image in images:

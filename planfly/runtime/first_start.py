@@ -1,8 +1,6 @@
 """Compile kernels at the first start after an install, in two processes, before the work begins."""
 
 import contextlib
-import functools
-import inspect
 import os
 import queue
 import subprocess
@@ -12,14 +10,10 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import ParamSpec, TypeVar, get_args, get_type_hints
 
-from planfly.flight_options import option_defaults
 from planfly.kernel_units.unit_kernels import list_unit_kernels
 from planfly.runtime.stages import has_receiver, report_line, stage
-from world.argument_types import check_types
 from world.compile_events import notify_before_compiling
-from world.files import did_you_mean
 from world.kernel_cache import CACHE_DIR_VARIABLE, can_write
 
 # ----------------------------------------------------------------------
@@ -173,60 +167,3 @@ def _report_and_compile(units: list[str]) -> None:
     with stage(title, STAGE_TITLE) as advance:
         advance(0, total, f"0 of {total}")
         compile_units(units, folder, lambda done: advance(done, total, f"{done} of {total}"))
-
-
-# ----------------------------------------------------------------------
-# Functions of the public API, which compile the kernels that they need.
-
-_Parameters = ParamSpec("_Parameters")
-_Result = TypeVar("_Result")
-
-
-def api_function(*kernel_units: str) -> Callable[[Callable[_Parameters, _Result]], Callable[_Parameters, _Result]]:
-    """Return a decorator for a function of the API: its arguments are checked, and it runs inside `warm_up`.
-
-    The options of an ``Unpack[...]`` parameter are listed in its signature, with their defaults.
-
-    kernel_units: see `warm_up`.
-    The function raises the ArgumentError of `world.argument_types.check_types`.
-
-    >>> from typing import Unpack
-    >>> from planfly.flight_options import MissionOptions
-    >>> @api_function()
-    ... def fly(mission: str, **options: Unpack[MissionOptions]) -> object:
-    ...     return options["fence"], options["wind"]
-    >>> fly("a.waypoints", wind=(8, 270))
-    ((), (8, 270))
-    >>> fly("a.waypoints", winds=(8, 270))
-    Traceback (most recent call last):
-    TypeError: fly() got an unexpected keyword argument 'winds': did you mean 'wind'?
-    """
-
-    def decorate(function: Callable[_Parameters, _Result]) -> Callable[_Parameters, _Result]:
-        """Extend a function's signature by its options, and wrap the function."""
-        signature, defaults = inspect.signature(function), dict[str, object]()
-        *parameters, last = signature.parameters.values()
-        if last.kind is last.VAR_KEYWORD:
-            (options,) = get_args(last.annotation)
-            defaults, annotations = option_defaults(options), get_type_hints(options)
-            parameters += [
-                inspect.Parameter(name, last.KEYWORD_ONLY, default=default, annotation=annotations[name])
-                for name, default in defaults.items()
-            ]
-            signature = signature.replace(parameters=parameters)
-
-        @functools.wraps(function)
-        def checked_function(*args: _Parameters.args, **keywords: _Parameters.kwargs) -> _Result:
-            """Check the arguments, add the defaults of missing options, and call the function inside `warm_up`."""
-            for name in keywords if defaults else ():
-                if name not in signature.parameters:
-                    hint = did_you_mean(name, signature.parameters)
-                    raise TypeError(f"{function.__name__}() got an unexpected keyword argument {name!r}{hint}")
-            checked_args, checked_keywords = check_types(signature, args, keywords)
-            with warm_up(*kernel_units):
-                return function(*checked_args, **{**defaults, **checked_keywords})
-
-        checked_function.__signature__ = signature  # type: ignore[attr-defined]
-        return checked_function
-
-    return decorate

@@ -11,10 +11,10 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Unpack
 
+from planfly.api.api_function import api_function
 from planfly.arguments import check_arguments
 from planfly.flight_options import MissionOptions
 from planfly.kernel_units.unit_kernels import PLANNING_AND_FLYING
-from planfly.runtime.first_start import api_function
 from planfly.runtime.process_setup import end_repeated_call
 from planfly.studio.session import open_session
 from world.errors import PlanflyError
@@ -65,7 +65,7 @@ def open_studio(
     Raises a `planfly.PlanflyError` for bad input.
     """
     end_repeated_call()
-    check_arguments(seed=options["seed"], port=port)
+    check_arguments(port=port)
     listener = _open_listener(port)
     with contextlib.closing(listener):
         target = str(what)

@@ -57,6 +57,7 @@ class SurveyRemedy:
     turn_around: turn-around distance of the layout, also with gates or a changed parameter or airspeed, m; NaN if
         unchanged.
     lead_in: distance before the first line, if longer than the turn-around distance, m.
+    has_gates: True for another airspeed together with gates at the ends of the lines.
     """
 
     kind: RemedyKind
@@ -69,6 +70,7 @@ class SurveyRemedy:
     length: float
     turn_around: float = math.nan
     lead_in: float = 0.0
+    has_gates: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,8 +118,9 @@ def find_survey_remedies(
 
     For each kind of change, the smallest change that passes is returned.
 
-    If neither longer turn-around distances nor gates are enough, both are combined.  If nothing else is enough, longer
-    turn-around distances are combined with another parameter value or a lower airspeed.  There are at most four flights
+    If neither longer turn-around distances nor gates are enough, both are combined.  If nothing else is enough, gates
+    are combined with a lower airspeed, and longer turn-around distances with another parameter value or a lower
+    airspeed.  There are at most four flights
     for each of about six changes.
 
     verdict: verdict on the flight of the setup.
@@ -142,7 +145,11 @@ def find_survey_remedies(
         trials.find_airspeed() or trials.try_default_airspeed(),
     ]
     if not any(candidates):
-        candidates.append(trials.find_parameter_and_turn_around() or trials.find_airspeed_and_turn_around())
+        candidates.append(
+            trials.find_gates_and_airspeed()
+            or trials.find_parameter_and_turn_around()
+            or trials.find_airspeed_and_turn_around()
+        )
     remedies = tuple(remedy for remedy in candidates if remedy is not None)
     return TriedRemedies(remedies, None if remedies else trials.nearest, trials.kept)
 
@@ -469,16 +476,21 @@ class _Trials:
             "parameter", deciding.name, deciding.current, deciding.passing, deciding.unit, *passed_flights[-1]
         )
 
-    def find_airspeed(self) -> SurveyRemedy | None:
+    def find_airspeed(self, *, has_gates: bool = False) -> SurveyRemedy | None:
         """Find the highest of the reduced airspeeds that passes, or None.
+
+        has_gates: True for gates at the ends of the lines in addition.
 
         Nothing is tried if the mission sets an airspeed.  The airspeed is set by items of the mission.
         """
+        setup, prefix = self._setup, ""
+        if has_gates:
+            setup, prefix = replace(setup, mission=_with_gates(setup, self._surveys)), "gates, "
         for speed in self._slower_airspeeds():
-            mission = _with_airspeed(self._setup, self._surveys, speed, self._uav.airspeed)
-            flight = self._fly_trial(mission, self._uav, f"{speed:g} m/s")
+            mission = _with_airspeed(setup, self._surveys, speed, self._uav.airspeed)
+            flight = self._fly_trial(mission, self._uav, f"{prefix}{speed:g} m/s")
             if self._is_remedy(flight):
-                return SurveyRemedy("airspeed", "", self._uav.airspeed, speed, "m/s", *flight)
+                return SurveyRemedy("airspeed", "", self._uav.airspeed, speed, "m/s", *flight, has_gates=has_gates)
         return None
 
     # ------------------------------------------------------------------
@@ -517,6 +529,12 @@ class _Trials:
             return None
         remedy = self._find_turn_around_with("gates", self._uav, self._longer_turn_arounds(), has_gates=True)
         return None if remedy is None else replace(remedy, kind="gates", current=0.0, value=1.0, unit="")
+
+    def find_gates_and_airspeed(self) -> SurveyRemedy | None:
+        """Try the reduced airspeeds with gates; return None if the lines have no place for gates, or if none passes."""
+        if _with_gates(self._setup, self._surveys) == self._setup.mission:
+            return None
+        return self.find_airspeed(has_gates=True)
 
     def find_parameter_and_turn_around(self) -> SurveyRemedy | None:
         """Try longer turn-around distances with another value of one autopilot parameter.
@@ -620,19 +638,9 @@ class _Trials:
         )
         lowest = math.ceil(min_speed * steps - 1e-6) / steps
         speeds = {lowest, *(round(2.0 * factor * self._uav.airspeed) / 2.0 for factor in AIRSPEED_FACTORS)}
-        max_speed = self._max_airspeed_for_photos()
-        if math.isfinite(max_speed):
-            speeds.add(math.floor(max_speed * steps + 1e-6) / steps)
-        for speed in sorted(speeds, reverse=True):
-            if lowest <= speed <= max(lowest, max_speed) and speed < self._uav.airspeed:
-                yield speed
-
-    def _max_airspeed_for_photos(self) -> float:
-        """Return the highest airspeed at which a slow camera takes photos with the required front overlap, m/s.
-
-        It follows from the ground speed flown at the place with the minimum overlap.  Infinity without such a camera.
-        """
-        speeds, autopilot = [math.inf], self._uav.autopilot
+        # Highest airspeed at which a slow camera takes photos with the required front overlap, from the ground speed
+        # flown at the place with the minimum overlap.
+        photo_speeds, autopilot = [math.inf], self._uav.autopilot
         altitude = float(self._setup.route.positions[self._surveys[0].first, 2])
         for measure in self._overlaps:
             if measure.is_camera_limited and measure.front is not None and measure.camera.front is not None:
@@ -640,8 +648,13 @@ class _Trials:
                 overlap = measure.camera.front - PHOTO_OVERLAP_TOLERANCE
                 needed_speed = (1.0 - overlap) * measure.camera.along * measure.height / measure.camera.interval
                 change = _GROUND_SPEED_RATIO * needed_speed - ground_speed
-                speeds.append(self._uav.airspeed + change / autopilot.speeds.true_airspeed_factor(altitude))
-        return min(speeds)
+                photo_speeds.append(self._uav.airspeed + change / autopilot.speeds.true_airspeed_factor(altitude))
+        max_speed = min(photo_speeds)
+        if math.isfinite(max_speed):
+            speeds.add(math.floor(max_speed * steps + 1e-6) / steps)
+        for speed in sorted(speeds, reverse=True):
+            if lowest <= speed <= max(lowest, max_speed) and speed < self._uav.airspeed:
+                yield speed
 
 
 def missing_height(measure: OverlapMeasure) -> float:

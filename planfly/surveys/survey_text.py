@@ -216,6 +216,7 @@ def remedy_text(remedy: SurveyRemedy, length: float) -> str:
             change = f"{remedy.name} {remedy.value:g} instead of {remedy.current:g} (--params)"
         case "airspeed":
             change = f"{remedy.value:g} m/s instead of {remedy.current:g} m/s (DO_CHANGE_SPEED)"
+            change += " and gates (CONDITION_GATE) where the camera is switched" if remedy.has_gates else ""
     if remedy.kind in ("gates", "parameter", "airspeed") and not math.isnan(remedy.turn_around):
         change += f", with turn-arounds of {remedy.turn_around:.0f} m"
     new_length, old_length = (f"{value / 1000.0:.1f} km" for value in (remedy.length, length))

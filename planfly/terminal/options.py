@@ -1,13 +1,15 @@
 """Add options that several commands share.
 
-The dest of an option is the matching keyword of the API, so that `planfly.commands.registry.call_api` passes it without
-further code.
+The dest of an option is the matching keyword of the API, so that `call_api` passes it without further code.
 """
 
+import argparse
 import contextlib
+import inspect
 import signal
 from collections.abc import Callable, Iterator
 from types import FrameType
+from typing import Any, TypeVar
 
 from planfly.arguments import CHOICES
 from planfly.terminal.arguments import (
@@ -22,6 +24,23 @@ from planfly.terminal.arguments import (
 from planfly.terminal.command_parser import CommandParser, OptionGroup
 from world.airspace.zone_suffixes import SUFFIXES as ZONES
 from world.elevation_formats import EMBEDDED, SUFFIXES
+
+_Result = TypeVar("_Result")
+
+
+def call_api(function: Callable[..., _Result], args: argparse.Namespace, **overrides: Any) -> _Result:
+    """Call a function of the API with the options that match its keywords, and return its result.
+
+    An option that was not given (None) leaves its keyword at the default.
+    overrides: keywords that override the options.
+
+    >>> call_api(lambda *, seed=1, out="here": (seed, out), argparse.Namespace(seed=3, out=None, json=None))
+    (3, 'here')
+    """
+    parameters = inspect.signature(function).parameters
+    options = {name: value for name, value in vars(args).items() if name in parameters} | overrides
+    return function(**{name: value for name, value in options.items() if value is not None})
+
 
 # ----------------------------------------------------------------------
 # Options for output files, and for the amount of printed text.

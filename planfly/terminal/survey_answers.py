@@ -57,6 +57,8 @@ class SurveyRemedyEntry:
     """Lead-in before the first line, m, if it is longer than the turn-around distance."""
     length_m: float
     """Length of the whole path, m."""
+    has_gates: bool
+    """True for another airspeed together with gates at the ends of the lines."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
@@ -182,4 +184,5 @@ def survey_remedy_entry(remedy: SurveyRemedy) -> SurveyRemedyEntry:
         turn_around_m=None if math.isnan(remedy.turn_around) else round(remedy.turn_around, 1),
         lead_in_m=remedy.lead_in,
         length_m=round(remedy.length, 1),
+        has_gates=remedy.has_gates,
     )

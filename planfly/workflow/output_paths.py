@@ -147,15 +147,6 @@ def replace_files(folder: Path, contents: Mapping[str, str | bytes], *, overwrit
     return tuple(folder / name for name in contents)
 
 
-def has_placeholder(target: str | Path) -> bool:
-    """Return True if a path contains a placeholder for the name or the seed.
-
-    >>> has_placeholder("runs/{name}-seed{seed}/flight.mcap"), has_placeholder("flight.mcap")
-    (True, False)
-    """
-    return "{name}" in str(target) or "{seed}" in str(target)
-
-
 def expand_path_pattern(target: str | Path, name: str, seed: int) -> Path:
     """Replace {name} and {seed} in a path; characters that are unsafe in a folder's name are replaced.
 
@@ -187,6 +178,6 @@ def file_target(
     if path.suffix.lower() != suffix:
         allowed = f"expected a {suffix} file; planfly.export writes other formats"
         raise PlanflyError(f"{path}: {allowed}", file=path, field="suffix", value=path.suffix, allowed=allowed)
-    if path.parent.exists() or not has_placeholder(target):
+    if path.parent.exists() or path == Path(target):
         check_output_file(path, overwrite, source)
     return path

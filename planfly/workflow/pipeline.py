@@ -13,7 +13,7 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import BLOCK_DURATION_S, LONG_BLOCK_DURATION_S, Flight, RunningFlight
 from flight.simulation.track import Track, TrackBuilder, join_tracks
 from logs.recording.reader import LogEvent
-from logs.recording.recorder import CrashSafeRecorder, thin_track
+from logs.recording.recorder import Recorder, thin_track
 from logs.verdict.judge_flight import judge_flight, judge_plan_only
 from logs.verdict.measures.energy import reason_not_to_start
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
@@ -251,7 +251,7 @@ def _record_and_judge(task: _FlightTask, requirements: RouteRequirements, flight
     with ExitStack() as open_logs:
         recorder = None
         if task.log is not None:
-            recorder = CrashSafeRecorder(task.log, flight.setup, every=task.every, batch=BATCH_S)
+            recorder = Recorder(task.log, flight.setup, every=task.every, batch=BATCH_S)
             open_logs.enter_context(recorder)
         # A recorded flight is written second by second, so that a crash of the process loses no more.
         block_ticks = round((LONG_BLOCK_DURATION_S if recorder is None else BLOCK_DURATION_S) / flight.dt)

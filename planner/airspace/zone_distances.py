@@ -33,7 +33,7 @@ UNKNOWN_HEIGHT_BOUND = 9000.0
 
 
 class AltitudeBand(NamedTuple):
-    """Vertical range of a part of a path, above mean sea level and above the ground below the part, m."""
+    """Vertical range of a part of a path, m: altitudes are AMSL, heights are above the ground below it."""
 
     min_altitude: float
     max_altitude: float
@@ -53,12 +53,14 @@ def zone_penetration(
     error_below: float,
     error_above: float,
 ) -> float:
-    """Return the depth of the leg a-b inside zones with their margins, integrated along the leg, m·km.
+    """Return how much the leg a-b violates zones and their margins: depth times length, m·km.
+
+    In an exclusion the depth is the smaller one of the horizontal and the vertical depth. For an inclusion both the
+    horizontal and the vertical distance outside are added.
 
     heights, to_pixel: ground heights, m, and the map from positions to their pixels.
     sample_spacing: spacing of the ground samples for zone levels that are stated above ground, m.
-    a, b: ends of the leg, (3,) m.
-    lateral_error, error_below, error_above: tracking error to the side, below and above the leg, m.
+    a, b: (3,) ends of the leg, m. lateral_error, error_below, error_above: tracking error to the side, below and above.
     """
     line = segment_between(a[0], a[1], b[0], b[1])
     total, required, records = 0.0, zones.required, zones.records
@@ -106,12 +108,13 @@ def zone_penetration(
 def penetration_depth(
     records: ZoneRecords, z: int, line: MapSegment, required_distance: float
 ) -> tuple[float, float, float]:
-    """Return the depth of a line in exclusion z with its margin, and the part abreast of the zone.
+    """Return the depth of a line in exclusion z with its margin, and the part of the line abreast of it.
 
     required_distance: required distance from the zone, m.
 
-    The depth is the distance by which the line would have to be shifted to be `required_distance` away from the zone,
-    m; 0 if it is far enough away. The part is given by the fractions of the line's length at its start and end.
+    Returns three numbers. The first is the depth: the distance by which the line would have to be shifted sideways to
+    be `required_distance` away from the zone, m; 0 if it is far enough away. The others are the beginning and the end
+    of the part, as fractions of the line's length.
     """
     view = view_shape(records, z, line, required_distance)
     if not view.inside and view.distance >= required_distance:
@@ -128,7 +131,7 @@ def penetration_depth(
 
 @inner
 def _inclusion_excess(records: ZoneRecords, z: int, line: MapSegment, required_distance: float) -> float:
-    """Return how much a line is outside inclusion z or too close to its edge, integrated, m·km.
+    """Return how far a line is outside inclusion z or too close to its edge: distance times length, m·km.
 
     required_distance: required distance from the edge, on the inside, m.
     """
@@ -151,7 +154,7 @@ def _inclusion_excess(records: ZoneRecords, z: int, line: MapSegment, required_d
 def altitude_band(start_altitude: float, end_altitude: float, error_below: float, error_above: float) -> AltitudeBand:
     """Return the range of altitudes of a straight line, extended by the tracking error.
 
-    The ground is unknown, so the heights above ground are not limited.
+    The range of heights above ground is left practically unlimited, as if the ground were unknown.
 
     error_below, error_above: vertical tracking error, m.
     """
@@ -172,7 +175,7 @@ def _sampled_altitude_band(
     error_below: float,
     error_above: float,
 ) -> AltitudeBand:
-    """Return the range of altitudes of a part of the line a-b, and the range of its heights above ground.
+    """Return the vertical range of a part of the line a-b: its altitudes, and its heights above ground.
 
     heights, to_pixel: ground heights, m, and the map from positions to their pixels.
     sample_spacing: spacing of the ground samples, m.
@@ -204,10 +207,10 @@ def _sampled_altitude_band(
 
 @inlined
 def vertical_distance(zone: Record, band: AltitudeBand) -> float:
-    """Return the distance of a range of altitudes below a zone's floor or above its ceiling, m.
+    """Return how far a range of altitudes is below a zone's floor or above its ceiling, m.
 
-    The distance is negative between floor and ceiling. For an exclusion it is the smallest distance of any altitude of
-    the range, for an inclusion the largest.
+    The distance is negative between floor and ceiling. For an exclusion the altitude with the smallest distance counts,
+    because no altitude may be inside. For an inclusion the largest distance counts, because all must be inside.
     """
     floor_min, floor_max = band.min_altitude, band.max_altitude
     if zone.floor_above_ground:
@@ -244,12 +247,11 @@ def measure_zone_margin(
     error_above: float,
     margin: Record,
 ) -> None:
-    """Fill the `ZONE_MARGIN` record for a straight piece a-b of a path.
+    """Measure the margins of a straight piece a-b of a path to all zones; fill its `ZONE_MARGIN` record.
 
     heights, depths, to_pixel: ground heights, m, the same with the opposite sign, and the map from positions to pixels.
-    a, b: (3,) ends of the piece, m.
-    lateral_error: (2,) lateral tracking error at a and b, m.
-    error_below, error_above: vertical tracking error, m.
+    a, b: (3,) ends of the piece, m. lateral_error: (2,) lateral tracking error at a and b, m.
+    error_below, error_above: vertical tracking error, m. margin: the record to fill.
     """
     margin.nearest, margin.excess, margin.zone = math.inf, math.inf, -1
     records, max_lateral_error = zones.records, max(lateral_error[0], lateral_error[1])
@@ -320,7 +322,7 @@ def _update_margin(zone: Record, required: Record, z: int, horizontal: float, ve
 
 @inner
 def _distance_to_violation(zone: Record, horizontal: float, vertical: float) -> float:
-    """Return the distance to a violation of a zone, m; negative if the zone is violated.
+    """Return how far a piece of a path is from violating a zone, m; negative if it violates the zone.
 
     horizontal: distance outside an exclusion or inside an inclusion, m.
     vertical: distance below the zone's floor or above its ceiling, m.
@@ -330,10 +332,10 @@ def _distance_to_violation(zone: Record, horizontal: float, vertical: float) -> 
 
 @inner
 def _horizontal_distance(records: ZoneRecords, z: int, a: Floats, b: Floats, max_distance: float) -> float:
-    """Return the smallest horizontal distance from the line a-b to the edge of zone z, m.
+    """Return the horizontal distance of the line a-b from the edge of zone z, m; negative in a violation.
 
-    The distance is positive for a line that is outside an exclusion or inside an inclusion, and negative for a line
-    that enters the exclusion or leaves the inclusion. Distances above `max_distance` may be inf.
+    The distance is positive for a line that is outside an exclusion or inside an inclusion. It is negative (or 0) for a
+    line that enters the exclusion, by its depth, or leaves the inclusion. Distances above `max_distance` may be inf.
     """
     line = segment_between(a[0], a[1], b[0], b[1])
     view = view_shape(records, z, line, max_distance)
@@ -357,7 +359,7 @@ def _exact_altitude_band(
     error_below: float,
     error_above: float,
 ) -> AltitudeBand:
-    """Return the range of altitudes of the line a-b, and the exact range of its heights above ground.
+    """Return the vertical range of the line a-b, with the exact range of its heights above ground.
 
     heights, depths, to_pixel: ground heights, m, the same with the opposite sign, and the map from positions to pixels.
     a, b: (3,) ends of the line, m.

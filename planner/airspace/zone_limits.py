@@ -42,9 +42,10 @@ class ZonesWithMargins(NamedTuple):
 
 
 class ZoneMargins(NamedTuple):
-    """Margins of a path to zones, m: horizontal and vertical as in `REQUIRED_MARGINS`.
+    """Margins that a path keeps to every zone, m: horizontal and vertical as in `REQUIRED_MARGINS`.
 
-    end_fraction: fraction of a fixed end's distance that replaces the margin if the end is within the margin.
+    end_fraction: if the start or the destination is closer to a zone than the margin, this fraction of its distance
+    replaces the margin of that zone.
     """
 
     horizontal: float
@@ -90,7 +91,11 @@ def _reduce_margins(
 
     ends: (k, 3) m.
     ground_heights: (k,) ground heights at the ends, m; NaN if unknown.
+    fraction: 0 to 1.
     required: `REQUIRED_MARGINS` records (z,), which are changed.
+
+    For an inclusion both margins are reduced. For an exclusion one of them is sufficient: the one of which the end has
+    the larger fraction.
     """
     for z in range(required.shape[0]):
         zone, margin = records.zones[z], required[z]
@@ -112,9 +117,9 @@ def _reduce_margins(
 
 @inner
 def first_exclusion_near(zones: ZonesWithMargins, west: float) -> int:
-    """Return the index of the first exclusion that may extend east of the coordinate `west`, m.
+    """Return the index of the first exclusion that may reach into an area whose western edge is `west`, m.
 
-    `west` is the western edge of the area that is searched for exclusions.
+    All exclusions before it end further west. It is found by bisection, because exclusions are sorted.
     """
     low, high = zones.inclusions, zones.required.shape[0]
     while low < high:
@@ -206,8 +211,8 @@ class ShapeView(NamedTuple):
 
     inside: True if the line starts in the shape.
     distance: distance from the line to the shape's outline, 0 if they meet; inf if beyond the requested limit.
-    right, left: extent of the shape across the line, negative to the right.
-    first, last: extent of the shape along the line.
+    right, left: extent of the shape across the line, from its rightmost (negative) to its leftmost point.
+    first, last: extent of the shape along the line, measured from the line's start.
     """
 
     inside: bool
@@ -230,7 +235,13 @@ def segment_between(ax: float, ay: float, bx: float, by: float) -> MapSegment:
 
 @inner
 def view_shape(records: ZoneRecords, z: int, line: MapSegment, max_distance: float) -> ShapeView:
-    """Measure the shape of zone z in the axes of a line; distances above `max_distance` (m) may be inf."""
+    """Measure the shape of zone z as seen from a line: its distance, and its extent across and along.
+
+    max_distance: m; a larger distance may be returned as inf.
+
+    The line is taken as an axis. The corners and edges of the shape are measured along it from its start, and across it
+    to the left. A line starts inside if the shape's edges cross the axis an odd number of times ahead of its start.
+    """
     zone = records.zones[z]
     if zone.round:
         east_offset, north_offset = zone.centre_east - line.east, zone.centre_north - line.north
@@ -287,7 +298,8 @@ def view_shape(records: ZoneRecords, z: int, line: MapSegment, max_distance: flo
 def _edge_distance2(along: float, across: float, to_along: float, to_across: float, horizontal_length: float) -> float:
     """Return the squared distance between a line and an edge that does not cross the line, m^2.
 
-    along, across, to_along, to_across: ends of the edge in the line's axes, m.
+    along, across, to_along, to_across: both ends of the edge, measured along the line from its start and across it, m.
+    horizontal_length: length of the line, m.
     """
     # Two pieces that do not cross are nearest at an end of one of them.
     distance_beyond_end = along - min(horizontal_length, max(0.0, along))

@@ -45,7 +45,9 @@ _MAX_PIECES = math.ceil(math.pi / ARC_STEP) + 2
 def airspace_pieces(data: ProblemArrays, waypoints: Floats) -> Records:
     """Measure the distance to zones and the height above ground of each piece of a path (w, 3).
 
-    Return `AIRSPACE_PIECE` records, first of its legs, then of its corners.
+    Returns `AIRSPACE_PIECE` records, first of its legs, then of its corners.
+
+    The pieces are those of `tracked_pieces` for an autopilot with tracking error, and otherwise legs and chords.
     """
     pieces = (
         tracked_pieces(data, waypoints) if data.tracking.has_error else _pieces_without_tracking_error(data, waypoints)
@@ -79,7 +81,8 @@ def airspace_pieces(data: ProblemArrays, waypoints: Floats) -> Records:
 def _pieces_without_tracking_error(data: ProblemArrays, waypoints: Floats) -> Records:
     """Cut a path (w, 3) without tracking error into its legs and the chords of its arcs.
 
-    Return `TRACKED_PIECE` records, first of the legs.
+    Returns `TRACKED_PIECE` records, first of the legs. A chord lies below the flown arc; its deviations to the side and
+    above enclose the arc.
     """
     leg_count, radii = waypoints.shape[0] - 1, fly_by_radii(data, waypoints)
     pieces = np.zeros(leg_count + leg_count * _MAX_PIECES, dtype=TRACKED_PIECE)
@@ -113,9 +116,11 @@ def _pieces_without_tracking_error(data: ProblemArrays, waypoints: Floats) -> Re
 
 @inner
 def _max_height_above_ground(data: ProblemArrays, piece: Record) -> float:
-    """Return the maximum height above ground that a flight may have along a piece, m; NaN off the terrain.
+    """Return the greatest height above ground of a flight along a piece, m; NaN off the terrain.
 
-    The flight may be above the piece and to either side of it, by the tracking error.
+    By the tracking error, the flight can be above the piece and to either side of it.
+
+    piece: `TRACKED_PIECE` record.
     """
     dx, dy = piece.end[0] - piece.begin[0], piece.end[1] - piece.begin[1]
     horizontal_length, max_height = max(1e-9, math.hypot(dx, dy)), -math.inf
@@ -155,11 +160,14 @@ def add_airspace_violations(
 ) -> None:
     """Add a path's violations of zones and of the maximum height to a `VIOLATIONS` record, m·km.
 
-    path: (w, 3) m.
-    legs, lags: `LEG` and `HEIGHT_LAG` records of the legs.
+    path: (w, 3) m. legs, lags: `LEG` and `HEIGHT_LAG` records of the legs.
     corners, flown_corners: `CORNER` and `FLOWN_CORNER` records of the corners, as planned and as flown.
 
     Zone penetration is added to the field `bounds`, and height above the maximum height to the field `terrain`.
+
+    Each leg is first tested for zones as a whole, with the largest deviation of the flight anywhere along it. Only if
+    it is then in a zone, its parts are measured: the two ends, the middle, and the parts near the corners, each with
+    its own deviation.
     """
     has_zones, has_max_height = data.airspace.zones.required.shape[0] > 0, data.airspace.max_height < math.inf
     required = required_headroom(data)
@@ -207,7 +215,9 @@ def add_airspace_violations(
 def airspace_excess(
     data: ProblemArrays, start: Floats, end: Floats, below: float, above: float, max_excess: float
 ) -> float:
-    """Return the zone penetration plus the excess height of a leg, integrated along the leg, m·km.
+    """Return how much a leg violates zones and the maximum height: depth times length, m·km.
+
+    It is the depth of the leg in zones plus its height above the maximum height, integrated along the leg.
 
     start, end: (3,) ends of the leg, m.
     below, above: vertical tracking error, m.
@@ -225,7 +235,7 @@ def airspace_excess(
 def _leg_zone_penetration(
     data: ProblemArrays, start: Floats, end: Floats, lateral: float, below: float, above: float
 ) -> float:
-    """Return the depth of a leg in zones enlarged by the tracking error, integrated along the leg, m·km.
+    """Return the depth of a leg in zones enlarged by the tracking error, times its length, m·km.
 
     start, end: (3,) ends of the leg, m.
     lateral, below, above: tracking error, m.
@@ -243,7 +253,7 @@ def _leg_excess_height(
     lag: Record,
     half_width: float,
 ) -> float:
-    """Return the excess of a leg over the maximum height above ground, integrated along the leg, m·km.
+    """Return the height of a leg above the maximum height above ground, integrated along the leg, m·km.
 
     required: the maximum height, expressed as a clearance by `required_headroom`.
     leg_start, leg_end: (3,) m.
@@ -278,12 +288,14 @@ def _swath_excess_height(
     above: float,
     max_excess: float,
 ) -> float:
-    """Return the excess of a line over the maximum height, integrated along it, m·km.
+    """Return the height of a line above the maximum height, integrated along it, m·km.
 
-    The excess is the largest of three lines: the line itself, and one line at the distance `lateral` (m) on each side.
+    Three lines are measured: the line itself, and one line at the distance `lateral` on each side. The largest of the
+    three results is returned.
 
     required: the maximum height, expressed as a clearance by `required_headroom`.
     start, end: (3,) ends of the line, m.
+    lateral: half width of the strip that the flight may use, m.
     above: largest height of the aircraft above the line, m.
     max_excess: value beyond which the computation stops; the result is then a lower bound above it. inf never stops.
     """
@@ -326,8 +338,8 @@ def airspace_counts(data: ProblemArrays, paths: Floats) -> Ints:
 
     paths: (n, w, 3) m.
 
-    There are six pieces per leg. The paper has no zones, and counts points, six per leg. Here pieces are tested along
-    their full length, because a path could pass through a zone between two points.
+    There are six pieces per leg, as the paper (Yang, Tang and Lozano, CEC 2014) has six points per leg, but no zones.
+    Each piece is tested along its full length, because a path could pass through a zone between two points.
 
     >>> from planfly.workflow.uav import load_uav
     >>> from planner.evaluation.problem import make_problem

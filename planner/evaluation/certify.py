@@ -105,9 +105,9 @@ _MAX_NAMED_PLACES = 6
 
 
 def _summarise_faults(faults: list[_Fault]) -> list[str]:
-    """Describe the faults of one kind in a line: the worst fault, and the places of the others.
+    """Describe all faults of one kind in one line, which is returned as a list; return [] without faults.
 
-    Return [] without faults.
+    The line describes the worst fault, and names the places of the others.
 
     faults: margin, place and description of each fault.
     """
@@ -115,7 +115,7 @@ def _summarise_faults(faults: list[_Fault]) -> list[str]:
         return []
     (_, place, problem), *others = sorted(faults, key=lambda fault: fault[0])
     other_places = ", ".join(name for _, name, _ in others[:_MAX_NAMED_PLACES])
-    remainder = f", {len(others) - _MAX_NAMED_PLACES} more" if len(others) > _MAX_NAMED_PLACES else ""
+    remainder = f" and {len(others) - _MAX_NAMED_PLACES} more" if len(others) > _MAX_NAMED_PLACES else ""
     return [f"{place}: {problem}" + (f" (also {other_places}{remainder})" if others else "")]
 
 
@@ -145,7 +145,11 @@ def _turn_margin(data: ProblemArrays, waypoints: Floats, problems: list[str]) ->
 
 
 def _leg_length_margin(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
-    """Return the smallest margin of a leg's length, m; append legs that are too short to `problems`."""
+    """Return the smallest margin of a leg's length, m; append legs that are too short to `problems`.
+
+    Every leg needs a minimum length. If legs have to contain their turns, a leg also needs the lengths of its turns, of
+    settling between them, and of rolling from one bank to the other.
+    """
     runs = leg_runs(waypoints)
     problems += _summarise_faults(
         [
@@ -178,8 +182,9 @@ def _leg_length_margin(data: ProblemArrays, waypoints: Floats, problems: list[st
 def _arc_slope_margin(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
     """Return the smallest slope margin on turn arcs, rad; append arcs that are too steep to `problems`.
 
-    An arc is shorter than the parts of the legs that it replaces, so the same change of height makes it steeper. The
-    margin is inf if the arcs need no check.
+    An arc is shorter than the parts of the legs that it replaces, so the same change of height makes it steeper. Arcs
+    are only checked if the aircraft limits the slopes, legs have to contain their turns, and waypoints are fly-by;
+    otherwise the margin is inf.
     """
     min_margin = math.inf
     limits_are_fixed = not (math.isnan(data.max_climb) or math.isnan(data.max_dive))
@@ -257,17 +262,17 @@ def _clearance_margin(data: ProblemArrays, waypoints: Floats, problems: list[str
     problems += _summarise_faults([(0.0, name, "leaves the terrain data") for name in off_terrain])
     problems += _summarise_faults(
         [
-            (place.margin, name, f"{_ground_text(place.height)} at its lowest point; {required_text}")
+            (
+                place.margin,
+                name,
+                f"{abs(place.height):.1f} m {'below' if place.height < 0.0 else 'above'} ground at its lowest point;"
+                f" {required_text}",
+            )
             for name, place in too_low.items()
             if name not in off_terrain
         ]
     )
     return _without_rounding(float(margins.min()))
-
-
-def _ground_text(height: float) -> str:
-    """Describe a height above ground, m, that is negative below the ground."""
-    return f"{abs(height):.1f} m {'below' if height < 0.0 else 'above'} ground"
 
 
 class _LowPlace(NamedTuple):
@@ -303,7 +308,7 @@ def _bounds_margin(data: ProblemArrays, waypoints: Floats, problems: list[str]) 
 
 
 def _airspace_margins(problem: Problem, waypoints: Floats, problems: list[str]) -> tuple[float, float]:
-    """Return the smallest margins to the required distance from a zone, and to the maximum height, m.
+    """Return two margins, m: the smallest to the required distance from a zone, and to the maximum height.
 
     Both are inf if the scenario has neither zones nor a maximum height. Violations are appended to `problems`.
     """

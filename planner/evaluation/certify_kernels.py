@@ -58,7 +58,9 @@ END_DISTANCE_M = 100.0
 def tracked_pieces(data: ProblemArrays, waypoints: Floats) -> Records:
     """Cut a path (w, 3) into straight pieces with bounds on the tracking error of the flight.
 
-    Return `TRACKED_PIECE` records, first of its legs, then of its corners.
+    Returns `TRACKED_PIECE` records, first of its legs, then of its corners. A leg is cut where its altitude lag has
+    decayed and near the fixed ends. A corner gives two pieces, a part of the leg before it and a part of the leg after
+    it, with the excursion of the flight there as an additional lateral deviation.
     """
     count = waypoints.shape[0]
     legs, corners = np.zeros(count - 1, dtype=LEG), np.zeros(count, dtype=CORNER)
@@ -69,7 +71,13 @@ def tracked_pieces(data: ProblemArrays, waypoints: Floats) -> Records:
     pieces = np.zeros((count - 1) * (len(_CUTS) + 3) + 2 * count, dtype=TRACKED_PIECE)
     piece_count = 0
     for i in range(count - 1):
-        piece_ends, begin_fraction = _piece_ends(lags[i].decay, legs[i].run), 0.0
+        # Ends of the pieces, as increasing fractions of the leg; the last is 1.
+        piece_ends, begin_fraction = np.ones(len(_CUTS) + 3), 0.0
+        for cut in range(len(_CUTS)):
+            piece_ends[cut] = min(1.0, _CUTS[cut] / max(1e-9, lags[i].decay))
+        end_zone = min(1.0, END_DISTANCE_M / max(1e-9, legs[i].run))
+        piece_ends[len(_CUTS)], piece_ends[len(_CUTS) + 1] = end_zone, 1.0 - end_zone
+        sort_few(piece_ends)
         for end_fraction in piece_ends:
             if end_fraction <= begin_fraction:
                 continue
@@ -104,21 +112,6 @@ def tracked_pieces(data: ProblemArrays, waypoints: Floats) -> Records:
 
 
 @inner
-def _piece_ends(decay: float, horizontal_length: float) -> Floats:
-    """Return the ends of the pieces of a leg, as increasing fractions of the leg; the last is 1.
-
-    decay: length of the leg, in multiples of the lag length.
-    """
-    fractions = np.ones(len(_CUTS) + 3)
-    for k in range(len(_CUTS)):
-        fractions[k] = min(1.0, _CUTS[k] / max(1e-9, decay))
-    end_zone = min(1.0, END_DISTANCE_M / max(1e-9, horizontal_length))
-    fractions[len(_CUTS)], fractions[len(_CUTS) + 1] = end_zone, 1.0 - end_zone
-    sort_few(fractions)
-    return fractions
-
-
-@inner
 def _cut_piece(start: Floats, end: Floats, begin_fraction: float, end_fraction: float, piece: Record) -> None:
     """Set the ends of a piece to the points at two fractions of a line.
 
@@ -147,7 +140,7 @@ def _set_deviations(lag: Record, begin_fraction: float, end_fraction: float, pie
 def _lateral_deviation(data: ProblemArrays, position: Floats, across: float) -> float:
     """Return the lateral deviation of the flight at a position on the path, m.
 
-    The deviation is smaller near the fixed ends.
+    It grows from 0 at the start and the destination to `across` at the distance `END_DISTANCE_M`.
     """
     end_distance = min(
         math.hypot(position[0] - data.start[0], position[1] - data.start[1]),
@@ -194,9 +187,9 @@ def missile_distance(data: ProblemArrays, waypoints: Floats) -> float:
 
 @inner
 def _segment_distance(threats: Records, start: Floats, end: Floats, min_distance: float) -> float:
-    """Return the distance from a segment to the nearest missile sphere, m, if it is below `min_distance`.
+    """Return the distance from a segment to the nearest missile sphere, m; at most `min_distance`.
 
-    Otherwise return `min_distance`. The distance is negative inside a sphere.
+    The distance is negative inside a sphere.
 
     threats: records of the threats; those without a kill radius are ignored.
     start, end: (3,) ends of the segment, m.
@@ -247,7 +240,7 @@ def with_end_course_points(data: ProblemArrays, path: Floats) -> Floats:
 
 @compiled
 def turn_and_roll_lengths(data: ProblemArrays, waypoints: Floats) -> tuple[Floats, Floats]:  # pragma: no cover
-    """Return the lengths that each leg needs for its turns, and for rolling from one bank to the next.
+    """Return the lengths that each leg needs for its turns, and for rolling between opposite banks.
 
     waypoints: (w, 3) m.
 
@@ -295,10 +288,30 @@ def leg_slope_limits(data: ProblemArrays, waypoints: Floats) -> tuple[Floats, Fl
 def heights_above_ground(data: ProblemArrays, waypoints: Floats) -> Records:
     """Measure the smallest height above ground and the required buffer of each piece of a path (w, 3).
 
-    Return `CERTIFIED_PIECE` records, first of its legs, then of its arcs or corners.
+    Returns `CERTIFIED_PIECE` records, first of its legs, then of its arcs or corners.
     """
     if data.tracking.has_error:
-        return _tracked_heights(data, tracked_pieces(data, waypoints))
+        # The height includes the tracking error below the piece and to either side of it, and is NaN over unknown
+        # ground.
+        tracked = tracked_pieces(data, waypoints)
+        out = np.zeros(tracked.size, dtype=CERTIFIED_PIECE)
+        for k in range(tracked.size):
+            piece = tracked[k]
+            dx, dy = piece.end[0] - piece.begin[0], piece.end[1] - piece.begin[1]
+            horizontal_length = max(1e-9, math.hypot(dx, dy))
+            min_height = math.inf
+            for side in (0.0, -1.0, 1.0):
+                offset_start, offset_end = piece.begin.copy(), piece.end.copy()
+                for end, lateral in ((offset_start, piece.lateral_begin), (offset_end, piece.lateral_end)):
+                    end[0] += side * lateral * dy / horizontal_length
+                    end[1] -= side * lateral * dx / horizontal_length
+                    end[2] -= piece.below
+                height, _ = segment_clearance(data.heights, data.to_pixel, offset_start, offset_end)
+                min_height = math.nan if math.isnan(height) or math.isnan(min_height) else min(min_height, height)
+            out[k].of_arc, out[k].number, out[k].height = piece.of_corner, piece.number, min_height
+            ends = data.start_buffer, data.destination_buffer
+            out[k].buffer = required_buffer(data, data.buffer, ends, piece.begin, piece.end)
+        return out
     leg_count = waypoints.shape[0] - 1
     radii = fly_by_radii(data, waypoints)
     pieces = np.zeros(leg_count + leg_count * _MAX_PIECES, dtype=CERTIFIED_PIECE)
@@ -314,40 +327,13 @@ def heights_above_ground(data: ProblemArrays, waypoints: Floats) -> Records:
 
 
 @inner
-def _tracked_heights(data: ProblemArrays, pieces: Records) -> Records:
-    """Measure the minimum heights above ground along pieces and to either side of them.
-
-    Return `CERTIFIED_PIECE` records. The height includes the tracking error below the piece, and is NaN over unknown
-    ground.
-
-    pieces: `TRACKED_PIECE` records.
-    """
-    out = np.zeros(pieces.size, dtype=CERTIFIED_PIECE)
-    for k in range(pieces.size):
-        piece = pieces[k]
-        dx, dy = piece.end[0] - piece.begin[0], piece.end[1] - piece.begin[1]
-        horizontal_length = max(1e-9, math.hypot(dx, dy))
-        min_height = math.inf
-        for side in (0.0, -1.0, 1.0):
-            offset_start, offset_end = piece.begin.copy(), piece.end.copy()
-            for end, lateral in ((offset_start, piece.lateral_begin), (offset_end, piece.lateral_end)):
-                end[0] += side * lateral * dy / horizontal_length
-                end[1] -= side * lateral * dx / horizontal_length
-                end[2] -= piece.below
-            height, _ = segment_clearance(data.heights, data.to_pixel, offset_start, offset_end)
-            min_height = math.nan if math.isnan(height) or math.isnan(min_height) else min(min_height, height)
-        out[k].of_arc, out[k].number, out[k].height = piece.of_corner, piece.number, min_height
-        ends = data.start_buffer, data.destination_buffer
-        out[k].buffer = required_buffer(data, data.buffer, ends, piece.begin, piece.end)
-    return out
-
-
-@inner
 def _measure_piece(data: ProblemArrays, start: Floats, end: Floats, of_arc: bool, number: int, out: Record) -> None:
     """Fill the `CERTIFIED_PIECE` record for a straight piece from `start` to `end`.
 
+    start, end: (3,) ends of the piece, m.
     of_arc: True for a piece of an arc, False for a piece of a leg.
     number: number of the leg or arc.
+    out: the record to fill.
     """
     height, _ = segment_clearance(data.heights, data.to_pixel, start, end)
     out.of_arc, out.number, out.height = of_arc, number, height
@@ -362,9 +348,10 @@ def required_buffer(
 
     buffer: additional height away from the ends, m.
     end_buffers: additional heights at the start and the destination, m.
+    a, b: (3,) ends of the piece, m.
 
-    The buffer grows half as fast as in a search. The difference allows for the ground between the samples of the
-    search.
+    From an end with a smaller buffer the required height grows with the distance, up to `buffer`. It grows half as fast
+    as in a search: the difference allows for the ground between the samples of the search.
     """
     for end, end_buffer in ((data.start, end_buffers[0]), (data.destination, end_buffers[1])):
         if end_buffer < buffer:

@@ -96,7 +96,7 @@ def measure_corner(
     amsl: float,
     corner: Record,
 ) -> None:
-    """Measure the turn between the unit courses u and v, and fill its `CORNER` record.
+    """Measure the turn from the unit course u to the unit course v, and fill its `CORNER` record.
 
     aircraft: performance, with the bank limit and the wind.
     tracking: tracking error of the autopilot; it can lengthen the parts of the legs that the turn takes.
@@ -122,9 +122,11 @@ def measure_corner(
 
 @inlined
 def courses_at_waypoint(data: ProblemArrays, legs: Records, i: int) -> tuple[float, float, float, float]:
-    """Return the unit courses of the legs before and after waypoint i; at an end, the prescribed course.
+    """Return the unit courses before and after waypoint i.
 
-    The result is the east and north components of both courses.
+    The result is east and north of the course before, then east and north of the course after. Inside the path these
+    are the courses of the two legs. Before the start and after the destination it is the prescribed course, or
+    the course of the only leg if none is prescribed.
     """
     leg_count = legs.shape[0]
     leg_after, leg_before = min(i, leg_count - 1), max(i - 1, 0)
@@ -141,9 +143,10 @@ def courses_at_waypoint(data: ProblemArrays, legs: Records, i: int) -> tuple[flo
 
 @compiled_inline
 def settling_length(turn_lengths: float, horizontal_length: float) -> float:
-    """Return the straight length of a leg that is needed for settling between its two turns, m.
+    """Return the straight length that a leg needs between its two turns, where the aircraft settles, m.
 
     turn_lengths: sum of the lengths that both turns take up, m.
+    horizontal_length: length of the leg, m.
     """
     return SETTLING_FRACTION * horizontal_length + min(SETTLING_LENGTH_M, turn_lengths)
 
@@ -194,9 +197,12 @@ ARC_STEP = math.radians(15.0)
 
 @inlined
 def half_blend_length(aircraft: PerformanceTable, amsl: float) -> float:
-    """Return half the length of the parabola that blends two slopes, m per unit of slope change.
+    """Return half the length of the parabola between two slopes, m per unit of slope change.
 
+    For a change of slope of 0.1 the parabola begins 0.1 times this length before the corner, and ends as far after it.
     A full tailwind is assumed.
+
+    amsl: altitude of the corner, m.
     """
     speed = true_airspeed(aircraft, amsl) + wind_speed_at(aircraft, amsl)
     return speed * speed / (2.0 * BLEND_ACCELERATION)
@@ -221,13 +227,13 @@ def fly_by_vertices(
 def blended_vertices(blend: float, previous: Floats, waypoint: Floats, next_waypoint: Floats, radius: float) -> Floats:
     """Return vertices (k, 3) of a path past `waypoint` that is nowhere higher than the flown path.
 
-    blend: half length of a blend (`half_blend_length`), m per unit of the slope's change.
+    blend: half length of the parabola that blends two slopes (`half_blend_length`), m per unit of the slope's change.
     previous, waypoint, next_waypoint: (3,) m. radius: radius of the fly-by arc, m; 0 for none.
 
-    The vertices are the point on the leg where the blend of slopes begins, points along the arc between its tangent
-    points, and the point on the next leg where the blend ends. The height changes linearly along the arc. Where the
-    slope decreases, the flight cuts the crest by (slope change) x (half length of the blend) / 4, and the vertices are
-    lowered by this amount. Without a radius, or if a leg is shorter than the tangent, the arc is the waypoint.
+    The first vertex is where the blend of slopes begins on the leg, the last one is where it ends on the next leg. The
+    points between lie on the arc, and their height changes linearly. Where the slope decreases, the flight cuts the
+    crest by (slope change) x (half length of the blend) / 4, and the vertices are lowered by this amount. Without a
+    radius, or if a leg is shorter than the tangent, the arc is the waypoint.
     """
     length_before = math.hypot(waypoint[0] - previous[0], waypoint[1] - previous[1])
     length_after = math.hypot(next_waypoint[0] - waypoint[0], next_waypoint[1] - waypoint[1])
@@ -286,10 +292,10 @@ def leg_parts_at_corner(
 ) -> Floats:
     """Return the parts of both legs next to `waypoint` as three vertices, (3, 3) m.
 
-    previous, waypoint, next_waypoint: (3,) m.
-    length_before, length_after: lengths of the two parts, m, at most the length of the leg.
+    The vertices are a point on the leg before the waypoint, the waypoint, and a point on the leg after it.
 
-    The waypoint is the second vertex.
+    previous, waypoint, next_waypoint: (3,) m.
+    length_before, length_after: lengths of the two parts, m. A part ends with its leg if the leg is shorter.
     """
     vertices = np.empty((3, 3))
     for row, neighbour, length in ((0, previous, length_before), (2, next_waypoint, length_after)):

@@ -30,11 +30,11 @@ _MIN_PIECE_LENGTH_M = 1.0
 
 
 class WaypointFrames(NamedTuple):
-    """One rotated frame for each of n inner waypoints.
+    """Axes for each of n inner waypoints: along its piece of a route, across it to the left, and up.
 
     east, north: (n,) position where along and across are 0, m.
     cosine, sine: (n,) cosine and sine of the angle from east to along, counter-clockwise.
-    edges: (n + 1,) limits along of the waypoints' intervals, m.
+    edges: (n + 1,) waypoint i has its `along` between edges[i] and edges[i + 1], m.
     """
 
     east: Floats
@@ -44,7 +44,7 @@ class WaypointFrames(NamedTuple):
     edges: Floats
 
     def to_world(self, points: ArrayLike) -> Floats:
-        """Convert points (along, across, up) in the waypoints' frames, (..., n, 3), to world positions.
+        """Convert points (along, across, up) to world positions, both (..., n, 3): point i is in frame i.
 
         >>> frames = route_frames(np.array([[0.0, 0.0], [100.0, 0.0], [100.0, 50.0]]))
         >>> frames.to_world([[60.0, 5.0, 9.0], [120.0, 5.0, 9.0]]).round(6).tolist()
@@ -71,7 +71,7 @@ class WaypointFrames(NamedTuple):
 
 
 def route_frames(route: Floats) -> WaypointFrames:
-    """Make the frames of waypoints along a route (n + 1, 2) on the map, one for each straight piece.
+    """Make the frames of n waypoints along a route (n + 1, 2) on the map, one for each straight piece.
 
     A piece that is too short to have a course gets the course of the piece before it. If there is none, it gets the
     course of the first piece that has one.
@@ -212,8 +212,8 @@ class Space:
     """Search space of a path; lengths in m.
 
     start, destination: (3,) fixed ends.
-    bounds: (2, 2) map.
-    up: lowest and highest waypoint.
+    bounds: (2, 2) map: west and east, then south and north.
+    up: lowest and highest altitude of a waypoint.
     across: half-width of the box on either side of the straight line, or None for the width of the map.
     """
 
@@ -291,7 +291,8 @@ def _across_limits(frame: RotatedFrame, space: Space, edges: Floats) -> tuple[Fl
 
     edges: (k + 1,) limits of the intervals along the axis, m.
 
-    The limits are the edges of the map, or the half-width that `space` states.
+    The limits are those of `space.across`, or else the edges of the map. In an interval that is almost off the map they
+    are -1 and 1.
     """
     if space.across is not None:
         return np.full(edges.size - 1, -space.across), np.full(edges.size - 1, space.across)
@@ -337,7 +338,7 @@ def polar_45_encoding(space: Space, waypoints: int) -> Encoding:
 
 
 def bearing_encoding(space: Space, waypoints: int) -> Encoding:
-    """Make an encoding like `polar_encoding` with theta relative to the direct line.
+    """Make an encoding like `polar_encoding` with theta relative to the straight line to the destination.
 
     This encoding is not in the paper. Errors do not accumulate, because a change of one waypoint shifts the following
     waypoints but does not turn them.

@@ -26,7 +26,7 @@ _ENERGY_COLUMN = 4
 
 
 class Value(IntEnum):
-    """Columns of a path's values."""
+    """Columns of the values by which paths are compared: m, s, m, s and J."""
 
     LENGTH = 0
     EXPOSURE = 1
@@ -79,7 +79,11 @@ def _fill_values(
 
 @inner
 def _mean_detection(data: ProblemArrays, start: Floats, dx: float, dy: float, dz: float) -> float:
-    """Return the mean detection density along a leg (dx, dy, dz) from a start point."""
+    """Return the mean detection density along a leg, summed over the radars that it passes within reach.
+
+    start: (3,) start of the leg, m.
+    dx, dy, dz: vector of the leg, m.
+    """
     total, length2 = 0.0, dx * dx + dy * dy + dz * dz
     if length2 < 1e-12:
         return 0.0

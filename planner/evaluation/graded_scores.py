@@ -59,7 +59,7 @@ MISSILE_GAP = np.dtype([("at_beginning", np.float64), ("at_end", np.float64)], a
 
 
 class PathScratch(NamedTuple):
-    """Scratch memory for evaluating paths of w waypoints one after another.
+    """Working memory for scoring one path of w waypoints; reused for the next path.
 
     legs: `LEG` records (w - 1,). corners: `CORNER` records (w,).
     flown: `FLOWN_CORNER` records (w,).
@@ -129,9 +129,8 @@ def score_legs(
 ) -> None:
     """Add the violations of legs and turns, and set the length ratio: the first part of `score_path`.
 
+    scratch: legs, corners and height lags are stored here; the other parts of `score_path` read them.
     objectives: the kill exposure is set to 0; `score_missiles` sets it later.
-
-    The other parts read the measurements that this part stores in `scratch`.
     """
     legs = scratch.legs
     corners = scratch.corners
@@ -194,7 +193,7 @@ def score_missiles(
     violations: Record,
     objectives: Record,
 ) -> None:
-    """Set the exposure to missiles, and add the clearance violations of corners, as part of `score_path`.
+    """Set the exposure to missiles, and add clearance violations at corners: part 3 of `score_path`.
 
     scratch: legs, corners, ground samples and lags of the path from `score_legs` and `score_ground`; its missile gaps
         are overwritten.
@@ -264,9 +263,11 @@ def graded_scores(data: ProblemArrays, paths: Floats) -> tuple[Floats, Floats]:
 
     The legs and the flown corners are scored along their whole length. The columns of the violations are those of
     `planner.plan.Violation`: turns (rad, plus missing leg lengths in units of 100 m), slopes (m per m), terrain (m x
-    km) and bounds (m). The columns of the objectives are those of `planner.plan.Objective`. The kill exposure is the
-    mean density along the path times the paper's number of points, which makes it comparable with the paper's sum.
-    Detection and height stay 0, because they would only decide between paths of exactly the same length.
+    km) and bounds (m). The columns of the objectives are those of `planner.plan.Objective`.
+
+    The kill exposure is the mean density along the path times the paper's number of points, which makes it comparable
+    with the paper's sum. Detection and height stay 0, because they would only decide between paths of exactly the same
+    length.
     """
     violations, objectives = np.zeros(len(paths), dtype=VIOLATIONS), np.zeros(len(paths), dtype=OBJECTIVES)
     # A plan's own path is read-only, which would compile another kernel.
@@ -292,10 +293,11 @@ def _score_paths(data: ProblemArrays, paths: Floats, violations: Records, object
 def _arc_radius(legs_hold_turns: bool, legs: Records, corners: Records, i: int) -> float:
     """Return the radius of the arc at waypoint i, m.
 
-    The radius is 0 at the ends. It is also 0 if turns are limited only by a maximum angle and a leg is too short for
-    its two turns. `planner.evaluation.corners.fly_by_radii` gives the radii of a whole path.
+    The radius is 0 for a turn that cannot be flown. It is also 0 next to a leg that is too short for its two turns;
+    such legs are allowed if only the angle of turns is limited. `planner.evaluation.corners.fly_by_radii` gives the
+    radii of a whole path.
 
-    legs_hold_turns: True if legs must hold their turns, so that none is too short.
+    legs_hold_turns: True if legs must be as long as their turns, so that none is too short.
     legs, corners: filled `LEG` records (w - 1,) and `CORNER` records (w,) of the path.
     """
     radius: float = corners[i].radius
@@ -323,10 +325,11 @@ def _measure_arcs(
 ) -> None:
     """Fill `FLOWN_CORNER` records (w,) and extents (w,) for corners that are flown without tracking error.
 
-    The flight deviates from the legs downwards by the blend of slopes, and sideways by at most R(1/cos(theta/2) - 1)
-    plus the sagitta of a chord. It does so within the tangent and half the arc, or within the blend.
+    The flight deviates from the legs downwards, because parabolas blend the slopes. It deviates sideways by at most
+    R(1/cos(theta/2) - 1) plus the sagitta of a chord. It does so within two tangent lengths of the waypoint, or within
+    the blend if there is no arc.
 
-    legs_hold_turns: True if legs must hold their turns.
+    legs_hold_turns: True if legs must be as long as their turns.
     fly_over: True for fly-over waypoints, which have no arc before them.
     path: (w, 3) m.
     legs, corners: filled `LEG` records (w - 1,) and `CORNER` records (w,) of the path.
@@ -358,7 +361,9 @@ def _measure_arcs(
 def _max_lag_near(lag: Record, leg: Record, corner: Record) -> tuple[float, float]:
     """Return the largest deviations of the flight below and above the legs near a corner, m.
 
-    lag, leg: records of the leg after the corner.
+    They are taken from the beginning of the leg after the corner.
+
+    lag, leg: `HEIGHT_LAG` and `LEG` records of the leg after the corner.
     """
     start_lag, settled_lag = lag_at(lag, 0.0), lag_at(lag, min(1.0, corner.after / max(leg.run, 1e-6)))
     return max(0.0, start_lag, settled_lag), max(0.0, -start_lag, -settled_lag)
@@ -373,8 +378,9 @@ def _clearance_deficit(
     extra_height: float,
     vertices: Floats,
 ) -> float:
-    """Return the missing clearance along the vertices (k, 3) of a flown turn, integrated, m·km.
+    """Return the missing clearance along a flown turn, integrated along its chords, m·km.
 
+    vertices: (k, 3) points of the turn, m.
     heights, slope_bounds: ground heights by pixel, m, and steepest slopes of the ground.
     to_pixel: map from east and north to column and row.
     required: required clearance.
@@ -391,7 +397,7 @@ def _clearance_deficit(
 
 @inner
 def _corner_exposure(missiles: MissileIndex, margin: float, vertices: Floats, below: float, above: float) -> float:
-    """Return the kill density times the length along a flown corner.
+    """Return the kill density along a flown corner times the corner's length, m.
 
     margin: distance that is added to the radii of the spheres, m.
     vertices: (k, 3) points of the corner, m.

@@ -25,7 +25,7 @@ PATHS_PER_BLOCK = 128
 
 
 def _block_fields(kind: type[np.generic], *names: str) -> list[tuple[str, type[np.generic], tuple[int]]]:
-    """Return the definitions of record fields that have one value for each path of a block.
+    """Return the definitions of record fields that hold one value for each path of a block.
 
     kind: type of the values.
     names: names of the fields.
@@ -117,8 +117,10 @@ def interpolate_legs(start: Record, step: Record, fraction: float, size: int, ou
 
 @inlined
 def load_waypoints(to_pixel: PolyMapRecord, paths: Floats, first_path: int, i: int, size: int, block: Record) -> None:
-    """Copy waypoint i of each path into a block, and compute its raster pixel as `polymap` does.
+    """Copy waypoint i of each path into `block.end`, and compute its raster pixel as `polymap` does.
 
+    to_pixel: map from east and north to column and row.
+    paths: (n, w, 3) m.
     first_path: number of the first path of the block.
     size: number of paths in the block.
     """
@@ -148,8 +150,10 @@ def _evaluate_polynomials(
 ) -> None:
     """Fill `out` with the sum of coefficients[i, j] x^i y^j for each path, by Horner's method.
 
-    terms: i + j is less than this number.
-    inner: scratch memory.
+    coefficients: (terms, terms); only those with i + j < terms are used.
+    size: number of paths in the block.
+    x, y, out: one value per path.
+    inner: working memory, one value per path.
     """
     for b in range(size):
         out[b] = 0.0
@@ -179,9 +183,9 @@ class PrecomputedLimits(NamedTuple):
 
     cos_max_turn: cosine of the largest turn.
     wind: downwind unit vector, east and north.
-    climb_slope, dive_slope: tangents that no leg may exceed, or, where the aircraft limits slopes, that every leg may
-    use.
-    slopes_by_aircraft: True if the aircraft limits slopes.
+    climb_slope, dive_slope: tangents of the slope limits. If the aircraft limits slopes, they are those that it can fly
+    on every course and at every altitude; a steeper leg may be possible and is checked by itself.
+    slopes_by_aircraft: True if the aircraft limits slopes, False if the scenario limits both climbs and dives.
     straight_distance: distance from start to destination in three dimensions, m.
     required: clearance above ground.
     """
@@ -197,7 +201,11 @@ class PrecomputedLimits(NamedTuple):
 
 @inner
 def precompute_limits(data: ProblemArrays) -> PrecomputedLimits:
-    """Return limits that are the same for all paths of a problem."""
+    """Return the limits that are the same for all paths of a problem, computed once for all of them.
+
+    Where the aircraft limits slopes, the smallest limit on any course and at any altitude is taken: a leg within it
+    needs no further check.
+    """
     climb, dive = data.max_climb, data.max_dive
     slopes_by_aircraft = math.isnan(climb) or math.isnan(dive)
     if math.isnan(climb):
@@ -226,9 +234,10 @@ def precompute_limits(data: ProblemArrays) -> PrecomputedLimits:
 def _min_slope_limit(data: ProblemArrays, air_angles: Floats) -> float:
     """Return the steepest slope that the aircraft can fly on every course between floor and ceiling, rad.
 
-    air_angles: (h,) flight-path angles relative to the air at the table's heights.
+    air_angles: (h,) steepest climb (or descent) relative to the air at the table's heights, rad.
 
-    The slope over the ground is smallest in the strongest tailwind. The result is -1 if there is no such slope.
+    The slope over the ground is smallest in the strongest tailwind. The result is -1 if there is no such slope: at some
+    height the angle is not positive, or the wind is about as fast as the aircraft.
     """
     wind = max(wind_speed_at(data.aircraft, data.floor), wind_speed_at(data.aircraft, data.ceiling))
     speed, air_angle = data.aircraft.airspeed, math.inf
@@ -244,14 +253,14 @@ def _min_slope_limit(data: ProblemArrays, air_angles: Floats) -> float:
 def _course_slope_limits(
     data: ProblemArrays, ux: float, uy: float, start_altitude: float, end_altitude: float, wind: Wind
 ) -> tuple[float, float]:
-    """Return the climb and dive limits on the unit course u between two altitudes, rad.
+    """Return the climb and dive limits on a course between two altitudes, rad.
 
-    ux, uy: east and north of the course.
+    ux, uy: east and north of the course, a unit vector.
     start_altitude, end_altitude: m AMSL.
     wind: downwind unit vector.
 
-    A limit of the scenario applies if there is one. Otherwise the lowest limit of the aircraft at the two altitudes and
-    half-way between them applies. The angle margin is subtracted.
+    A limit that the scenario states applies. Otherwise it is the lowest limit of the aircraft at three altitudes: the
+    two given ones and the one half-way between them. The angle margin is subtracted.
     """
     climb, dive = data.max_climb, data.max_dive
     if math.isnan(climb) or math.isnan(dive):
@@ -350,10 +359,11 @@ def add_leg_violations(
 ) -> None:
     """Add turn, slope and bounds violations of a path (w, 3) to a `VIOLATIONS` record (eq. 1-4, 7).
 
-    legs, corners: measurements of the path.
+    legs, corners: filled `LEG` records (w - 1,) and `CORNER` records (w,) of the path.
     by_amount: True to add the excess of each violation, False to add 1.
 
-    If `legs_hold_turns` is set, a leg that is too short for the turns at its ends adds to the turn violations.
+    If `legs_hold_turns` is set, a leg that is too short for the turns at its ends adds to the turn violations. With
+    `by_amount`, so does any leg shorter than `MIN_LEG_M`.
     """
     # Another order of these lines would change the order of summation, and with it the last digits.
     _add_turn_violations(data, limits, legs, by_amount, violations)
@@ -465,13 +475,13 @@ def _add_leg_length_violations(
 def _arc_slope_excess(
     data: ProblemArrays, limits: PrecomputedLimits, path: Floats, i: int, legs: Records, corners: Records
 ) -> float:
-    """Return the excess of the slope of the arc at waypoint i over the aircraft's limits, m per m.
+    """Return by how much the arc at waypoint i is too steep for the aircraft, m per m; 0 if it is not.
 
     path: (w, 3) m.
     i: index of an inner waypoint.
     legs, corners: filled `LEG` records (w - 1,) and `CORNER` records (w,) of the path.
 
-    The limits on both courses of the corner apply.
+    The arc must be within the limits on the course before the turn and on the course after it.
     """
     slope_in = (path[i, 2] - path[i - 1, 2]) / max(legs[i - 1].run, 1.0)
     slope_out = (path[i + 1, 2] - path[i, 2]) / max(legs[i].run, 1.0)
@@ -487,9 +497,9 @@ def _arc_slope_excess(
 
 @inlined
 def _violation(excess: float, by_amount: bool) -> float:
-    """Return the score of an excess over a limit; 0 if there is no excess.
+    """Return what an excess over a limit adds to a score.
 
-    by_amount: True to return the excess itself, False to return 1.
+    by_amount: True for the excess itself, False for 1 if there is any excess.
     """
     if by_amount:
         return excess

@@ -70,7 +70,11 @@ def _score_paths(
     """Fill the `VIOLATIONS` and `OBJECTIVES` records (n,) of paths (n, w, 3).
 
     scratch: a `BLOCK_SCRATCH` record (1,).
-    legs, corners: scratch records of one path.
+    legs, corners: working memory for one path.
+    violations, objectives: records to fill.
+
+    Paths are scored in blocks. Turns, slopes and bounds are counted in the blocks, too, if their limits are constants;
+    otherwise they are counted path by path.
     """
     path_count, block = paths.shape[0], scratch[0]
     limits = precompute_limits(data)
@@ -102,9 +106,7 @@ def _score_paths(
 def _score_block(
     data: ProblemArrays, limits: PrecomputedLimits, paths: Floats, first_path: int, size: int, block: Record
 ) -> None:
-    """Score a block of `size` paths side by side, beginning with path number `first_path`.
-
-    Fill the sums of the block.
+    """Score `size` paths side by side, from path number `first_path` on; store the sums in the block.
 
     Each waypoint is mapped to the raster once. Between waypoints a leg is assumed to be straight in pixels.
     """
@@ -179,9 +181,9 @@ def _find_ground(heights: Heights, size: int, block: Record) -> None:
 
 @inlined
 def _add_terrain(required: RequiredClearance, size: int, adds_height: bool, block: Record) -> None:
-    """Count the points that are too low, and add the heights above ground if `adds_height`.
+    """Count the points that are too low (eq. 5); if `adds_height`, add up their heights (eq. 11).
 
-    These are eqs. 5 and 11 of Yang, Tang and Lozano 2014. A point above unknown ground counts as too low.
+    The equations are those of Yang, Tang and Lozano 2014. A point above unknown ground counts as too low.
 
     required: required clearance.
     size: number of paths in the block.
@@ -209,11 +211,12 @@ def _add_terrain(required: RequiredClearance, size: int, adds_height: bool, bloc
 
 @inlined
 def _find_nearby_units(threat_cells: ThreatCells, size: int, block: Record) -> None:
-    """Find the list of threats that may reach each point; store the first entry and the length of each list.
+    """Find the threats that may reach the current point of each path.
 
-    threat_cells: lists of the threats by the cells of a grid that they reach.
+    threat_cells: for each cell of a grid, the part of one long list that holds the threats near this cell.
     size: number of paths in the block.
-    block: one point of each path of the block; the entries and lengths are stored in it.
+    block: one point of each path. `first` and `count` are set to the first entry and the length of this part. `count`
+        is 0 for a point below or above the altitudes that the threats reach.
     """
     # A cell is not bounded in height; it stores the heights that its units reach.
     west, south, per_metre = threat_cells.west, threat_cells.south, 1.0 / threat_cells.side
@@ -284,7 +287,7 @@ def _add_exposures(spheres: Records, units: Int32s, size: int, block: Record) ->
 
 @inlined
 def _add_leg(limits: PrecomputedLimits, size: int, is_first: bool, block: Record) -> None:
-    """Add the length of a leg, and count its slope and the turn into it if too large.
+    """Add the length of a leg; count the leg if it is too steep, and the turn into it if it is too sharp.
 
     These are eqs. 1 to 4 and 8 of Yang, Tang and Lozano 2014.
 
@@ -324,13 +327,13 @@ def _add_leg(limits: PrecomputedLimits, size: int, is_first: bool, block: Record
 
 @inlined
 def _add_bounds_violations(data: ProblemArrays, size: int, waypoints: Record, sums: Record) -> None:
-    """Count the waypoints that are off the map, below the floor or above the ceiling.
+    """Count the paths' current waypoints that are off the map, below the floor or above the ceiling.
 
     This is eq. 7 of Yang, Tang and Lozano 2014.
 
     size: number of paths in the block.
-    waypoints: record with one entry per path for east, north and up, m.
-    sums: record with one entry per path, whose counts of waypoints outside are updated.
+    waypoints: record with the east, north and up of one waypoint of each path, m.
+    sums: sums of each path; `outside` is increased by 1 if the path's waypoint is outside.
     """
     west = data.west
     east = data.east

@@ -141,7 +141,7 @@ def threat_records(threats: Threats) -> Records:
 
 
 def sphere_records(threats: Records) -> Records:
-    """Return the spheres of `THREAT` records as `SPHERE` records (m,)."""
+    """Return `THREAT` records as `SPHERE` records (m,), with the squares and powers that points need."""
     spheres = np.zeros(len(threats), dtype=SPHERE)
     for name in ("east", "north", "up"):
         spheres[name] = threats[name]
@@ -201,10 +201,10 @@ def required_clearance(data: ProblemArrays) -> RequiredClearance:
 
 @inner
 def required_headroom(data: ProblemArrays) -> RequiredClearance:
-    """Express the maximum height above ground as a required clearance.
+    """Express the maximum height above ground as a required clearance above ground turned upside down.
 
-    It applies to a path and a ground whose heights have the opposite sign: being below the maximum height is then being
-    above the clearance.
+    If the heights of the path and of the ground are given the opposite sign, then a path below the maximum height is a
+    path above this clearance. The same code can check both.
     """
     space = data.airspace
     return _make_required_clearance(data, -space.max_height, space.buffer, space.start_buffer, space.destination_buffer)
@@ -239,7 +239,7 @@ def _make_required_clearance(
 
 @inlined
 def clearance_at(required: RequiredClearance, east: float, north: float) -> float:
-    """Return the required height above ground at a position, m.
+    """Return the required height above ground (the clearance plus the buffer) at a position, m.
 
     required: clearance, and buffers at both ends and between them, m.
     east, north: m.
@@ -294,7 +294,7 @@ HEIGHT_MARGIN_M = 4.0
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """The data of a search.
+    """Task of a search: a scenario, the limits of the UAV, and both as arrays for compiled code.
 
     search: arrays with the margins that a search aims for.
     certified: arrays with the margins that the certificate requires.
@@ -313,7 +313,7 @@ def make_problem(scenario: Scenario, limits: Limits, attempt: int = 0) -> Proble
 
     attempt: number of searches that have already failed; each failure increases the clearance of the next search.
 
-    Raises ScenarioError if no path can be planned in the scenario.
+    Raises ScenarioError without terrain, or for a turn or slope limit within the margin that a plan keeps to it.
     """
     terrain = scenario.terrain
     if terrain is None:
@@ -325,7 +325,7 @@ def make_problem(scenario: Scenario, limits: Limits, attempt: int = 0) -> Proble
     for field in ("max_turn", "max_climb", "max_dive"):
         value = getattr(limits, field)
         if value is not None and value <= ANGLE_MARGIN_RAD:
-            allowed = 'a plan keeps a margin of 0.5 to this limit; allowed: above 0.5, or "aircraft"'
+            allowed = 'a plan keeps a margin of 0.5 degrees to this limit; allowed: above 0.5, or "aircraft"'
             raise ScenarioError.at(
                 scenario.name,
                 f"limits.{field}_deg",
@@ -367,7 +367,10 @@ def make_problem(scenario: Scenario, limits: Limits, attempt: int = 0) -> Proble
 
 
 def _certified_arrays(scenario: Scenario, limits: Limits, terrain: Terrain) -> ProblemArrays:
-    """Return the arrays of a problem with the margins of the certificate."""
+    """Return the arrays of a problem with the margins of the certificate.
+
+    The margins cover the errors of a flight, the autopilot's tracking error and the reserves that `limits` state.
+    """
     threats = threat_records(scenario.threats)
     radius = np.maximum(scenario.threats.kill_radius, scenario.threats.detection_radius)
     tracking = zero_tracking_error() if limits.tracking is None else limits.tracking.record
@@ -421,7 +424,10 @@ def _certified_arrays(scenario: Scenario, limits: Limits, terrain: Terrain) -> P
 
 
 def _zone_margins(scenario: Scenario, horizontal: float, vertical: float, end_fraction: float) -> ZoneMargins:
-    """Return the required margins to zones (m), changed by the scenario's `zone_margin_m` if it is stated.
+    """Return the required margins to zones, changed by the scenario's `zone_margin_m` if it is stated.
+
+    horizontal, vertical: margins without `zone_margin_m`, m.
+    end_fraction: fraction of a fixed end's distance that replaces a margin which the end violates.
 
     `zone_margin_m` changes the horizontal margin by its difference from `CERTIFIED_ZONE_MARGIN_M`. An increase also
     applies to the vertical margin, a reduction does not.
@@ -432,11 +438,12 @@ def _zone_margins(scenario: Scenario, horizontal: float, vertical: float, end_fr
 
 
 def _max_buffer(certified: ProblemArrays, certified_margin: float) -> float:
-    """Return the largest margin that a search may keep to a limit of the height above ground, m.
+    """Return the largest margin of a search to the required clearance or to the maximum height, m.
+
+    Between these two limits lies the band in which a path has to stay. A search may exceed the certificate's margin by
+    a fraction of this band. The margin is inf without a maximum height.
 
     certified_margin: margin of the certificate to the same limit, m.
-
-    The margin is inf without a maximum height.
     """
     space = certified.airspace
     band_height = space.max_height - certified.clearance - certified.buffer - space.buffer
@@ -459,8 +466,8 @@ def _reduced_performance(scenario: Scenario, limits: Limits) -> PerformanceTable
 def _buffer_growth(scenario: Scenario, limits: Limits, aircraft: PerformanceTable) -> float:
     """Return the growth of the buffer (height above the clearance) with the distance from an end, m per m.
 
-    The aircraft can follow this growth. Without reserves above or below the path it is `BUFFER_GROWTH_RATIO`, which is
-    also the maximum.
+    The growth is at most `BUFFER_GROWTH_RATIO`. With a reserve above or below the path it is also limited by the slopes
+    that the aircraft has left at both ends, so that it can follow the growth.
     """
     if not (limits.reserve_height or limits.reserve_above):
         return BUFFER_GROWTH_RATIO
@@ -493,7 +500,7 @@ def _end_buffer(terrain: Terrain, limits: Limits, point: Floats, buffer: float, 
 
 
 def _make_slope_bounds(terrain: Terrain) -> SlopeBounds:
-    """Return upper bounds on the terrain's slope: of the whole terrain, and of each tile with its neighbours."""
+    """Return upper bounds on the terrain's slope: everywhere, and within each tile and its neighbours."""
     slopes = steepest_slopes(terrain.heights, terrain.spacing)
     max_slope = float(slopes.max())
     # Each tile with its neighbours, so that the bound holds within a tile's side of any of its points.

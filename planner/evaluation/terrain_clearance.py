@@ -34,7 +34,7 @@ HEIGHT_LAG = np.dtype(
 
 @inlined
 def _remaining_fraction(lengths: float) -> float:
-    """Return an upper bound on exp(-lengths), the fraction of a lag that remains after some lag lengths."""
+    """Return the fraction of a lag that remains after some lag lengths: a bound above exp(-lengths)."""
     # Four terms of exp(x), because a library's exponential rounds differently on different machines.
     return 1.0 / (1.0 + lengths * (1.0 + lengths * (0.5 + lengths / 6.0)))
 
@@ -65,9 +65,14 @@ def set_lag(
 ) -> float:
     """Fill the `HEIGHT_LAG` record of a leg; return the distance of the aircraft below the leg's end, m.
 
+    On a leg with a slope the lag approaches a constant distance. On a leg with a change of altitude below the
+    autopilot's step, the aircraft is demanded the final altitude from the beginning.
+
+    tracking: tracking error of the autopilot, with the step, m.
     length: lag length (`lag_length`), m.
     horizontal_length, altitude_change: horizontal length and altitude change of the leg, m.
     below: distance of the aircraft below the start of the leg, m.
+    lag: the record to fill.
     """
     lag.steady, lag.slant = length * altitude_change / max(horizontal_length, 1e-6), 0.0
     if abs(altitude_change) < tracking.step:
@@ -101,7 +106,10 @@ def compute_height_lags(
 
 @inlined
 def lag_at(lag: Record, fraction: float) -> float:
-    """Return the distance of the aircraft below a leg at a fraction of the leg, m; negative above the leg."""
+    """Return the distance of the aircraft below a leg at a fraction of the leg, m; negative above the leg.
+
+    lag: `HEIGHT_LAG` record of the leg.
+    """
     return lag.steady + lag.slant * (1.0 - fraction) + lag.transient * _remaining_fraction(fraction * lag.decay)
 
 
@@ -151,16 +159,17 @@ def _take_sample(
     altitude_change: float,
     min_step: float,
 ) -> tuple[float, float]:
-    """Sample the ground at a point of a line.
+    """Return the height of a point above the required clearance, and the step to the next point.
 
-    Return the height above the required clearance and the next step.
+    The points lie on a line. The higher the point, the longer the step, because the ground rises by no more than its
+    steepest slope.
 
     heights: ground heights by pixel, m.
     tiles, tile_side: upper bound on the ground's slope (m per m) within `tile_side` m of each tile of the raster.
     growth: largest slope of the required height, m per m.
     column, row, up: raster position and altitude of the point.
     required_height: required clearance, m.
-    max_further_height: largest height that is required in addition elsewhere on the line, m.
+    max_further_height: largest additional height that the aircraft can need further along the line, m.
     horizontal_length, altitude_change: horizontal length and altitude change of the whole line, m.
     min_step: minimum spacing of samples, as a fraction of the line.
 
@@ -193,7 +202,7 @@ def terrain_excess(
     bz: float,
     max_excess: float,
 ) -> float:
-    """Return the depth below the required clearance along the line a-b, summed over samples, m·km.
+    """Return how far the line a-b is below the required clearance: depth times length, m·km.
 
     heights: ground heights by pixel, m.
     slope_bounds: steepest slopes of the ground near each pixel, which set the steps between samples.
@@ -201,7 +210,7 @@ def terrain_excess(
     extra_height: additional height that is required on this line, m.
     ends: columns and rows of a and b.
     ax, ay, az, bx, by, bz: east, north and altitude of the two ends, m.
-    max_excess: value beyond which the sum ends, m·km.
+    max_excess: value beyond which the sum over samples ends, so that the result is a lower bound, m·km.
     """
     column, row, last_column, last_row = ends
     column_step, row_step = last_column - column, last_row - row
@@ -285,12 +294,12 @@ def sample_terrain(
 ) -> None:
     """Fill the `TERRAIN_LEG` record of each leg of a path (w, 3): its depth and its smallest heights.
 
-    legs, lags: filled `LEG` and `HEIGHT_LAG` records (w - 1,) of the path.
-    extents, unfinished: (w,) distance within which a point is near a waypoint, m, and (w - 1,) scratch.
+    legs, lags: filled `LEG` and `HEIGHT_LAG` records (w - 1,) of the path. terrain_legs: (w - 1,) records to fill.
+    extents: (w,) distance within which a point is near a waypoint, m. unfinished: (w - 1,) working memory.
 
     Depths and heights are measured from the required clearance. The smallest heights are exact up to
-    `NEAR_GROUND_HEIGHT_M`, and lower bounds above it. The legs are sampled in turn, because the next sample of a leg
-    depends on the result of its last one and the processor would have to wait for it.
+    `NEAR_GROUND_HEIGHT_M`, and lower bounds above it. The legs are sampled in turn, one sample of each at a time,
+    because the next sample of a leg depends on its last one; the processor can work on several legs at once.
     """
     count = legs.shape[0]
     _start_sampling(to_pixel, required.sample_spacing, path, legs, extents, terrain_legs)
@@ -345,7 +354,7 @@ def sample_terrain(
 
 @inlined
 def segment_pixels(to_pixel: PolyMapRecord, ax: float, ay: float, bx: float, by: float) -> Pixels:  # pragma: no cover
-    """Return the raster columns and rows of both ends of a segment: column and row of a, then of b.
+    """Return the pixel coordinates of the ends of a segment: column and row of a, then of b.
 
     to_pixel: map from east and north to column and row.
     ax, ay, bx, by: east and north of the two ends, m.

@@ -39,10 +39,10 @@ THREAT_CELL = np.dtype(
 
 @by_reference
 class ThreatCells(NamedTuple):
-    """Lists of units by the cells that they reach, for compiled functions.
+    """Grid on the map. Each cell lists the units (numbers of threats) that reach it.
 
     cells: `THREAT_CELL` records (c,), row by row; the last represents all points outside the grid and lists every unit.
-    units: units of one cell after another, in increasing order.
+    units: one array for all cells: first the units that reach cell 0, in increasing order, then those of cell 1.
     west, south: edges of the grid, m. side: side of a cell, m.
     columns, rows: number of columns and rows of the grid.
     """
@@ -59,9 +59,9 @@ class ThreatCells(NamedTuple):
 def make_threat_cells(position: Floats, radius: Floats, bounds: Floats) -> ThreatCells:
     """List, for each cell of a grid on the map, the units whose sphere reaches above or below the cell.
 
-    position: (m, 3) positions of the units.
+    position: (m, 3) positions of the units, m.
     radius: (m,) radii of the spheres, m; 0 for none.
-    bounds: (2, 2) map.
+    bounds: (2, 2) map, m: west and east, then south and north.
     """
     min_corner, max_corner = bounds[:, 0], bounds[:, 1]
     min_corner, max_corner = (
@@ -89,10 +89,10 @@ def make_threat_cells(position: Floats, radius: Floats, bounds: Floats) -> Threa
 
 @compiled
 def _fill_cells(first: Int32s, units: Int32s, min_altitudes: Int32s, max_altitudes: Int32s, cells: Records) -> None:
-    """Fill the records of the cells: their part of the list of units, and the altitude range of these units.
+    """Fill the record of each cell: its part of the list of units, and the altitudes of these units.
 
-    first: (cells + 1,) first entry of each cell in the list.
-    units: units of one cell after another.
+    first: (cells + 1,) cell k has the entries first[k] to first[k + 1] - 1 of the list.
+    units: the list: first the units of cell 0, then those of cell 1.
     min_altitudes, max_altitudes: (u,) lowest and highest altitude that each unit reaches, m.
     cells: `THREAT_CELL` records to fill.
     """
@@ -112,7 +112,8 @@ def _list_units(
 ) -> tuple[Int32s, Int32s]:
     """List the units that reach each cell; return each cell's first entry in the list, and the list.
 
-    The list contains the units of one cell after another; the last cell lists all units.
+    The list contains first the units of cell 0, then those of cell 1, and so on; the last cell is for points outside
+    the grid and lists all units. The entries of cell k are first[k] to first[k + 1] - 1.
 
     position: (u, 3) positions of the units, m; altitudes are ignored.
     radius: (u,) horizontal reach of the units, m; a unit with 0 or less is left out.
@@ -184,9 +185,13 @@ MISSILE_CLASS = np.dtype(
 class MissileIndex(NamedTuple):
     """Missiles in the order of their grid cells, so that those near a segment are adjacent in memory.
 
-    missiles: `MISSILE` records (m,) of the missiles with a radius.
+    Missiles of similar radius form a class, which has a grid of its own: a long radius in one class does not enlarge
+    the search in the others.
+
+    missiles: `MISSILE` records (m,) of the missiles with a radius: class by class, and cell by cell within a class.
     classes: `MISSILE_CLASS` records (k,).
-    first: (c,) first missile of each cell, and after each class's cells the end of its last cell.
+    first: (c,) first missile of each cell of the first class, then the end of its last cell; then the same for the next
+    class.
     """
 
     missiles: Records
@@ -195,7 +200,7 @@ class MissileIndex(NamedTuple):
 
 
 def make_missile_index(threats: Records, side: float | None = None) -> MissileIndex:
-    """Make the spatial index of missiles.
+    """Make the spatial index of missiles: sort them by class, and within a class by the cells of its grid.
 
     threats: records with the fields east, north, up, kill_radius and kill_scale, m; threats without a kill radius are
         ignored.
@@ -250,11 +255,11 @@ def kill_density(
 ) -> tuple[float, float, float]:
     """Return the mean kill density over the segment a-b, and the distances to spheres near its ends, m.
 
-    index: missiles in classes of similar radii, each with its own grid of cells.
+    index: missiles in classes of similar radii, each with its own grid; only missiles in cells near a-b are tested.
     margin: distance that is added to the radii, m.
     max_distance: a returned distance is exact if it is below this, m; otherwise it may be inf.
     ax, ay, az, bx, by, bz: east, north and altitude of the two ends, m.
-    length_a, length_b: lengths at a and at b on which the distances to the surfaces of spheres are measured, m.
+    length_a, length_b: the distances at a and b are those of the first length_a and the last length_b m of the segment.
     below, above: largest distance of the aircraft below and above the segment, from its tracking error, m.
     """
     dx, dy, dz = bx - ax, by - ay, bz - az
@@ -337,7 +342,7 @@ def _shift_towards_missile(start_height: float, altitude_change: float, below: f
 
 @inlined
 def _cell_index(position: float, count: int) -> int:
-    """Return the index of the cell of a position along one axis.
+    """Return the index of the cell that contains a position (in cells) along one axis.
 
     The index is -1 below the first cell, and `count` above the last.
     """
@@ -368,7 +373,7 @@ def _sphere_density(
     """Return the mean kill density over a segment that enters a sphere.
 
     dot, start2, length2: as in `window_exposure`; the point is the centre of the sphere.
-    radius, scale: of the sphere, m.
+    radius, scale: radius of the sphere, and scale of its kill density, m.
     """
     if length2 < 1e-12:
         return window_exposure(0.0, 1.0, length2, dot, start2, scale)

@@ -45,9 +45,10 @@ _SIMPSON_WEIGHTS = (1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0)
 class WindGrid(NamedTuple):
     """Wind at the places of a regular grid, each at the time at which a plan passes there.
 
-    first: the grid's first place, world m, (3,).
-    step: distances between its places, m, (3,).
-    velocities: m/s, east and north, (x, y, z, 2); without places if the wind is that of the performance table.
+    first: (3,) place of velocities[0, 0, 0], m.
+    step: (3,) distances between neighbouring places east, north and up, m.
+    velocities: (x, y, z, 2) east and north wind at each place, m/s; of size 0 without a forecast, when the performance
+    table gives the wind.
     """
 
     first: Floats
@@ -84,7 +85,7 @@ _EMPTY_TABLE = np.zeros(0)
 _EMPTY_TABLE.setflags(write=False)
 _NO_VELOCITIES = np.zeros((0, 0, 0, 2))
 _NO_VELOCITIES.setflags(write=False)
-# No wind but that of the performance table.
+# No forecast: only the wind of the performance table.
 NO_WINDS = WindGrid(_EMPTY_TABLE, _EMPTY_TABLE, _NO_VELOCITIES)
 # Cost of a search for the shortest path.
 LENGTH_COST = TravelCost(1.0, 0.0, 0.0, _EMPTY_TABLE, _EMPTY_TABLE, _EMPTY_TABLE, _EMPTY_TABLE, _EMPTY_TABLE, NO_WINDS)
@@ -92,6 +93,8 @@ LENGTH_COST = TravelCost(1.0, 0.0, 0.0, _EMPTY_TABLE, _EMPTY_TABLE, _EMPTY_TABLE
 
 def make_wind_grid(scenario: Scenario, table: PerformanceTable) -> WindGrid:
     """Return the wind of a scenario's forecast over its map; `NO_WINDS` without a forecast.
+
+    Each place has the wind of the time at which a straight flight from the start would have come as far as the place.
 
     table: performance of the aircraft in the mean wind.
     """
@@ -123,7 +126,7 @@ def make_travel_cost(
 ) -> TravelCost | None:
     """Make the cost function of an objective, in equivalent metres.
 
-    The cost is the path's length, or its time or energy divided by the time or energy of a metre of level flight.
+    The cost is the path's length, or its time or energy divided by that of one metre of level flight in still air.
     Returns None for the objective energy if the aircraft's power is unknown.
 
     table: performance of the aircraft at the airspeed of the path.
@@ -167,10 +170,12 @@ def make_energy_cost(envelope: Envelope, table: PerformanceTable, winds: WindGri
 
 
 def _power_parabola(envelope: Envelope, airspeed: float, amsl: float) -> tuple[float, float, float, float, float]:
-    """Fit a parabola to the power over the sine of the climb angle.
+    """Fit a parabola to the power as a function of the sine of the climb angle.
 
-    Return its coefficients and the limits of the sine: level, linear, square, min_sine and max_sine, as in
-    `TravelCost`. All are NaN if the power is unknown.
+    It passes through idle in the steepest descent, level flight, and full throttle in the steepest climb.
+
+    Returns level, linear, square, min_sine and max_sine, as in `TravelCost`. All are NaN if the power is unknown or
+    level flight is impossible.
 
     airspeed: m/s.
     amsl: altitude, m.
@@ -187,8 +192,11 @@ def _power_parabola(envelope: Envelope, airspeed: float, amsl: float) -> tuple[f
 
 
 class LegTime(NamedTuple):
-    """Time of a leg (s), its derivatives with respect to the leg (s/m), and D of `leg_time`.
+    """Time of a leg, as `leg_time` computes it, with its derivatives.
 
+    seconds: time, s.
+    by_east, by_north, by_up: change of the time with each component of the leg's vector, s/m.
+    root: D of `leg_time`.
     is_flyable: True if the aircraft can hold the leg's course in the wind.
     """
 
@@ -244,9 +252,9 @@ class _FlightConditions(NamedTuple):
 
 @inner
 def _interpolate_wind(winds: WindGrid, x: float, y: float, z: float) -> tuple[float, float]:
-    """Return the wind of a grid at a place, m/s, east and north, by trilinear interpolation.
+    """Return the east and north wind at a place, m/s, interpolated between the places of a grid.
 
-    winds: velocities at the points of a regular grid.
+    winds: velocities at the places of a regular grid; the eight around the place are used.
     x, y, z: east, north and altitude of the place, m.
 
     Beyond the grid the wind at its edge applies.
@@ -377,7 +385,11 @@ def path_cost(travel: TravelCost, table: PerformanceTable, path: Floats) -> floa
 
 
 class LegModel(NamedTuple):
-    """Scratch of `model_leg`: derivatives (2, 3) and curvature (2, 3, 2, 3) of a leg's cost by its ends."""
+    """Derivatives of a leg's cost with respect to its two ends, as `model_leg` fills them.
+
+    slopes: (2, 3) first derivatives: [0] with respect to the start (east, north, up), [1] with respect to the end.
+    curvature: (2, 3, 2, 3) second derivatives: [i, j, k, l] with respect to axis j of end i and axis l of end k.
+    """
 
     slopes: Floats
     curvature: Floats
@@ -385,15 +397,15 @@ class LegModel(NamedTuple):
 
 @inner
 def model_leg(travel: TravelCost, table: PerformanceTable, start: Floats, finish: Floats, model: LegModel) -> float:
-    """Return the cost of a leg, which is always finite, and model it to second order.
+    """Return the cost of a leg, and fill its first and second derivatives with respect to the leg's ends.
 
     travel, table: weights of length, time and energy in the cost, and performance of the aircraft.
     start, finish: (3,) ends of the leg, m.
-    model: derivatives (2, 3) and curvature (2, 3, 2, 3) of the cost by the two ends, which are filled.
+    model: the derivatives to fill.
 
-    The curvature (second derivative) is the sum of the curvatures of the length, of the time at each height, and of the
-    power, which are all convex. The coupling of height and course is omitted, so the matrix has no negative eigenvalue.
-    Time and energy are integrated along the leg by Simpson's rule with three points.
+    The cost is finite even if the leg cannot be flown. Its second derivative has three parts: length, time at each
+    height, and power. All are convex, and the coupling of height and course is omitted, so the matrix has no negative
+    eigenvalue. Time and energy are integrated along the leg by Simpson's rule with three points.
     """
     slopes, curvature = model.slopes, model.curvature
     slopes[:], curvature[:] = 0.0, 0.0
@@ -464,8 +476,9 @@ def _add_place_model(
     fraction: fraction of the leg at which the place lies.
     weight: weight of the place in the cost of the leg.
     timed_cost: cost of time and energy of the leg in the wind of the place.
-    model: derivatives and curvature of the leg's cost, to which the shares of both ends are added.
+    model: derivatives of the leg's cost with respect to both ends, to which those of the place are added.
 
+    The place moves with the ends: at fraction f by 1 - f times the step of the start, and by f times that of the end.
     The derivatives are central differences over `HORIZONTAL_STEP_M` and `HEIGHT_STEP_M`.
     """
     x, y, amsl = start[0] + fraction * step[0], start[1] + fraction * step[1], start[2] + fraction * step[2]
@@ -486,7 +499,12 @@ def _add_place_model(
 
 @inner
 def _fill_length_hessian(hessian: Floats, displacement: tuple[float, float, float], length: float) -> Floats:
-    """Fill the Hessian (3, 3) of a leg's length with respect to the leg's vector (east, north, up)."""
+    """Fill and return the second derivatives (3, 3) of a leg's length with respect to its vector.
+
+    hessian: (3, 3) array to fill.
+    displacement: vector of the leg: east, north and up, m.
+    length: its length, m.
+    """
     for axis in range(3):
         for other_axis in range(3):
             identity = 1.0 if axis == other_axis else 0.0
@@ -497,10 +515,10 @@ def _fill_length_hessian(hessian: Floats, displacement: tuple[float, float, floa
 
 @inner
 def _fill_time_curvature(curvature: Floats, time: LegTime, conditions: _FlightConditions) -> None:
-    """Fill the curvature (3, 3) of a leg's time: (1 - w g' - g w' - (V^2 - w^2) g g') / D.
+    """Fill the second derivatives (3, 3) of a leg's time with respect to the leg's vector.
 
-    Here g is the gradient of the time, w is the wind, V is the airspeed, and D is as in `leg_time`. For a
-    leg that is not flyable the curvature is 1 / D on the diagonal, and 0 elsewhere.
+    They are (1 - w g' - g w' - (V^2 - w^2) g g') / D. Here g is the gradient of the time, w is the wind, V is the
+    airspeed, and D is as in `leg_time`. For a leg that is not flyable they are 1 / D on the diagonal, and 0 elsewhere.
     """
     wind = (conditions.wind_east, conditions.wind_north, 0.0)
     gradient = (time.by_east, time.by_north, time.by_up)
@@ -523,7 +541,7 @@ def _add_step_model(
     gradient: tuple[float, float, float],
     slope_factor: float,
 ) -> None:
-    """Add a leg's curvature and gradient, given with respect to its vector, to the arrays for its two ends.
+    """Add derivatives that are given with respect to a leg's vector to those with respect to its ends.
 
     curvature: (2, 3, 2, 3) second derivatives of the leg's cost by its ends; updated.
     slopes: (2, 3) derivatives of the leg's cost by its ends; updated.

@@ -11,7 +11,7 @@ from world.arrays import Floats, Ints
 class BoxSearch(ABC):
     """Population-based search in a box: `ask` returns samples to score, `tell` takes their scores.
 
-    lower, upper: (d,) box.
+    lower, upper: (d,) lowest and highest value of each variable.
     rank: function of scores (n, c) that returns their ranks (n,); smaller is better.
     population: even number of samples.
     initial: (population, d) first samples; None for uniform ones.
@@ -53,4 +53,4 @@ class BoxSearch(ABC):
 
     @abstractmethod
     def tell(self, scores: Floats) -> None:
-        """Process the scores (n, c) of the last samples of `ask`, and make the next samples."""
+        """Process the scores (n, c) of the samples that `ask` returned last, and make the next samples."""

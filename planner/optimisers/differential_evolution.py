@@ -34,7 +34,11 @@ class DifferentialEvolution(BoxSearch):
     _generation = 0
 
     def tell(self, scores: Floats) -> None:
-        """Process the scores (n, c) of the last trial vectors, select the survivors, and make new trial vectors."""
+        """Let the trial vectors replace the samples that rank no better, and make new trial vectors.
+
+        scores: (n, c) scores of the last trial vectors. The first scores are those of the whole first population, which
+            replaces nothing.
+        """
         if not len(self.scores):
             self.samples, self.scores = self._pending_samples.copy(), np.array(scores)
         else:
@@ -60,6 +64,9 @@ class DifferentialEvolution(BoxSearch):
         self._pending_samples = np.where(trials > self.upper, 0.5 * (targets + self.upper), trials)
 
     def _target_rows(self) -> Ints:
-        """Return the rows that this generation challenges; the two halves of the population alternate."""
+        """Return the rows of the samples that the next trial vectors may replace.
+
+        These are the first and the last half of the population in turn.
+        """
         count = len(self.samples)
         return np.arange(self._half) if self._generation % 2 == 0 else np.arange(count - self._half, count)

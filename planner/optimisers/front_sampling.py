@@ -54,7 +54,15 @@ MAX_EXPONENT = 2
 
 
 class Kind(IntEnum):
-    """Kind of displacement of a sample from its mean; each kind is equally frequent."""
+    """Kind of displacement of a sample from its mean, the solution of the archive that it is drawn around.
+
+    Each kind is equally frequent.
+
+    NEAR: along the differences to the nearest solutions, with noise.
+    NOISE: only noise.
+    BLOCK: a block of neighbouring points moves towards its place in another solution.
+    NOISY_BLOCK: such a block, with noise.
+    """
 
     NEAR = 0
     NOISE = 1
@@ -66,10 +74,10 @@ class FrontSampling:
     """Ask-and-tell search for a front in a box.
 
     lower, upper: (d,) box.
-    directions: (k, d) directions of the noise, each as long as its largest deviation.
-    reference: (m,) reference point; solutions with objectives beyond it are ignored.
+    directions: (k, d) directions of the noise; the length of each is a step of scale 1.
+    reference: (m,) upper limits of the objectives; a solution that reaches one of them is ignored.
     axes: number of variables per point; the variables of neighbouring points are adjacent.
-    size: size of the archive. population: number of samples per generation.
+    size: largest number of solutions in the archive, which holds the front. population: samples per generation.
 
     >>> unit = np.eye(2)
     >>> search = FrontSampling(np.zeros(2), np.ones(2), unit, np.full(2, 2.0), 1, 20, 40, np.random.default_rng(1))
@@ -95,10 +103,10 @@ class FrontSampling:
         """Start with an empty archive.
 
         lower, upper: (d,) box.
-        directions: (k, d) directions of the noise, each as long as its largest deviation.
-        reference: (m,) reference point; solutions with objectives beyond it are ignored.
+        directions: (k, d) directions of the noise; the length of each is a step of scale 1.
+        reference: (m,) upper limits of the objectives; a solution that reaches one of them is ignored.
         axes: number of variables per point.
-        size: size of the archive.
+        size: largest number of solutions in the archive.
         population: number of samples per generation.
         rng: generator of random numbers.
         """
@@ -111,7 +119,10 @@ class FrontSampling:
         self.objectives: Floats = np.empty((0, reference.size))
 
     def ask(self) -> Floats:
-        """Draw samples (population, d): solutions of the archive with random displacements, clipped to the box."""
+        """Draw samples (population, d): random solutions of the archive, displaced at random (`Kind`).
+
+        The samples are clipped to the box.
+        """
         mean_rows = self._rng.integers(len(self.vectors), size=self._population)
         self._kinds = kinds = self._rng.integers(len(Kind), size=self._population)
         samples = self.vectors[mean_rows]
@@ -179,11 +190,13 @@ class FrontSampling:
         return noise
 
     def tell(self, vectors: Floats, objectives: Floats, violations: Floats) -> None:
-        """Insert the best samples into the archive, and adapt the scales of the displacements.
+        """Insert the best samples into the archive, and adapt the scale of the noise of each kind.
 
         vectors: (n, d) samples.
-        objectives: (n, m).
-        violations: (n, c), all 0 for a sample that meets the constraints.
+        objectives: (n, m) their objectives, all minimised.
+        violations: (n, c), all 0 for a sample that meets the constraints. Other samples never enter the archive.
+
+        A scale grows if enough of the samples with this noise enter the archive; otherwise it shrinks.
         """
         feasible_rows = np.flatnonzero((violations <= 0.0).all(axis=1) & (objectives < self.reference).all(axis=1))
         is_in_archive = np.zeros(len(vectors), dtype=bool)

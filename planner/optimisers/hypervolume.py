@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from world.arrays import Floats, Ints
-from world.kernels import compiled, inner
+from world.kernels import compiled
 
 Marks = NDArray[np.uint8]
 
@@ -23,7 +23,8 @@ SEED = 20
 def hypervolume(points: Floats, reference: Floats) -> float:
     """Return the exact volume that points (n, m) dominate below a reference point (m,).
 
-    It is computed by slices of the last objective.
+    The volume is cut into slabs at the points' last objectives. In each slab the other objectives bound a volume of one
+    dimension less, which is computed in the same way.
 
     >>> hypervolume(np.array([[1.0, 3.0], [2.0, 1.0]]), np.array([4.0, 4.0]))  # areas 1 x 3 + 2 x 2
     7.0
@@ -47,9 +48,9 @@ def hypervolume(points: Floats, reference: Floats) -> float:
 
 
 def covering_order(points: Floats, reference: Floats, count: int, rng: np.random.Generator | None = None) -> Ints:
-    """Choose up to `count` points (n, m) that cover most hypervolume.
+    """Choose up to `count` of the points (n, m), so that they cover as much hypervolume as possible.
 
-    Return their row numbers in order of choice.
+    Returns their row numbers in order of choice.
 
     reference: (m,) upper limit; a point that is not below it in every objective is left out.
     rng: random generator of the probes; None for the same probes in every call.
@@ -81,10 +82,10 @@ def covering_order(points: Floats, reference: Floats, count: int, rng: np.random
 
 @compiled
 def _mark_covered_probes(points: Floats, probes: Floats) -> Marks:
-    """Return marks (n, p): 1 if a point is at or below a probe in every objective, otherwise 0.
+    """Return marks (n, p): [i, j] is 1 if point i dominates probe j, otherwise 0.
 
-    points: (n, m).
-    probes: (m, p).
+    points: (n, m) objectives of each point.
+    probes: (m, p) objectives of each probe. A point at or below a probe in every objective dominates it.
     """
     marks = np.ones((points.shape[0], probes.shape[1]), dtype=np.uint8)
     for n in range(points.shape[0]):
@@ -96,14 +97,15 @@ def _mark_covered_probes(points: Floats, probes: Floats) -> Marks:
 
 @compiled
 def _choose_rows_greedily(marks: Marks, first_rows: Ints, count: int) -> Ints:
-    """Choose `count` points that together cover many probes.
+    """Choose `count` points that together cover many probes; return the numbers of their rows.
 
-    Return the numbers of their rows in marks (n, p).
+    marks: (n, p); [i, j] is 1 if point i covers probe j.
+    first_rows: points that are chosen first.
 
-    `first_rows` are chosen first, then repeatedly the row that covers most probes not yet covered. Of equal rows, the
-    first is chosen. The gain of a row can only decrease when other rows are chosen. Its last count
-    is therefore an upper bound, and only few rows have to be counted again (Minoux, Optimization Techniques, Lecture
-    Notes in Control and Information Sciences 7, 1978).
+    Each further point is the one that covers most probes not yet covered, the first of equal ones. This number of
+    probes, the gain of a point, can only decrease when other points are chosen. The number counted last is therefore an
+    upper bound, and only few points have to be counted again (Minoux, Optimization Techniques, Lecture Notes in Control
+    and Information Sciences 7, 1978).
     """
     size, width = marks.shape
     uncovered, count_positions, gains = np.ones(width, dtype=np.uint8), np.full(size, -1), np.full(size, width)
@@ -111,19 +113,13 @@ def _choose_rows_greedily(marks: Marks, first_rows: Ints, count: int) -> Ints:
     for position in range(count):
         row = first_rows[position] if position < first_rows.size else np.argmax(gains)
         while position >= first_rows.size and count_positions[row] < position:
-            gains[row], count_positions[row] = _count_common_marks(marks[row], uncovered), position
+            common_count = 0
+            for p in range(width):
+                common_count += marks[row, p] & uncovered[p]
+            gains[row], count_positions[row] = common_count, position
             row = np.argmax(gains)
         chosen_rows[position] = row
         gains[row] = -1
         for p in range(width):
             uncovered[p] &= 1 - marks[row, p]
     return chosen_rows
-
-
-@inner
-def _count_common_marks(marks: Marks, other_marks: Marks) -> int:
-    """Return the number of probes (p,) that are marked in both arrays."""
-    total = 0
-    for p in range(marks.size):
-        total += marks[p] & other_marks[p]
-    return total

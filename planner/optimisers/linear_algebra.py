@@ -53,7 +53,10 @@ def cholesky(matrix: Floats, ridge: float) -> Floats:
 
 @compiled
 def multiply_by_lower(rows: Floats, factor: Floats) -> Floats:
-    """Multiply rows (n, d) by the transpose of a lower triangular matrix (d, d)."""
+    """Return the product (n, d) of rows (n, d) and the transpose of a triangular matrix.
+
+    factor: (d, d) lower triangular matrix.
+    """
     out = np.zeros(rows.shape)
     for n in range(rows.shape[0]):
         for i in range(factor.shape[0]):
@@ -64,7 +67,7 @@ def multiply_by_lower(rows: Floats, factor: Floats) -> Floats:
 
 @compiled
 def multiply_by_sparse(rows: Floats, basis: Floats) -> Floats:
-    """Multiply rows (n, d) by a basis (d, k) that consists mostly of zeros."""
+    """Return the product (n, k) of rows (n, d) and a matrix `basis` (d, k) that consists mostly of zeros."""
     columns = rows.T.copy()
     out = np.zeros((basis.shape[1], rows.shape[0]))
     for k in range(basis.shape[1]):
@@ -85,8 +88,8 @@ def _add_multiple(values: Floats, factor: float, out: Floats) -> None:
 def band_cholesky(matrix: Floats, out: Floats) -> None:
     """Fill `out` with the lower Cholesky factor of a positive definite band matrix.
 
-    Both are stored as (d, b), with the b diagonals as columns; entry [i, k] belongs to row i and column i - k. A pivot
-    is at least 1e-12 times the diagonal entry.
+    Both are stored as (d, b): column 0 is the main diagonal, column 1 the diagonal below it, and so on. Entry [i, k]
+    belongs to row i and column i - k of the matrix. A pivot is at least 1e-12 times the diagonal entry.
     """
     size, width = matrix.shape
     for i in range(size):

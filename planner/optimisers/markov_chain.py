@@ -61,8 +61,8 @@ def fit_chain(rows: Floats, size: int, ridge: float) -> tuple[Floats, Floats]:
     size: number of variables of a group.
     ridge: value added to each variance, as a fraction of the mean variance of the group.
 
-    Returns, for each of the g groups, its regression matrix and the Cholesky factor of its residuals' covariance,
-    (g, size, size) each.
+    Returns two arrays (g, size, size), with a matrix for each of the g groups. The first has the regressions on the
+    previous group, zeros for group 0. The second has the Cholesky factors of the residuals' covariances.
     """
     group_count = rows.shape[1] // size
     regressions, residual_factors = np.zeros((group_count, size, size)), np.zeros((group_count, size, size))
@@ -93,7 +93,7 @@ def fit_chain(rows: Floats, size: int, ridge: float) -> tuple[Floats, Floats]:
 
 @compiled
 def draw_chain(normals: Floats, regressions: Floats, residual_factors: Floats) -> Floats:
-    """Turn independent standard normal numbers (n, d) into samples (n, d) of the chain.
+    """Turn independent standard normal numbers (n, d) into samples (n, d) of the chain, minus their mean.
 
     regressions, residual_factors: results of `fit_chain`.
     """

@@ -103,6 +103,9 @@ class Gaussian:
 
         rank: function that ranks scores, as for `BoxSearch`.
         noise: (n,) random numbers that break ties.
+
+        Points that all have the same rank show no direction. The Gaussian then only becomes narrower (once it has a
+        best point), and is given up after too many such evaluations.
         """
         self.evaluations += len(points)
         ranks = rank(scores)
@@ -133,7 +136,10 @@ class Gaussian:
         )
 
     def _update_distribution(self, draws: Floats) -> None:
-        """Update mean, deviation and covariance with the normal draws (m, d) of the better half, best first."""
+        """Update mean, deviation and covariance as CMA-ES does.
+
+        draws: (m, d) standard normal numbers from which the better half of the last points was made, best first.
+        """
         self._generations += 1
         steps = multiply_by_lower(draws, self._factor)
         mean_draw, mean_step = (self.weights[:, None] * draws).sum(axis=0), (self.weights[:, None] * steps).sum(axis=0)
@@ -161,7 +167,9 @@ class Gaussian:
 
 
 class Multistart(BoxSearch):
-    """Searches with one Gaussian each, from starts of many widths, by slices of evaluations.
+    """Many searches with one Gaussian each, from starts of many places and widths.
+
+    They share the evaluations, in slices: after each slice the same search continues, or another one gets its turn.
 
     >>> def rank(scores):
     ...     return np.argsort(np.argsort(scores[:, 0]))
@@ -211,7 +219,12 @@ class Multistart(BoxSearch):
             self._draw_generation(self._search)
 
     def tell(self, scores: Floats) -> None:
-        """Process the scores (n, c) of the last samples of `ask`, and draw the next generation."""
+        """Process the scores (n, c) of the last samples of `ask`, and draw the next generation.
+
+        The best sample of all is kept. The search that drew the samples is updated. At the end of its slice of
+        evaluations, the same search continues or another one gets the next slice. The scores of first samples, which
+        no search has drawn, set the centre and the scale of all searches instead.
+        """
         ranks, noise = self._rank(scores), self._rng.random(len(scores))
         order = np.lexsort((noise, ranks))
         # The best sample of all generations, then this generation.
@@ -231,11 +244,19 @@ class Multistart(BoxSearch):
                 self._search.is_done
                 or self._search.evaluations - self._slice_start >= SLICE_EVALUATIONS * self.lower.size
             ):
-                # The next slice of evaluations continues this search, or goes to another one.
-                self._spent_evaluations[self._is_continued] += self._search.evaluations - self._slice_start
-                next_search = self._search if self._may_continue(self._search) else self._choose_search()
-                self._slice_start = next_search.evaluations
-                self._search = next_search
+                # The next slice of evaluations continues this search, or goes to another one, so that new and continued
+                # searches share the evaluations equally: the best waiting search, or a new search.
+                spent_evaluations = self._spent_evaluations
+                spent_evaluations[self._is_continued] += self._search.evaluations - self._slice_start
+                if not self._may_continue(self._search):
+                    waiting = [search for search in self._searches if search.curve and not search.is_done]
+                    self._is_continued = bool(waiting) and spent_evaluations[True] <= spent_evaluations[False]
+                    if self._is_continued:
+                        waiting_ranks = self._rank(np.stack([search.curve[-1][1] for search in waiting]))
+                        self._search = waiting[int(np.argmin(waiting_ranks))]
+                    else:
+                        self._search = self._start_search()
+                self._slice_start = self._search.evaluations
         self._draw_generation(self._search)
 
     def _draw_generation(self, search: Gaussian) -> None:
@@ -249,7 +270,11 @@ class Multistart(BoxSearch):
         """Return True if a search may continue at once with another slice of evaluations.
 
         It must be in the better half of the searches that have reached the same width, by their results at that width.
-        The best search of all has to wait for its turn, so that half of the evaluations go to other searches.
+        The best search of all has to wait for its turn, so that half of the evaluations go to other searches. A search
+        that is done, that is the only one, or that has used more than `MAX_EVALUATION_FRACTION` of all evaluations has
+        to wait, too.
+
+        The width and the best scores of the search are added to its curve, unless it has found nothing yet.
         """
         if search.best is None:
             return False
@@ -272,21 +297,11 @@ class Multistart(BoxSearch):
         ranks = self._rank(np.stack([search.best[1], *equally_narrow_scores]))
         return 2 * int((ranks[1:] < ranks[0]).sum()) <= len(equally_narrow_scores)
 
-    def _choose_search(self) -> Gaussian:
-        """Choose the search for the next slice, so that new and continued searches share the evaluations equally.
-
-        This is the best waiting search, or a new search.
-        """
-        waiting_searches = [search for search in self._searches if search.curve and not search.is_done]
-        self._is_continued = bool(waiting_searches) and self._spent_evaluations[True] <= self._spent_evaluations[False]
-        if self._is_continued:
-            return waiting_searches[
-                int(np.argmin(self._rank(np.stack([search.curve[-1][1] for search in waiting_searches]))))
-            ]
-        return self._start_search()
-
     def _start_search(self) -> Gaussian:
-        """Start a search: the first one at the centre with a typical width, later ones with a random width."""
+        """Start a search: the first one at the centre with a typical width, later ones at random.
+
+        Later searches have a random width and generation size, and start at the centre or at a random place.
+        """
         size = self.lower.size
         min_population = min(self._population, 4 + int(3.0 * math.log(size)))
         if not self._searches:

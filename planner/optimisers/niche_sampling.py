@@ -83,7 +83,7 @@ class NicheSampling:
         costs: (g, n) costs of the samples.
         deviation: (d,) standard deviations of new samples.
         max_cost: maximum cost of a selected sample.
-        elite: (g, d), always selected.
+        elite: (g, d) one sample of each group, such as its best so far. It is always selected and comes first.
         """
         selected, counts = _select(
             rows, costs, elite, CLEARING_RADIUS_RATIO * deviation, max_cost, max(1, int(MAX_SELECTED_FRACTION * count))
@@ -104,9 +104,9 @@ class NicheSampling:
         return out
 
     def _draw_feasible(self, size: tuple[int, int, int], draw: Callable[[Ints], Floats], max_redraws: int) -> Floats:
-        """Draw samples of a shape, and draw infeasible samples again.
+        """Draw `size` samples (groups, samples per group, variables), and draw infeasible samples again.
 
-        draw: function that returns samples (n, d) for group numbers (n,).
+        draw: function that returns one sample for each of the given group numbers (n,), (n, d).
         max_redraws: maximum number of further draws; after them, infeasible samples remain.
         """
         groups = np.repeat(np.arange(size[0]), size[1])
@@ -156,9 +156,9 @@ def _select(
 
 @inner
 def _is_distinct(row: Floats, other_rows: Floats, clearing_radius: Floats) -> bool:
-    """Return True if a sample (d,) is at least the clearing radius away from every other sample.
+    """Return True if a sample differs enough from every other sample.
 
-    Two samples are at least the radius apart if they differ by it or more in at least one variable.
+    It has to differ from each by the clearing radius or more, in at least one variable.
 
     row: (d,) the sample.
     other_rows: (n, d) the other samples.

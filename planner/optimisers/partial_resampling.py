@@ -113,15 +113,42 @@ class PartialResampling(BoxSearch):
     def tell(self, scores: Floats) -> None:
         """Process the scores (n, c) of the last samples of `ask`, and draw the next samples.
 
-        A sample of a population replaces its parent if it is better.
+        A sample of a population replaces its parent if it is better. Once the population no longer improves, a Gaussian
+        around its best sample draws the samples, until it has converged and a larger population begins.
         """
         if self._gaussian is not None:
-            self._update_gaussian(self._gaussian, scores)
+            points = (self._pending_samples - self.lower) / (self.upper - self.lower)
+            self._gaussian.update(points, scores, self._rank, self._rng.random(len(scores)))
+            self._store(*self._sort(self._pending_samples, scores))
+            if not self._gaussian.is_done:
+                self._draw_from_gaussian(self._gaussian)
+                return
+            # The Gaussian has converged: start again.
+            self._gaussian = None
+            self._start()
+            self._count = min(self._max_count, POPULATION_GROWTH * self._count)
+            self._pending_samples = self._rng.uniform(self.lower, self.upper, (self._count, self.lower.size))
             return
         if not len(self._points):
             self._points, self._point_scores = self._pending_samples.copy(), scores.copy()
         else:
-            self._replace_parents(scores)
+            # Replace each parent whose sample ranks higher; move the redrawn fraction and the width towards the values
+            # with which the better samples were drawn. Generations in which no sample ranks higher than the best parent
+            # are counted.
+            count = len(self._points)
+            ranks = self._rank(np.concatenate([self._point_scores, scores]))
+            gains = ranks[:count] - ranks[count:]
+            is_better = gains > 0
+            # The population is sorted, so that the best parent is the first.
+            self._stalled_generations = 0 if ranks[count:].min() < ranks[0] else self._stalled_generations + 1
+            if is_better.any():
+                weights = gains[is_better] / gains[is_better].sum()
+                fractions = self._fractions[is_better]
+                weighted_fraction = float((weights * fractions**2).sum() / (weights * fractions).sum())
+                self._redrawn_fraction += LEARNING_RATE * (weighted_fraction - self._redrawn_fraction)
+                log_ratio = float((weights * np.log(self._widths[is_better] / self._width)).sum())
+                self._width *= math.exp(LEARNING_RATE * log_ratio)
+            self._points[is_better], self._point_scores[is_better] = self._pending_samples[is_better], scores[is_better]
         self._points, self._point_scores = self._sort(self._points, self._point_scores)
         self._store(self._points, self._point_scores)
         if self._stalled_generations > MAX_STALLED_GENERATIONS:
@@ -137,46 +164,10 @@ class PartialResampling(BoxSearch):
         order = np.lexsort((self._rng.random(len(points)), self._rank(scores)))
         return points[order], scores[order]
 
-    def _update_gaussian(self, gaussian: Gaussian, scores: Floats) -> None:
-        """Update the refining Gaussian with scores (n, c), or start again if it has converged."""
-        points = (self._pending_samples - self.lower) / (self.upper - self.lower)
-        gaussian.update(points, scores, self._rank, self._rng.random(len(scores)))
-        self._store(*self._sort(self._pending_samples, scores))
-        if not gaussian.is_done:
-            self._draw_from_gaussian(gaussian)
-            return
-        self._gaussian = None
-        self._start()
-        self._count = min(self._max_count, POPULATION_GROWTH * self._count)
-        self._pending_samples = self._rng.uniform(self.lower, self.upper, (self._count, self.lower.size))
-
     def _draw_from_gaussian(self, gaussian: Gaussian) -> None:
         """Draw the next generation of the refining Gaussian."""
         samples = self.lower + gaussian.draw(self._rng) * (self.upper - self.lower)
         self._pending_samples = np.clip(samples, self.lower, self.upper)
-
-    def _replace_parents(self, scores: Floats) -> None:
-        """Replace each parent whose sample ranks higher; adapt the redrawn fraction and the width.
-
-        Both move towards the values with which the better samples were drawn. The generations in which no sample ranks
-        higher than the best parent are counted in `_stalled_generations`.
-
-        scores: (n, c) scores of the samples, one sample per parent.
-        """
-        count = len(self._points)
-        ranks = self._rank(np.concatenate([self._point_scores, scores]))
-        gains = ranks[:count] - ranks[count:]
-        is_better = gains > 0
-        # The population is sorted, so that the best parent is the first.
-        self._stalled_generations = 0 if ranks[count:].min() < ranks[0] else self._stalled_generations + 1
-        if is_better.any():
-            weights = gains[is_better] / gains[is_better].sum()
-            fractions = self._fractions[is_better]
-            weighted_fraction = float((weights * fractions**2).sum() / (weights * fractions).sum())
-            self._redrawn_fraction += LEARNING_RATE * (weighted_fraction - self._redrawn_fraction)
-            log_ratio = float((weights * np.log(self._widths[is_better] / self._width)).sum())
-            self._width *= math.exp(LEARNING_RATE * log_ratio)
-        self._points[is_better], self._point_scores[is_better] = self._pending_samples[is_better], scores[is_better]
 
     def _store(self, points: Floats, scores: Floats) -> None:
         """Store the best sample of all starts, and behind it a generation (n, d) with scores (n, c), best first."""
@@ -186,7 +177,11 @@ class PartialResampling(BoxSearch):
         self.scores = np.concatenate([self._best[1][None], scores])
 
     def _draw(self) -> None:
-        """Draw a sample for each member of the population, which is sorted."""
+        """Draw a new sample for each member of the population, which is sorted.
+
+        The sample keeps a part of the variables of its member. The others are redrawn around one of the best members,
+        which is moved by the difference of two random members, times a width.
+        """
         count = len(self._points)
         points = (self._points - self.lower) / (self.upper - self.lower)
         self._fractions = np.clip(

@@ -26,7 +26,10 @@ TREE_THRESHOLD = 4000
 
 @dataclass(frozen=True, slots=True)
 class Level:
-    """Priority level: columns of the scores, all minimised, with their goals (`NO_GOAL` for none)."""
+    """Priority level: the columns of the scores that it compares, and a goal for each.
+
+    All scores are minimised. Scores at or below the goal are equally good; the goal `NO_GOAL` is never reached.
+    """
 
     columns: tuple[int, ...]
     goals: tuple[float, ...]
@@ -60,12 +63,14 @@ def ranks(scores: Floats, levels: Sequence[Level]) -> Ints:
 
 @compiled
 def _rank_candidates(table: Floats, widths: Ints) -> Ints:
-    """Rank candidates by the number of candidates that are preferred to each, level by level, (n,).
+    """Return for each candidate the number of candidates that are preferred to it, (n,).
 
-    table: (c, n) scores, one column per candidate.
+    table: (c, n) scores, one column per candidate. The rows of the level with the highest priority come first.
     widths: number of rows of the table in each priority level, highest priority first.
 
-    A lower level only decides between candidates that are equal on all higher levels.
+    A lower level only decides between candidates that are equal on all higher levels. The candidates are therefore
+    sorted by the first level, split into groups of equal ones, and each group is sorted by the next level. Within a
+    group, those that dominate a candidate are counted.
     """
     count = table.shape[1]
     candidate_ranks = np.zeros(count, dtype=np.int64)
@@ -114,6 +119,10 @@ def _rank_candidates(table: Floats, widths: Ints) -> Ints:
 def _merge_sort(table: Floats, first_row: int, width: int, order: Ints, scratch: Ints, begin: int, end: int) -> None:
     """Sort order[begin:end] lexicographically by `width` rows of the table, from row `first_row` on.
 
+    table: (c, n) scores, one column per candidate.
+    order: numbers of candidates, sorted in place.
+    scratch: working memory as long as `order`.
+
     The merge sort is stable.
     """
     for k in range(begin + 1, end):
@@ -147,7 +156,7 @@ def _merge_sort(table: Floats, first_row: int, width: int, order: Ints, scratch:
 
 @inner
 def _precedes(table: Floats, first_row: int, width: int, candidate: int, other: int) -> bool:
-    """Return True if a candidate precedes the other candidate in lexicographic order.
+    """Return True if a candidate is lower than the other one in the first row in which they differ.
 
     table: (c, n) scores, one column per candidate. Its rows from first_row to first_row + width - 1 are compared.
     """
@@ -161,7 +170,7 @@ def _precedes(table: Floats, first_row: int, width: int, candidate: int, other: 
 def _add_dominator_counts(
     rows: Floats, width: int, begin: int, end: int, order: Ints, scratch: Ints, candidate_ranks: Ints
 ) -> None:
-    """Add the number of dominators of each candidate of a tied group to `candidate_ranks`.
+    """Count the candidates that dominate each candidate of a tied group; add to `candidate_ranks`.
 
     rows: (c, n) scores, one column per candidate; only the first `width` rows are compared.
     width: number of scores of the priority level.
@@ -170,6 +179,9 @@ def _add_dominator_counts(
     order: number of the candidate in each column, (n,).
     scratch: working memory, (n,); its values do not matter, and are overwritten.
     candidate_ranks: rank of each candidate by its number, (n,).
+
+    An earlier candidate dominates if it is nowhere higher. Equal candidates do not dominate each other, and get the
+    same count.
     """
     dominators = 0
     for k in range(begin + 1, end):
@@ -202,7 +214,7 @@ def _count_at_most(values: Floats, limit: float) -> int:
 
 @inner
 def _clear_marks_above(values: Floats, limit: float, marks: Ints) -> None:
-    """Set the marks of values above the limit to 0."""
+    """Set the marks of values above the limit to 0; leave the other marks."""
     for k in range(values.size):
         marks[k] &= 1 if values[k] <= limit else 0
 
@@ -220,9 +232,9 @@ def _count_marks(marks: Ints) -> int:
 def _dense_ranks(rows: Floats, begin: int, end: int) -> tuple[Ints, int]:
     """Rank the candidates begin to end - 1 by the second row of scores.
 
-    Return their ranks and the number of ranks.
+    Ranks start at 1 and have no gaps; equal values have the same rank: the values 7, 3, 7 have the ranks 2, 1, 2.
 
-    Ranks start at 1 and have no gaps; equal values have the same rank.
+    Returns the ranks (end - begin,) and the highest rank.
     """
     count = end - begin
     order, dense_ranks = np.empty(count, dtype=np.int64), np.empty(count, dtype=np.int64)
@@ -239,14 +251,15 @@ def _dense_ranks(rows: Floats, begin: int, end: int) -> tuple[Ints, int]:
 
 @inner
 def _add_dominator_counts_by_tree(rows: Floats, begin: int, end: int, order: Ints, candidate_ranks: Ints) -> None:
-    """Add the number of dominators of each candidate of a group to `candidate_ranks`, in O(n log n).
+    """Count dominators as `_add_dominator_counts` does, for two scores only, but in O(n log n).
 
     rows: (2, n) scores, one column per candidate.
     begin, end: the group is the columns from begin to end - 1, which are sorted by the first score, then by the second.
     order: (n,) number of the candidate in each column.
     candidate_ranks: (n,) rank of each candidate by its number; updated.
 
-    A Fenwick tree over the second row counts the dominators; it is faster than a scan if there are many candidates.
+    Candidates are visited in the order of the first score. A Fenwick tree counts the candidates visited so far by the
+    rank of their second score; those of the same or a lower rank dominate the next candidate.
     """
     dense_ranks, rank_count = _dense_ranks(rows, begin, end)
     tree = np.zeros(rank_count + 1, dtype=np.int64)

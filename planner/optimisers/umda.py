@@ -73,7 +73,11 @@ class Umda(BoxSearch):
         self._pending_samples = self._sample(len(samples) - self._half)
 
     def _sample(self, count: int) -> Floats:
-        """Draw samples of independent Gaussians (maximum likelihood, 1/N), redrawn and clipped to the box."""
+        """Draw samples of independent Gaussians that are fitted to the selected samples.
+
+        A Gaussian has the mean and the standard deviation (1/N, not less than the floor) of the selected samples along
+        its direction. What lies outside the box is redrawn, and finally clipped.
+        """
         selected = self.samples if self._basis is None else _project(self.samples, self._basis)
         mean, deviation = selected.mean(axis=0), selected.std(axis=0)
         if self._floor is not None:
@@ -86,7 +90,7 @@ class Umda(BoxSearch):
         )
 
     def _redraw(self, draw: Callable[[int], Floats], count: int) -> Floats:
-        """Draw `count` samples, redraw those outside the box, and finally clip them.
+        """Draw `count` samples, and redraw those outside the box; clip those that stay outside.
 
         draw: function that draws the given number of samples.
         """
@@ -101,7 +105,9 @@ class Umda(BoxSearch):
         return np.clip(samples, self.lower, self.upper)
 
     def _redraw_each(self, samples: Floats, mean: Floats, deviation: Floats) -> Floats:
-        """Redraw the values of samples (n, d) outside the box from independent Gaussians, and finally clip them.
+        """Redraw the single values of samples (n, d) outside the box, and clip those that stay outside.
+
+        samples: (n, d), changed in place.
 
         mean, deviation: (d,) parameters of the Gaussians.
         """
@@ -117,5 +123,8 @@ class Umda(BoxSearch):
 
 
 def _project(rows: Floats, basis: Floats) -> Floats:
-    """Project rows (n, d) onto the columns of a basis (d, k), after making both arrays contiguous."""
+    """Return the coordinates (n, k) of rows (n, d) along the columns of a basis (d, k).
+
+    Both arrays are made contiguous for the compiled product.
+    """
     return multiply_by_sparse(np.ascontiguousarray(rows), np.ascontiguousarray(basis))

@@ -24,8 +24,9 @@ class Algorithm:
     name, summary: texts in commands and their help.
     encoding: a name of `planner.evaluation.encoding.ENCODINGS`.
     graded: scores violations by amount along the whole path, and ranks kill exposure before length.
-    smooth: draws first samples, and the marginals of UMDA, along the eigenvectors of the Brownian-bridge kernel.
-    seeded: starts from grid routes, improved by a pattern search.
+    smooth: draws first samples, and the marginals of UMDA, along the eigenvectors of the Brownian-bridge kernel, so
+    that neighbouring waypoints move together.
+    seeded: starts from routes over grids of the map, improved by a pattern search.
     final_shortening: finally shortens the best path; among zones, or if that fails, moves all its waypoints at once.
     optimiser: name of an optimiser in `planner.optimisers`; "waypoints" is
     `planner.search.generations.run_waypoint_generations`.

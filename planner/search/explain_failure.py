@@ -41,7 +41,8 @@ _GROUND_CELL = -2
 class SeparatingZones(NamedTuple):
     """Zones that separate start and destination.
 
-    zones: names of the zones adjacent to both the region of the start and the region of the destination.
+    zones: names of the zones. They are adjacent to the cells that can be reached from the start and to those that can
+    be reached from the destination, or to either of them if no zone is adjacent to both.
     cell_side: side of the cells of the examined grid, m.
     """
 
@@ -50,11 +51,13 @@ class SeparatingZones(NamedTuple):
 
 
 def find_separating_zones(scenario: Scenario) -> SeparatingZones | None:
-    """Find the zones that separate start and destination on a grid of cells.
+    """Find the zones that separate start and destination.
 
-    Return None if nothing separates them, or if the ground alone does.
+    Space is divided into a grid of cells, at several altitudes. Zones close cells, and start and destination are
+    separated if no chain of open cells connects them. A gap narrower than a cell is treated as closed. Missiles and the
+    aircraft's climb are ignored.
 
-    A gap narrower than a cell is treated as closed. Missiles and the aircraft's climb are ignored.
+    Returns None if nothing separates them, if the ground alone does, or without terrain or zones.
 
     >>> from world.scenario import load_scenario
     >>> find_separating_zones(load_scenario("tight")) is None
@@ -303,7 +306,10 @@ def explain_failure(plan: Plan, limits: Limits | None = None) -> list[str]:
 
 
 def _describe_walls(scenario: Scenario) -> list[str]:
-    """Return a line if the ground, or ground and missiles together, block the whole width of the map."""
+    """Return a line if the ground, or ground and missiles together, block the whole map's width; else [].
+
+    Lines across the map are tested, perpendicular to the direct line from start to destination.
+    """
     terrain = scenario.terrain
     if terrain is None:
         return []
@@ -340,7 +346,10 @@ def _map_crossings(scenario: Scenario) -> Iterator[tuple[float, np.ndarray]]:
 
 
 def _describe_margin_walls(problem: Problem) -> list[str]:
-    """Return a line if ground, clearance and margins leave no altitude free across the whole map."""
+    """Return a line if ground, clearance and margins leave no altitude across the whole map; else [].
+
+    The lines across the map are those of `_describe_walls`, except near the ends, where the margins are reduced.
+    """
     scenario, data = problem.scenario, problem.certified
     if scenario.terrain is None:
         return []
@@ -361,7 +370,10 @@ def _describe_margin_walls(problem: Problem) -> list[str]:
 
 
 def _has_gap(scenario: Scenario, points: np.ndarray, min_altitudes: np.ndarray) -> bool:
-    """Return True if there is an altitude outside all kill spheres above at least one of the points (n, 2).
+    """Return True if an altitude above at least one of the points (n, 2) is outside all kill spheres.
+
+    Nine altitudes are tested at each point, from the lowest allowed one to the ceiling. Without a ceiling there is
+    always a gap.
 
     min_altitudes: lowest allowed altitude at each point, m, (n,).
     """
@@ -380,7 +392,7 @@ def _has_gap(scenario: Scenario, points: np.ndarray, min_altitudes: np.ndarray) 
 
 
 def _describe_proven_closure(problem: Problem) -> list[str]:
-    """Return a line if it is proven that missiles or the altitude limit block every path; otherwise []."""
+    """Return a line if it is proven that missiles, ground or an altitude limit block every path; else []."""
     data, ceiling = problem.certified, "the ceiling"
     missiles, max_level_altitude = blocking_missiles(data), highest_level_flight(data)
     if missiles is None:
@@ -398,15 +410,16 @@ def _describe_proven_closure(problem: Problem) -> list[str]:
     names = [problem.scenario.threats.names[k] for k in missiles[:MAX_NAMED_MISSILES]]
     others = f" and {len(missiles) - MAX_NAMED_MISSILES} more" if len(missiles) > MAX_NAMED_MISSILES else ""
     return [
-        f"no path exists: {', '.join(names)}{others} block every path between ground, {ceiling} and the edges of the"
-        " map; without any one of these missiles a path may exist"
+        f"no path exists: {', '.join(names)}{others} block every path between the ground, {ceiling} and the edges of"
+        " the map; without any one of these missiles a path may exist"
     ]
 
 
 def nearest_missile_text(plan: Plan) -> str:
     """Return a line that names the missile that a plan's legs approach most closely, and the leg.
 
-    The certificate's distance is smaller than the leg's, because the flight may deviate from its legs.
+    The line states two distances: of the leg, outside the kill radius, and of the flight, which may be inside it
+    because it deviates from its legs.
     """
     threats, waypoints = plan.scenario.threats, plan.waypoints
     starts, legs = waypoints[:-1, None], np.diff(waypoints, axis=0)[:, None]
@@ -425,7 +438,8 @@ def nearest_missile_text(plan: Plan) -> str:
 def violated_zones(scenario: Scenario, path: np.ndarray) -> list[str]:
     """Return the names of the zones that a path (w, 3) violates.
 
-    They are the exclusions that the path enters, and the inclusions that it leaves.
+    They are the exclusions that the path enters, and the inclusions that it leaves, at points at most
+    `ZONE_SAMPLE_SPACING_M` apart.
 
     >>> from world.scenario import load_scenario
     >>> violated_zones(load_scenario("tight"), np.zeros((2, 3)))

@@ -46,10 +46,27 @@ SAFE_SEARCH_FRACTION = 0.1
 def run_path_generations(search: Search, population: int, generations: int, starts: Floats) -> Floats:
     """Run an optimiser on whole paths; return the best vector (d,) of the last generation.
 
+    population: number of samples of the first generation.
+    generations: maximum number of further generations, each of half as many samples.
     starts: vectors (s, d) around which the first population is sampled.
+
+    A seeded search ends earlier if it no longer improves, or after a fraction of these evaluations.
     """
     encoding, algorithm = search.encoding, search.algorithm
-    levels, previous_evaluations = _preference_levels(search), search.evaluations
+    previous_evaluations = search.evaluations
+    # Paths are ranked with the goals of the scenario, if it states any.
+    goals = search.problem.scenario.planner.goals
+    length_goal = NO_GOAL if goals.length_ratio is None else goals.length_ratio
+    kill_goal = NO_GOAL if goals.kill_exposure is None else goals.kill_exposure
+    levels: tuple[Level, ...] = (
+        (CONSTRAINTS, Level((KILL,), (kill_goal,)), Level((LENGTH,), (length_goal,)))
+        if algorithm.graded
+        else (
+            CONSTRAINTS,
+            Level((LENGTH, KILL), (length_goal, kill_goal)),
+            Level((DETECTION, HEIGHT), (NO_GOAL, NO_GOAL)),
+        )
+    )
     initial = (
         first_samples(search.problem.space, encoding, population, starts, search.rng) if algorithm.smooth else None
     )
@@ -62,8 +79,13 @@ def run_path_generations(search: Search, population: int, generations: int, star
         if search.must_end() or search.first_safe_found():
             break
         max_fraction = SAFE_SEARCH_FRACTION if search.best_is_safe() else UNSAFE_SEARCH_FRACTION
+        is_stagnant = False
+        if len(best_scores) > STALLED_GENERATIONS:
+            earlier, latest = best_scores[-1 - STALLED_GENERATIONS], best_scores[-1]
+            has_same_violations = np.array_equal(earlier[:LENGTH], latest[:LENGTH]) and earlier[KILL] == latest[KILL]
+            is_stagnant = has_same_violations and earlier[LENGTH] - latest[LENGTH] < MIN_GAIN_FRACTION
         if algorithm.seeded and (
-            _is_stagnant(best_scores) or search.evaluations >= previous_evaluations + max_fraction * full_evaluations
+            is_stagnant or search.evaluations >= previous_evaluations + max_fraction * full_evaluations
         ):
             break
         optimiser.tell(search.evaluate(optimiser.ask()))
@@ -74,18 +96,8 @@ def run_path_generations(search: Search, population: int, generations: int, star
     return np.asarray(optimiser.samples[best_first(optimiser.scores)[0]])
 
 
-def _preference_levels(search: Search) -> tuple[Level, ...]:
-    """Return the preference levels that rank paths, with the goals of the scenario, if it states any."""
-    goals = search.problem.scenario.planner.goals
-    length_goal = NO_GOAL if goals.length_ratio is None else goals.length_ratio
-    kill_goal = NO_GOAL if goals.kill_exposure is None else goals.kill_exposure
-    if search.algorithm.graded:
-        return CONSTRAINTS, Level((KILL,), (kill_goal,)), Level((LENGTH,), (length_goal,))
-    return CONSTRAINTS, Level((LENGTH, KILL), (length_goal, kill_goal)), Level((DETECTION, HEIGHT), (NO_GOAL, NO_GOAL))
-
-
 def _best_row(scores: Floats) -> Floats:
-    """Return the row (8,) of scores (n, 8) that the archive would place first."""
+    """Return the scores (8,) of the best path among scores (n, 8)."""
     return np.asarray(scores[best_first(scores)[0]])
 
 
@@ -107,15 +119,6 @@ def _make_optimiser(
         return MarkovChain(lower, upper, rank, population, search.rng, initial=initial)
     basis = bridge_basis(search.encoding.waypoints - 2) if search.algorithm.smooth else None
     return Umda(lower, upper, rank, population, search.rng, initial=initial, basis=basis)
-
-
-def _is_stagnant(best_scores: list[Floats]) -> bool:
-    """Return True if the last `STALLED_GENERATIONS` generations brought almost no improvement."""
-    if len(best_scores) <= STALLED_GENERATIONS:
-        return False
-    earlier, latest = best_scores[-1 - STALLED_GENERATIONS], best_scores[-1]
-    has_same_violations = np.array_equal(earlier[:LENGTH], latest[:LENGTH]) and earlier[KILL] == latest[KILL]
-    return bool(has_same_violations and earlier[LENGTH] - latest[LENGTH] < MIN_GAIN_FRACTION)
 
 
 # --- Single waypoints ---
@@ -170,6 +173,9 @@ REPAIR_EVALUATIONS = 100
 def run_waypoint_generations(search: Search, population: int, generations: int) -> None:
     """Run the factorised distribution algorithm, and insert the paths that it finds into the archive.
 
+    Each interval of the axis has a set of candidates for its waypoint. In each generation the best path through every
+    candidate is found by dynamic programming, and new candidates are drawn around those with the best paths.
+
     population: number of candidates per interval in the first generation.
     generations: number of generations, at most `MAX_GENERATIONS`, or `SEEDED_GENERATIONS` with seeds.
     """
@@ -212,7 +218,9 @@ def run_waypoint_generations(search: Search, population: int, generations: int) 
 
 
 def _first_candidate_count(search: Search, population: int) -> int:
-    """Return the number of candidates per interval in the first generation, limited by memory.
+    """Return the number of candidates per interval in the first generation.
+
+    A seeded search has fewer candidates. The memory for the legs between them limits the number.
 
     population: requested number of candidates.
     """
@@ -247,7 +255,10 @@ def may_try_again(search: Search) -> bool:
 
 
 def _count_attempt_legs(search: Search) -> int:
-    """Return the number of legs between all candidates in all generations of the first attempt."""
+    """Return how many legs there are between the candidates of neighbouring intervals, in all generations.
+
+    The number is that of the first attempt.
+    """
     settings = search.problem.scenario.planner
     first_count = _first_candidate_count(search, settings.population)
     candidate_pairs = (
@@ -263,12 +274,13 @@ def _as_vectors(rows: Floats) -> Floats:
 
 
 def _join_candidates(search: Search, paths: Floats, slack: float) -> WaypointChains:
-    """Join the waypoints of different paths (k, w, 3) to the best path through each waypoint.
+    """Find the best path through each waypoint of some paths (k, w, 3), whose waypoints may be mixed.
 
-    slack: fraction by which the first bound exceeds the cost of the best safe path.
+    Only paths below an upper bound on the cost are searched, because without a bound almost every leg would have to be
+    evaluated. If there is none, a larger bound is tried. If few legs may still be evaluated, the last search, without a
+    bound, only joins the first candidates.
 
-    Larger bounds follow until a path is found: without a bound almost every leg would be evaluated. If few legs may
-    still be evaluated, only the first candidates are joined.
+    slack: fraction by which the first bound exceeds the cost of the best safe path, if there is one.
     """
     data, space = search.problem.search, search.problem.space
     straight_length = math.dist(space.start, space.destination)
@@ -292,7 +304,14 @@ def _join_candidates(search: Search, paths: Floats, slack: float) -> WaypointCha
 
 
 def _evaluate_best(search: Search, rows: Floats, chains: WaypointChains) -> None:
-    """Evaluate whole paths through some of the best candidates; repair one path if none is feasible."""
+    """Evaluate whole paths through some of the best candidates of some intervals.
+
+    Without any path through candidates, the path of the first candidates is evaluated. If no path in the archive is
+    feasible, a pattern search tries to repair the best one.
+
+    rows: (intervals, candidates, 3) candidates in the rotated frame.
+    chains: best path through each candidate.
+    """
     candidate_chains = set()
     for i in range(1, len(chains.cost) - 1, INTERVAL_STEP):
         for k in np.argsort(chains.cost[i], kind="stable")[:BEST_PER_INTERVAL]:

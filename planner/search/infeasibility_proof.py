@@ -99,8 +99,9 @@ def highest_level_flight(data: ProblemArrays) -> float:
 def blocking_missiles(data: ProblemArrays) -> list[int] | None:
     """Return the indices of a minimal set of missiles that, with ground and ceiling, block every path.
 
-    The list is empty if ground and ceiling alone block every path. Returns None if it is not proven that every path is
-    blocked.
+    The set is minimal in that each of its missiles is needed: groups of missiles are left out as long as the others
+    still block every path. The list is empty if ground and ceiling alone do. Returns None if it is not proven that
+    every path is blocked.
     """
     if not is_closed(data):
         return None
@@ -123,7 +124,11 @@ def blocking_missiles(data: ProblemArrays) -> list[int] | None:
 def _is_proven_closed(data: ProblemArrays, missiles: Flags, column_size: float, margin: float) -> bool:
     """Return the result of `is_closed` for the missiles that are True in `missiles`.
 
+    For each column a list of closed altitude ranges is built: first the ground, then each sphere. Then a search over
+    the open ranges of neighbouring columns looks for the destination.
+
     column_size: side of the square columns, m.
+    margin: required distance from the missiles' spheres, m.
     """
     columns = max(1, math.ceil((data.east - data.west) / column_size))
     rows = max(1, math.ceil((data.north - data.south) / column_size))
@@ -156,9 +161,12 @@ def _is_proven_closed(data: ProblemArrays, missiles: Flags, column_size: float, 
 
 @inner
 def _lowest_ground(data: ProblemArrays, i: int, j: int, column_size: float) -> float:
-    """Return the lowest ground below a column or next to it, m; -inf if a pixel has no data.
+    """Return the lowest ground among the pixels below a column and next to it, m.
+
+    The result is -inf if a pixel has no data or the column is not completely above the raster.
 
     i, j: indices of the column towards east and north.
+    column_size: side of a column, m.
     """
     first_column = math.inf
     first_row = math.inf
@@ -196,6 +204,7 @@ def _close_sphere(
     """Close the altitudes of columns that are completely inside a sphere.
 
     east, north, altitude, radius: sphere, m, with its centre relative to the map's south-western corner.
+    column_size: side of a column, m.
     range_bottoms, range_tops, range_counts: closed altitude ranges of all columns, which are changed.
     """
     columns, rows = range_counts.shape

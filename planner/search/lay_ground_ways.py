@@ -122,8 +122,8 @@ class FinalModel(NamedTuple):
     """Airspeed and slope that the autopilot flies on a final.
 
     airspeed: true airspeed on the glide, m/s, as a function of tailwind (m/s) and altitude (m AMSL).
-    slope: flown slope of the glide, m per m, as a function of height over and distance before the landing point (m),
-    tailwind (m/s) and altitude of the point (m AMSL).
+    slope: flown slope of the glide, m per m, as a function of four numbers: height over the landing point and distance
+    before it (m), tailwind (m/s), and altitude of the landing point (m AMSL).
     """
 
     airspeed: Callable[[float, float], float]
@@ -175,8 +175,10 @@ def add_departure_and_approach(
 
 @dataclass(frozen=True, slots=True)
 class _Site:
-    """Plan, and the problems with which its departure and approach are certified.
+    """Plan and surroundings of a departure and an approach, and the problems that certify both.
 
+    limits: limits within which the plan's algorithm plans.
+    problem: problem of the parts at the required clearance.
     low_problem: problem of the parts below the required clearance, without margins to zones; of its certificate only
     the distances from missiles and zones are used.
     turn_radius: radius of the tightest turn, m.  turn_lengths: lengths that turns take of their legs.
@@ -197,7 +199,14 @@ class _Site:
         return self.plan.scenario
 
     def slopes(self, course: float, amsl: float) -> tuple[float, float]:
-        """Return the climb and the dive slope (m per m) to plan with on a course (rad) at an altitude (m AMSL)."""
+        """Return the climb and the dive slope of departures and approaches, m per m, both positive.
+
+        course: rad.
+        amsl: altitude, m.
+
+        They are `SLOPE_FRACTION` of the aircraft's steepest slopes, and stay below the limits of the certificate and of
+        the scenario.
+        """
         certified_slopes = aircraft_slopes(self.problem.certified.aircraft, course, amsl)
         # Slopes stay 1.1 times the angle margin below a limit: the margin of the certificate, and 10 % for rounding.
         stated_limits = (self.limits.max_climb, self.limits.max_dive)
@@ -380,7 +389,7 @@ def _find_departure(site: _Site, launch: Launch) -> tuple[ClimbOut | None, str]:
             if best_rejected.count >= _MAX_CERTIFIED:
                 break
     courses = (
-        "on its course"
+        "on the launch course"
         if launch.course is not None
         else f"on {len({candidate.course for candidate in launches})} courses"
     )
@@ -401,12 +410,13 @@ def _make_departure(
 ) -> ClimbOut | Certificate | None:
     """Make the departure over some points of the map; return it, or its certificate if it is rejected.
 
+    It is tried with several climb slopes, the steepest first, until it passes the certificate. If all are rejected, the
+    certificate of the last one is returned; None if the path is too short even for the steepest climb.
+
     site: plan, limits and terrain around home.
     course: launch course, rad.
     points: east and north of the departure from home to the first waypoint, m.
     takeoff_altitude: altitude at the end of the take-off, m AMSL.
-
-    Return None if the aircraft cannot climb to the first waypoint on this path.
     """
     next_waypoints, first_waypoint = site.plan.waypoints[1:3], site.plan.waypoints[0]
     goal_altitude, top_altitude = float(first_waypoint[2]), max(takeoff_altitude, float(first_waypoint[2]))
@@ -442,7 +452,7 @@ class _Launch(NamedTuple):
     drifted_ends: tuple[MapPoint, ...]
 
     def fits(self, points: Sequence[MapPoint], turn_lengths: TurnLengths) -> bool:
-        """Return True if the first leg is long enough for a drifted take-off and the turn at the leg's end.
+        """Return True if the first legs are long enough for their turns, also after a drifted take-off.
 
         points: home, end of the first leg, and the points after it.
         """
@@ -450,7 +460,9 @@ class _Launch(NamedTuple):
 
 
 def _find_launches(site: _Site, launch: Launch, takeoff_height: float, altitude: float) -> tuple[list[_Launch], str]:
-    """Return the launches clear of ground, missiles and zones, and the reason if there are none.
+    """Return the launches clear of ground, missiles and zones, and the reason to state if there are none.
+
+    Each launch course is tried with first legs of several lengths.
 
     takeoff_height: height above home up to which the launch climbs straight ahead, m.
     altitude: altitude for which the climb performance is computed, m AMSL.
@@ -624,7 +636,7 @@ def _find_approach(site: _Site, strip: LandingStrip, final_model: FinalModel) ->
 
 
 def _describe_strip_fault(terrain: Terrain, strip: LandingStrip, course: float) -> str:
-    """Describe why a strip's ground is unsuitable for landing; "" if it is suitable."""
+    """Describe why a strip's ground is unsuitable for landing on a course (rad); "" if it is suitable."""
     for direction, slope in zip(("along", "across"), strip_slopes(terrain, strip, course), strict=True):
         if math.isnan(slope):
             return "the terrain at the ends of the strip is unknown"
@@ -684,9 +696,11 @@ def _find_finals(
 
 
 def _check_final(site: _Site, final: _Final) -> tuple[float, str]:
-    """Return the margin of a final, m, and a text on its obstacle.
+    """Check a final for ground, missiles and zones; return its margin, m, and a text on its obstacle.
 
-    The margin is negative, and the text not empty, if the final is blocked.
+    The margin is 0 and the text "" if the final is clear. Otherwise the margin is not positive, and the text completes
+    the sentence "a final approach ...". The glide is checked at its ground clearance and for missiles and zones from
+    the line-up's altitude down to the field; the level part before it needs a certificate.
     """
     glide_start, point = final.final_waypoints[1], final.point
     distances, terrain_heights = _ground_profile(
@@ -719,7 +733,7 @@ def _check_final(site: _Site, final: _Final) -> tuple[float, str]:
 def _find_path_to_line_up(site: _Site, final: _Final) -> tuple[Floats | None, str]:
     """Find the shortest accepted path from the plan's end to the line-up of a final.
 
-    Return its corners (n, 3), m, and "", or None and the reason why no path is accepted.
+    Returns its corners between these two points, (n, 3) m, and ""; or None and the reason why no path is accepted.
     """
     waypoints, final_altitude = site.plan.waypoints, float(final.final_waypoints[0, 2])
     last_waypoint, end_altitude = waypoints[-1], float(waypoints[-1, 2])
@@ -792,9 +806,9 @@ def _approach_altitudes(
 
 
 def _scale_slope(site: _Site, factor: float, is_descent: bool, altitude: float, course: float) -> float:
-    """Return a part of the climb slope, or of the dive slope, on a course, m per m.
+    """Return the climb slope or the dive slope on a course times a factor, m per m.
 
-    factor: fraction of the slope.
+    factor: 0 to 1.
     is_descent: True for the dive slope.
     altitude: m AMSL.
     course: rad.

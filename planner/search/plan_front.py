@@ -30,10 +30,13 @@ from planner.plan import Objective, Objectives, Plan, Violations
 from planner.search.algorithms import find_algorithm, limits_for
 from planner.search.plan_path import plan_path, with_waypoints
 from planner.search.search_state import SearchProgress, StopCondition
+from planner.seeding.airspace_grids import airspace_routes
 from planner.seeding.first_samples import bridge_modes
 from planner.seeding.shortening import resample, shorten_path
 from planner.seeding.side_routes import optimistic_grid, side_routes
+from planner.seeding.waypoint_fitting import QUICK_FIT, fit_waypoints
 from world.arrays import Floats
+from world.geometry import path_length
 from world.html_table import html_table
 from world.random_streams import PLANNER, stream
 from world.scenario import Scenario
@@ -42,19 +45,19 @@ from world.scenario import Scenario
 CLEARANCE_FRACTIONS = (0.0, 0.25, 0.5, 0.75, 0.95)
 # Radar preferences of the seeds: fractions of the radars' radius that paths keep out of.
 RADAR_FRACTIONS = (0.0, 0.35, 0.5, 0.65, 0.8, 1.0)
-# Grid for routes past the obstacles, which are shortened for each preference in addition to the default plan; see
-# `planner.search.seeds`. Number of stages of the grid.
+# Grids for routes past missiles and radars, which are shortened in addition to the default plan; see
+# `planner.search.seeds`. Number of stages of a grid.
 STAGE_COUNT = 50
 # Size of the area of highest ground, as a fraction of a step.
 GROUND_SPREAD_STEPS = 0.2
 # Spacing across, as a fraction of a step.
-SPACING_ACROSS_STEPS = 1.0 / 3.0
+SPACING_ACROSS_STEPS = 2.0 / 3.0
 # Reduction of the spheres.
-SPHERE_REDUCTION_FACTOR = 0.3
-# Maximum number of routes.
+SPHERE_REDUCTION_FACTOR = 0.1
+# Maximum number of routes per grid.
 MAX_ROUTES = 3
-# Maximum cost of a route relative to the length of the default path.
-MAX_COST_RATIO = 1.25
+# Grid among zones: number of stages and number of routes; see `planner.seeding.airspace_grids.airspace_routes`.
+ZONE_GRIDS = ((25, 2),)
 # Fractions of the search margins beyond the certificate's margins, tried in this order.
 MARGIN_FRACTIONS = (0.5, 0.1, 0.0)
 # Minimum number of solutions that the search keeps.
@@ -331,62 +334,68 @@ def seed_paths(task: FrontTask, default: Floats) -> Iterator[Floats]:
     """Yield paths (w, 3) from which the search begins, for various preferences.
 
     They are the default path (w, 3), and shortened paths. The shortened paths are made of the default path and of
-    routes on other sides of the obstacles.
+    routes on all sides of the missiles and radars. Shortening ignores zones; if there are any, the routes are yielded,
+    too.
     """
     yield default
     count = len(default)
-    routes = [default, *(resample(route, count) for route in _list_routes(task, default))]
-    for preferred_problem in _preferred_problems(task):
-        for route in routes:
-            path, _ = shorten_path(preferred_problem, route)
-            # Shorten again from equal legs, as for the default plan.
-            path, _ = shorten_path(preferred_problem, resample(path, count))
-            yield path
+    for data in _problems_with_radars(task):
+        routes = _list_routes(data, task.frame, default)
+        if is_limited(data.airspace):
+            yield from routes
+        for preferred_problem in _preferred_problems(task, data):
+            for route in [default, *routes]:
+                path, _ = shorten_path(preferred_problem, route)
+                # Shorten again from equal legs, as for the default plan.
+                path, _ = shorten_path(preferred_problem, resample(path, count))
+                yield path
 
 
-def _list_routes(task: FrontTask, default: Floats) -> list[Floats]:
-    """Return routes (k, 3) on other sides of the obstacles.
+def _problems_with_radars(task: FrontTask) -> Iterator[ProblemArrays]:
+    """Yield the problem with each radar as a missile sphere, for each of `RADAR_FRACTIONS` of its detection radius."""
+    scenario = task.problem.scenario
+    has_radar = (scenario.threats.detection_radius > 0.0).any()
+    for fraction in RADAR_FRACTIONS if has_radar else RADAR_FRACTIONS[:1]:
+        threats = threat_records(scenario.threats).copy()
+        threats["kill_radius"] = np.maximum(threats["kill_radius"], fraction * threats["detection_radius"])
+        # Read-only like a scenario's threats: for a writable array the kernels would be compiled again.
+        threats.setflags(write=False)
+        yield task.problem.search._replace(threats=threats, missiles=make_missile_index(threats))
 
-    If there are zones, the result is [], because such routes ignore zones.
-    """
-    data, frame = task.problem.search, task.frame
+
+def _list_routes(data: ProblemArrays, frame: RotatedFrame, default: Floats) -> list[Floats]:
+    """Return routes (w, 3) past missile spheres and zones on different sides; `default` is the default path."""
+    count, bound = len(default), MAX_LENGTH_RATIO * float(path_length(default))
+    span = (-0.5 * bound, 0.5 * bound)
     if is_limited(data.airspace):
-        return []
-    half_width = 0.5 * MAX_COST_RATIO * frame.length
+        zone_routes = airspace_routes(data, frame, span, ZONE_GRIDS)
+        return [fit_waypoints(data, frame, route.points, count, QUICK_FIT) for route in zone_routes]
     grid = optimistic_grid(
         data,
         frame,
-        (-half_width, half_width),
+        span,
         STAGE_COUNT,
         shrink=SPHERE_REDUCTION_FACTOR,
         spread=GROUND_SPREAD_STEPS,
         ratio=SPACING_ACROSS_STEPS,
     )
-    bound = MAX_COST_RATIO * float(np.sqrt((np.diff(default, axis=0) ** 2).sum(axis=1)).sum())
-    return [frame.to_world(route.points) for route in side_routes(data, frame, grid, bound, MAX_ROUTES)]
+    routes = side_routes(data, frame, grid, bound, MAX_ROUTES)
+    return [resample(frame.to_world(route.points), count) for route in routes]
 
 
-def _preferred_problems(task: FrontTask) -> Iterator[ProblemArrays]:
-    """Yield the problem and stricter variants: combinations of obstacles, clearance and cost.
+def _preferred_problems(task: FrontTask, data: ProblemArrays) -> Iterator[ProblemArrays]:
+    """Yield a problem and stricter variants: combinations of clearance and cost.
 
-    - Obstacles: each radar becomes a missile sphere whose radius is one of `RADAR_FRACTIONS` of its detection radius.
     - Clearance: the buffer is at least one of `CLEARANCE_FRACTIONS` of the spare height above the required clearance,
       which is the smaller one of both ends.
     - Cost: the cost of the problem, and then the cost of the fourth objective, `task.travel`.
     """
-    data, scenario = task.problem.search, task.problem.scenario
     end_legs = np.stack([[end, end] for end in (data.start, data.destination)])
     spare_height = max(0.0, float(task.values(end_legs)[:, Value.CLEARANCE].min()) - data.clearance)
-    radar_fractions = RADAR_FRACTIONS if (scenario.threats.detection_radius > 0.0).any() else RADAR_FRACTIONS[:1]
-    for radar_fraction in radar_fractions:
-        threats = threat_records(scenario.threats).copy()
-        threats["kill_radius"] = np.maximum(threats["kill_radius"], radar_fraction * threats["detection_radius"])
-        missiles = make_missile_index(threats)
-        for clearance_fraction in CLEARANCE_FRACTIONS:
-            buffer = max(data.buffer, clearance_fraction * spare_height)
-            stricter_problem = data._replace(missiles=missiles, buffer=buffer)
-            yield stricter_problem
-            yield stricter_problem._replace(travel=task.travel)
+    for fraction in CLEARANCE_FRACTIONS:
+        stricter_problem = data._replace(buffer=max(data.buffer, fraction * spare_height))
+        yield stricter_problem
+        yield stricter_problem._replace(travel=task.travel)
 
 
 # --- The search ---

@@ -116,7 +116,7 @@ def plan_path(
     cost = make_objective_cost(scenario, limits, problem)
 
     def search_with(count: int, evaluations: int) -> _Result:
-        """Search with a number of waypoints; the legs of a path with too few waypoints are halved."""
+        """Search with `count` waypoints; if the scenario requires more, halve the longest legs of the path."""
         encoding = ENCODINGS[found_algorithm.encoding](problem.space, count)
         settings = (progress, stop, first_safe, required_kill_distance(problem), improved)
         search = Search(problem, found_algorithm, encoding, stream(seed, PLANNER), *settings, evaluations=evaluations)
@@ -148,10 +148,10 @@ def plan_path(
 
 
 def _other_waypoint_counts(scenario: Scenario, algorithm: Algorithm, previous_path: Floats | None) -> tuple[int, ...]:
-    """Return the numbers of waypoints with which a search may be repeated.
+    """Return the numbers of waypoints, other than the scenario's, with which a search may be repeated.
 
-    A path with more waypoints may turn more often; fewer waypoints are easier to place. A number that the scenario
-    states is the number of waypoints of the plan: its legs are then halved.
+    A path with more waypoints may turn more often; fewer waypoints are easier to place. If the scenario states a large
+    number, a search with the default number is repeated, and legs of its path are halved to get the stated number.
 
     previous_path: older path to start from, which fixes the number; or None.
     """
@@ -181,9 +181,10 @@ def _needs_other_count(best: _Result, count: int) -> bool:
 
 
 def _is_better(result: _Result, other: _Result) -> bool:
-    """Return True if a path meets the goal and the other does not, or if both do and it is shorter.
+    """Return True if the path of a search is better than that of another search.
 
-    If neither meets the goal, a certified path is better, and of two certified paths the one further from missiles.
+    A path that meets the goal of the search is better, and of two such paths the shorter one. If neither meets it, a
+    certified path is better, and of two alike the one further from missiles.
     """
     (search, waypoints, certificate), (_, other_waypoints, other_certificate) = result, other
     meets, other_meets = search.meets_goal(certificate), search.meets_goal(other_certificate)
@@ -276,10 +277,10 @@ def _search_repeatedly(search: Search, previous_path: Floats | None) -> tuple[Fl
 
 
 def _check_options(scenario: Scenario, airspeed: float) -> None:
-    """Raise ScenarioError for the first reason why no path can be searched.
+    """Raise ScenarioError if a search makes no sense; the first reason found is stated.
 
-    The wind may be too strong for the airspeed (m/s), the population too large, the budget smaller than the population,
-    or the start or destination inside a missile's kill radius.
+    It makes no sense in a wind that is too strong for the airspeed (m/s), with a population that is too large or larger
+    than the budget, or from or to a place inside a missile's kill radius.
     """
     if scenario.wind.speed > MAX_WIND_FRACTION * airspeed:
         raise ScenarioError.at(
@@ -317,8 +318,12 @@ def _check_options(scenario: Scenario, airspeed: float) -> None:
 
 
 def _run_attempt(search: Search, attempt: int, previous_path: Floats | None) -> None:
-    """Search once, from the first population to the last generation; store the results in `search`.
+    """Search once: try seeds, run generations, shorten the best path; store the results in `search`.
 
+    The attempt ends earlier if the straight line is safe, if the search must end, or if it is proven that there is no
+    path. With a safe path, a seeded search of single waypoints runs no generations.
+
+    attempt: number of the attempt, from 0; it selects the grids and the population of `ATTEMPTS`.
     previous_path: older path to start from, or None.
     """
     settings = search.problem.scenario.planner

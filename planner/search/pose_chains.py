@@ -48,13 +48,14 @@ MAX_LAPS = 8
 def candidate_chains(
     start: MapPoint, course: float, end: MapPoint, end_course: float, turn_radius: float, laps: int
 ) -> Iterator[list[MapPoint]]:
-    """Yield lists of corners that connect two legs, for the paths of a departure or an approach.
+    """Yield lists of corners for a path from `start` to `end`, for a departure or an approach.
+
+    The path is flown from `start` over the corners to `end`. After its laps it has no corner or one near the start,
+    and up to two before the end: on the extended last leg, and on a base leg across it.
 
     course, end_course: course of the leg before `start`, and of the leg after `end`, rad.
     turn_radius: radius of the tightest turn, m.
-    laps: number of laps before the other corners.
-
-    A list has at most one corner near the start, and at most two before the end.
+    laps: number of square laps before the other corners.
     """
     lap_chains: list[list[MapPoint]] = [[]]
     if laps:
@@ -101,9 +102,9 @@ def _offset_point(point: MapPoint, course: float, distance: float) -> MapPoint:
 
 
 class TurnLengths(NamedTuple):
-    """Leg lengths (m) that turns take up before and after corners, by turn.
+    """Lengths (m) that turns take up of the legs before and after their corner.
 
-    The turns are from 0 in steps of `TURN_STEP_RAD`.
+    Entry k is for a turn of k times `TURN_STEP_RAD`.
     """
 
     before: tuple[float, ...]
@@ -112,7 +113,8 @@ class TurnLengths(NamedTuple):
     def lengths(self, turn: float) -> tuple[float, float]:
         """Return the lengths that a turn (rad) takes up before and after its corner, m.
 
-        For a turn beyond the end of the table, return about the lengths of the table's sharpest turn.
+        They are interpolated in the table. For a turn beyond the end of the table, they are about those of the table's
+        sharpest turn.
         """
         # Just before the last entry, so that an entry follows.
         position = min(turn / TURN_STEP_RAD, len(self.before) - 1.001)
@@ -125,7 +127,7 @@ class TurnLengths(NamedTuple):
 
 
 def arc_turn_lengths(radius: float) -> TurnLengths:
-    """Return the leg lengths that arcs of a radius (m) take up: the lengths of their tangents.
+    """Return the table of turn lengths for arcs of a radius (m): the lengths of their tangents.
 
     >>> [round(length) for length in arc_turn_lengths(150.0).lengths(math.radians(90.0))]
     [150, 150]
@@ -155,9 +157,10 @@ class PathMeasures(NamedTuple):
 
 
 def measure_path(points: Sequence[MapPoint], turn_lengths: TurnLengths) -> PathMeasures:
-    """Measure a path up to the first turn that is too sharp, or to the path's end.
+    """Measure the length and the turns of a path, and how much of each leg its turns take up.
 
-    The points are plain numbers, which is faster, because tens of thousands of paths are measured.
+    The measurement ends at a turn that is too sharp, and at two points less than 1 m apart: such a path has the cost
+    inf and does not fit. The points are plain numbers for speed: tens of thousands of paths are measured.
 
     >>> measure_path([(0.0, 0.0), (0.0, 1000.0), (1000.0, 1000.0)], arc_turn_lengths(150.0)).fits
     True
@@ -191,6 +194,7 @@ def climb_altitudes(
 ) -> Floats:
     """Compute the altitude at each point of a path that climbs as steeply as allowed, (n,) m AMSL.
 
+    points: (n) east and north of the path, m.
     start_altitude: altitude at the first point, m.
     climb: function that returns the climb slope on a course.
     min_altitude: minimum altitude except at the end, m.
@@ -213,13 +217,14 @@ def climb_altitudes(
 def descent_altitudes(
     points: Sequence[MapPoint], start_altitude: float, climb: SlopeOnCourse, dive: SlopeOnCourse, end_altitude: float
 ) -> Floats:
-    """Compute the altitudes (n,) of a path that descends as late, or climbs as early, as possible.
+    """Compute the altitudes (n,) of a path that descends as late, or climbs as early, as possible, m AMSL.
 
     points: (n) east and north of the path, m.
     start_altitude, end_altitude: m AMSL.
     climb, dive: functions that return the tangent of the steepest slope on a course.
 
-    If the path is too short, the first or the last altitude differs from the requested altitude.
+    If the path is too short for the change of altitude, the first altitude is lower than requested (in a descent), or
+    the last one is (in a climb).
 
     >>> descent_altitudes([(0.0, 0.0), (0.0, 500.0), (0.0, 1500.0)], 200.0, lambda _: 0.1, lambda _: 0.1, 50.0).tolist()
     [200.0, 150.0, 50.0]

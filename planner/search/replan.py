@@ -19,7 +19,8 @@ from world.errors import MissionError
 from world.geometry import leg_courses
 from world.scenario import Scenario
 
-# Function that completes a plan, with a search that it may call for a changed scenario or for other limits.
+# Function of a plan and a search that returns the completed plan. It may call the search to plan again, for a changed
+# scenario or within other limits.
 Settle = Callable[[Plan, Search], Plan]
 
 # Minimum number of waypoints of the path ahead; with fewer it cannot avoid anything.
@@ -72,7 +73,7 @@ def replan(
     remaining_scenario = replace(scenario, start=remaining_path[0], start_course=course, planner=settings)
 
     def search(changed_scenario: Scenario, changed_limits: Limits) -> Plan:
-        """Plan the path ahead; start from the remaining old path if its number of waypoints is suitable."""
+        """Plan the path ahead; start from the rest of the old path if both have the same number of waypoints."""
         previous_path = remaining_path if changed_scenario.planner.waypoints == len(remaining_path) else None
         return plan_path(
             changed_scenario,
@@ -127,7 +128,10 @@ def check_same_mission(scenario: Scenario, old_plan: Plan) -> None:
 
 
 def _check_first_waypoint(scenario: Scenario, old_plan: Plan, leg: int) -> None:
-    """Raise MissionError if the first waypoint of the new plan is in a kill radius or violates a zone."""
+    """Raise MissionError if the first waypoint of the new plan is in a kill radius or violates a zone.
+
+    leg: number of the leg of the old plan at whose start this waypoint is.
+    """
     threats = scenario.threats
     depths = threats.kill_radius - np.sqrt(((threats.position - old_plan.waypoints[leg]) ** 2).sum(axis=1))
     missile = int(np.argmax(np.where(threats.kill_radius > 0.0, depths, -math.inf))) if len(depths) else -1

@@ -68,9 +68,10 @@ def make_objective_cost(scenario: Scenario, limits: Limits, problem: Problem) ->
 
 
 def search_cheapest_path(search: Search, shortest_path: _CertifiedPath, weights: TravelCost) -> _CertifiedPath:
-    """Return the cheapest path and its certificate.
+    """Return the path with the lowest time or energy that is found, and its certificate.
 
-    The shortest path is returned if no path that is as safe is cheaper.
+    The shortest path itself is returned if the length is to be minimised, or if it does not meet the goal of the
+    search, or if no path that meets this goal is cheaper.
 
     shortest_path: the shortest path and its certificate.
     weights: weights of length, time and energy in the cost.
@@ -135,13 +136,15 @@ def _start_paths(search: Search, shortest_path: Floats) -> Iterator[Floats]:
 def _choose_cheaper(
     search: Search, evaluation_data: ProblemArrays, start: Floats, best_path: _CertifiedPath
 ) -> _CertifiedPath:
-    """Shorten a start path; return the result if it is certified and cheaper, otherwise the best path so far.
+    """Reduce the cost of a start path; return the result if it is better than the best path so far.
 
-    Larger margins are tried until a shortened path is certified. For each margin, paths between the best path and the
-    shortened path are also tried if the airspace has zones or a maximum height.
+    It has to be certified and cheaper. Otherwise the best path so far is returned.
+
+    Larger margins are tried until a path of lower cost is certified. For each margin, paths between the best path and
+    this path are also tried if the airspace has zones or a maximum height.
 
     evaluation_data: the planning problem with the cost to minimise.
-    start: (w, 3) path to shorten, m.
+    start: (w, 3) path to begin with, m.
     best_path: the best certified path so far, and its certificate.
     """
     path = start

@@ -102,7 +102,10 @@ CERTIFICATES_PER_PAUSE = 4
 
 
 def with_narrow_margins(problem: Problem) -> Problem:
-    """Return a problem whose search may pass missiles at little more than the certificate's margin, gusts included."""
+    """Return a problem whose search may pass missiles at little more than the certificate's margin.
+
+    The tracking error across the path and the reserve for gusts are still kept.
+    """
     data = problem.search
     margin = data.tracking.across + problem.certified.kill_margin + NARROW_KILL_MARGIN_M
     return replace(problem, search=data._replace(kill_margin=min(data.kill_margin, margin)))
@@ -140,6 +143,8 @@ class Archive:
 
     def insert(self, vectors: Floats, scores: Floats) -> None:
         """Insert new paths in the order of their rank; of equal paths, older ones stay first.
+
+        vectors, scores: (n, d) paths and (n, 8) their scores.
 
         As soon as one row is feasible, infeasible rows are dropped, because there may be thousands of them to rank. A
         full archive accepts only rows that are better than its last row.
@@ -264,10 +269,10 @@ class Search:
         raise SearchEnded
 
     def straight_vectors(self, *, has_equal_legs: bool = False) -> Floats:
-        """Return the straight line as a vector (1, d) of the rotated encoding.
+        """Return the straight line from start to destination as a vector (1, d) of the rotated encoding.
 
-        has_equal_legs: False for waypoints in the middle of their intervals, so that the first and last leg have half
-            the length of the others.
+        has_equal_legs: True for legs of equal length. False for waypoints in the middle of their intervals, so that the
+            first and last leg have half the length of the others.
         """
         encoding, space = self.encoding, self.problem.space
         edges = encoding.lower[0::3], encoding.upper[0::3]
@@ -284,7 +289,12 @@ class Search:
         return bool(reason)
 
     def improve(self, vector: Floats, max_evaluations: int) -> Floats:
-        """Improve a vector (d,) by a pattern search, insert the result into the archive; return its scores (8,)."""
+        """Improve a vector (d,) by a pattern search; insert the result in the archive; return its scores (8,).
+
+        If the budget allows less than two evaluations, the vector is only evaluated.
+
+        max_evaluations: maximum number of evaluations.
+        """
         evaluation_limit = min(max_evaluations, self._evaluation_budget() - self.evaluations)
         if evaluation_limit < 2:
             return np.asarray(self.evaluate(vector[None])[0])
@@ -297,7 +307,9 @@ class Search:
         return np.asarray(scores[0])
 
     def move_and_improve(self, vector: Floats, rounds: int, scale: float, max_evaluations: int) -> Floats:
-        """Move all waypoints of a vector (d,) at once, then `improve` it; return the best scores (8,).
+        """Move all waypoints of a vector (d,) at once, then `improve` it; return the resulting scores (8,).
+
+        If the budget is almost used up, the vector is only improved. `max_evaluations` limits `improve`.
 
         rounds, scale: number and relative size of the moves, as in `move_all_waypoints`.
         """
@@ -316,7 +328,13 @@ class Search:
         return self.algorithm.final_shortening and not is_limited(self.problem.search.airspace)
 
     def shorten(self, path: Floats) -> bool:
-        """Shorten a path (w, 3); keep the result, and return True, if it is the shortest finished path."""
+        """Shorten a path (w, 3); keep the result, and return True, if it is the shortest finished path.
+
+        A finished path is certified and has the required distance from missiles. A shortened path that is not is
+        shortened again with larger margins: first with margins to spheres and ground, then with corners as flown, last
+        with margins of slopes. Shortening is given up as soon as the result is longer than the best path, lies too far
+        inside a missile's margin, or the budget is used up.
+        """
         data = self.problem.search
         # Additional margin, m; True to model the corners as flown; additional margin of slopes, rad.
         attempts = [(margin, False, 0.0) for margin in EXTRA_MARGINS_M]
@@ -360,10 +378,10 @@ class Search:
         return True
 
     def _shorten_again(self, path: Floats) -> bool:
-        """Shorten a path (w, 3) without a certificate again, from equal legs and then with narrow margins.
+        """Shorten a path (w, 3) that is not finished once more: from equal legs, and then with narrow margins.
 
         Keep the result, and return True, if it is finished and clearly shorter than the best safe path. Without a safe
-        path, the search tries narrow margins later.
+        path nothing is done, because the search then tries narrow margins later.
         """
         if not self.has_safe():
             return False
@@ -384,7 +402,7 @@ class Search:
         return False
 
     def _violates_only_slopes(self, certificate: Certificate) -> bool:
-        """Return True if a path violates only the slope limits."""
+        """Return True if a path violates the slope limits and nothing else, missiles' margins included."""
         keeps_distance = certificate.kill_distance >= self.required_distance
         other_margins = replace(certificate, slope=0.0).margins
         return certificate.slope < 0.0 and keeps_distance and all(margin >= 0.0 for margin in other_margins)
@@ -416,7 +434,10 @@ class Search:
         return math.dist(self.problem.space.start, self.problem.space.destination)
 
     def length_ratio(self) -> float:
-        """Return the length ratio of the best path: its length divided by the straight distance."""
+        """Return the length of the best path, divided by the straight distance.
+
+        It is the shorter of the archive's best path, if that is safe, and the shortest finished path.
+        """
         ratio = float(self.archive.scores[0][LENGTH])
         if self.shortest is None:
             return ratio
@@ -433,7 +454,10 @@ class Search:
         return math.inf if budget is None else budget
 
     def record_history(self) -> None:
-        """Append length ratio, kill exposure and violations of the best path to the history."""
+        """Append length ratio, kill exposure and violations of the best path to the history.
+
+        With graded scores the kinds of violations are counted, otherwise all violations.
+        """
         best_scores = self.archive.scores[0]
         violations = best_scores[: len(Violation)]
         count = np.count_nonzero(violations) if self.algorithm.graded else violations.sum()

@@ -56,7 +56,7 @@ MAX_FOLLOWED_RETRY_ROUTES = 3
 
 
 def try_straight_line(search: Search) -> bool:
-    """Try the straight line; return True if it is safe, so that the search is finished: no path is shorter.
+    """Try the straight line; return True if it is safe, which ends the search, because no path is shorter.
 
     Encodings other than "rotated" do not try it, and return False.
     """
@@ -81,7 +81,10 @@ def try_straight_line(search: Search) -> bool:
 def starting_vectors(
     search: Search, grids: tuple[tuple[int, int], ...], previous: Floats | None, *, is_retry: bool = False
 ) -> Floats:
-    """Return the start vectors of a search, (n, d): a seed and the previous path.
+    """Return the vectors from which a search starts, (n, d): one seed and the previous path, if any.
+
+    The seed is made of a route over a grid; its waypoints are fitted to the route. Encodings other than "rotated" have
+    none, nor have algorithms that are not seeded, unless there is a previous path; the result then has no rows.
 
     grids: number of stages and number of routes of each grid.
     previous: older path (w, 3), or None.
@@ -121,11 +124,12 @@ def starting_vectors(
 
 
 def _list_routes(search: Search, grids: tuple[tuple[int, int], ...], is_retry: bool) -> list[GridRoute]:
-    """Return the routes over the grids, ordered by paths that are quickly fitted to them, best first.
+    """Return the routes over the grids, best first: in the order of paths that are quickly fitted to them.
 
-    is_retry: as in `starting_vectors`.
+    grids, is_retry: as in `starting_vectors`.
 
-    Each fitted path is inserted into the archive at once.
+    Each fitted path is inserted into the archive at once. As soon as a path is safe, and if routes may be shortened,
+    the following routes are only shortened and are not returned.
     """
     encoding, space, data = search.encoding, search.problem.space, search.problem.search
     if search.progress is not None:
@@ -194,7 +198,11 @@ MIN_GAIN_FRACTION = 2e-5
 
 
 def search_other_sides(search: Search) -> None:
-    """Shorten the best path, and routes on the other sides of the obstacles."""
+    """Shorten the best path, and routes past other sides of the obstacles; keep what is safe and shorter.
+
+    Other sides are not tried if there are zones or a maximum height, or if the best path is hardly longer than the
+    straight line. More grids are tried if the best path is long or none is safe.
+    """
     if not len(search.archive.scores):
         # A search needs a result, even if the grids have no route.
         search.evaluate(search.straight_vectors())
@@ -246,13 +254,18 @@ def _try_grids(search: Search, grids: tuple[tuple[int, float, float], ...]) -> l
 
 
 def _max_route_cost(search: Search) -> float:
-    """Return the cost, m, above which no route of a grid is followed."""
+    """Return the cost, m, above which a route of a grid is not shortened.
+
+    It is a little more than the length of the best safe path, or a multiple of the straight line without such a path.
+    """
     ratio = MAX_COST_RATIO * search.length_ratio() if search.has_safe() else MAX_DETOUR_RATIO
     return ratio * math.dist(search.problem.space.start, search.problem.space.destination)
 
 
 def _close_narrow_places(search: Search, step: float, kill_radius: float) -> ProblemArrays:
-    """Return the data of a search in which narrow places are closed to the routes of a grid or lattice.
+    """Return the data of a search with a sphere at each narrow place, which closes it to routes of a grid.
+
+    Narrow places are those where a shortened path has come too close to a missile.
 
     step: step of the grid or lattice, m; a place within a step of a closed place is not closed again.
     kill_radius: radius of the sphere that closes a place, m. It is large enough that no route steps over the sphere.
@@ -267,8 +280,9 @@ def _close_narrow_places(search: Search, step: float, kill_radius: float) -> Pro
 def _try_ceiling_routes(search: Search) -> list[Floats]:
     """Shorten routes at the altitude of the ceiling; return the routes as paths (w, 3).
 
-    There is one route for each step and depth. It avoids the places where a shortened path has remained too close to a
-    missile.
+    A route is searched for each step of the lattice, and for each depth by which it may enter missiles' spheres. It
+    avoids the places where a shortened path has remained too close to a missile. A route close to an earlier one is
+    left out.
     """
     frame = rotated_frame(search.problem.space.start, search.problem.space.destination)
     tried_paths: list[Floats] = []
@@ -336,9 +350,11 @@ def may_turn_back(search: Search, certificate: Certificate) -> bool:
 
 
 def search_turning_back(search: Search, best: tuple[Floats, Certificate]) -> tuple[Floats, Certificate]:
-    """Search along a route that may turn back.
+    """Search for a path along a route that may turn back; return the better of it and `best`.
 
-    Return the better of the new path and `best`, with its certificate.
+    The route is found on a lattice of places and courses. If this finds no safe path, a second search on the lattice
+    follows. It has a better estimate of the remaining length, and if the usual buffer above the ground is high, a lower
+    one.
 
     best: best path so far, with its certificate.
     """
@@ -356,13 +372,14 @@ def search_turning_back(search: Search, best: tuple[Floats, Certificate]) -> tup
 def _search_lattices(
     search: Search, best: tuple[Floats, Certificate], *, is_guided: bool
 ) -> tuple[tuple[Floats, Certificate], bool]:
-    """Search along the cheapest routes over lattices, until a path is safe.
+    """Search along the cheapest routes over lattices, from coarse to fine, until a path is safe.
 
     best: best path so far, with its certificate.
     is_guided: True for an estimate of the remaining length that knows obstacles and slopes, so that the search reaches
         further with the same number of states.
 
-    Returns the better of the new path and `best`, with its certificate, and True if states remain.
+    Returns the better of the new path and `best`, with its certificate, and True if the lattices did not use up the
+    number of states that may be visited.
     """
     data, space = search.problem.search, search.problem.space
     frame, step = rotated_frame(space.start, space.destination), turning_step(data)
@@ -397,9 +414,10 @@ def _search_lattices(
 
 
 def _follow_shortened(search: Search, best: tuple[Floats, Certificate]) -> tuple[Floats, Certificate]:
-    """Shorten the best path without regard to its certificate, and search for a safe path along the result.
+    """Shorten the best path, safe or not, and search for a safe path along the result.
 
-    Returns the new path with its certificate if it is safe and shorter than `best`; otherwise returns `best`.
+    This is done with several margins in turn. Returns the best path found if it is safe and shorter than `best`;
+    otherwise returns `best`. Each path has its certificate.
     """
     if not search.can_shorten:
         return best
@@ -416,7 +434,11 @@ def _follow_shortened(search: Search, best: tuple[Floats, Certificate]) -> tuple
 
 
 def _search_along_route(search: Search, route: Floats) -> tuple[Floats, Certificate, bool]:
-    """Search along a route (k, 3); return the best path, its certificate, and True if the path was shortened."""
+    """Search for a path along a route (k, 3), with one waypoint on each piece of it.
+
+    Waypoints are fitted to the route, improved and shortened in a search of its own, with frames along the route.
+    Returns the best path, its certificate, and True if shortening found a finished path.
+    """
     waypoints = search.encoding.waypoints
     piece_ends, _ = sample_route(route, waypoints - 1)
     encoding = route_encoding(search.problem.space, piece_ends[:, :2])
@@ -448,7 +470,10 @@ def _search_along_route(search: Search, route: Floats) -> tuple[Floats, Certific
 
 
 def _improve_and_shorten(search: Search, vector: Floats, routes: tuple[Floats, ...]) -> None:
-    """Improve the path of a vector (d,); then shorten this path and some routes (k, 3), which may be better."""
+    """Improve the path of a vector (d,); then shorten the best path and some routes (k, 3).
+
+    The results are in the archive and in `search.shortest`.
+    """
     search.evaluate(vector[None])
     for _ in range(FIRST_SEARCH_COUNT):
         if search.must_end() or search.first_safe_found():

@@ -12,10 +12,10 @@ Search = Callable[[Scenario, Limits], Plan]
 
 
 class SharedBudget:
-    """Search that may be repeated for the same plan, in another scenario or within other limits.
+    """Search that several calls share: for the same plan, each in another scenario or within other limits.
 
-    Each search may use the remaining evaluations of the scenario's budget. If fewer evaluations than one population
-    remain, no further search is run.
+    Each search may use the evaluations of the scenario's budget that earlier searches have left. If fewer than one
+    population remain, no further search is run, and the last plan is returned.
     """
 
     def __init__(self, search: Search) -> None:

@@ -38,15 +38,21 @@ EDGE_COST = 0.3
 TURN_COST = 0.15
 # Fraction of the steepest slopes that a route on a gentle grid uses, because legs cut its corners.
 GENTLE_SLOPE_FRACTION = 0.9
-# A grid column: its ground and the lowest and highest allowed height, m; lowest > highest for none.
+# A grid column: its ground and the lowest and highest allowed altitude, m; lowest > highest if none is allowed.
 COLUMN = np.dtype([("ground", np.float64), ("lowest", np.float64), ("highest", np.float64)])
 
 
 class AirspaceGrid(NamedTuple):
     """Grid of one resolution: positions across at stages + 1 positions along, and layers of height.
 
-    across: m from the line.
-    layer_spacing: m. The first layer is at the lowest allowed height if `follows`, otherwise at `floor` (m).
+    A stage is the step from one position along to the next.
+
+    stages: number of stages.
+    across: (across,) positions across, m from the line.
+    layers: number of layers.
+    layer_spacing: m.
+    follows: True if the layers follow the ground: the first layer is at the lowest allowed altitude of each column.
+    floor: altitude of the first layer if the layers do not follow the ground, m.
     gentle: True if changes of course have a cost and slopes stay below the steepest.
     """
 
@@ -60,7 +66,7 @@ class AirspaceGrid(NamedTuple):
 
 
 class _ClosedHeights(NamedTuple):
-    """Altitudes closed to a step, from low to high, m AMSL; low > high for none."""
+    """Range of altitudes that zones close to a step, from low to high, m AMSL; low > high for none."""
 
     low: float
     high: float
@@ -99,9 +105,12 @@ def _fill_column(
 
 @inner
 def _closed_heights(zones: ZonesWithMargins, line: MapSegment, lateral: float, ground: float) -> _ClosedHeights:
-    """Return the range of altitudes at which zones block a horizontal step, m AMSL.
+    """Return the range of altitudes at which zones block a step, m AMSL.
 
-    line: horizontal line of the step.
+    If several exclusions block it, the range reaches from the lowest floor to the highest ceiling. Outside an inclusion
+    all altitudes are closed.
+
+    line: the step on the map.
     lateral: tracking error to add to the zones' margins, m.
     ground: altitude of the ground at the start of the step, m, from which a zone's heights above ground are measured.
     """
@@ -160,7 +169,9 @@ def _set_layer_costs(
     last_across: int,
     cell_costs: Floats,
 ) -> None:
-    """Fill the cost per m of path in the cells of a stage; inf for a cell that no path may enter.
+    """Fill the cost per m of path in the cells of a stage; inf outside the range of allowed altitudes.
+
+    The cost increases towards the edges of a band of heights above ground, and inside kill spheres.
 
     columns: `COLUMN` records (across,) of the stage, with the range of allowed altitudes.
     obstacles: `OBSTACLE` records: kill spheres in the rotated frame.
@@ -209,12 +220,12 @@ def _relax_airspace_stage(
     previous_parents: Codes,
     parents: Codes,
 ) -> None:
-    """Compute the costs of the cheapest routes to the cells of a stage, and store their parents.
+    """Extend all routes by one step to the next stage; keep the cheapest route to each of its cells.
 
     previous_columns, columns: `COLUMN` records (across,) of the previous stage and of this stage.
     cost, next_cost: (across, layers) costs of the routes to the cells of the previous stage and this stage (updated).
     cell_costs: (across, layers) cost per m of the steps to this stage. A change of course from the parent also costs.
-    previous_parents, parents: (across, layers) parents in both stages, as across x layers + layer; the latter updated.
+    previous_parents, parents: (across, layers) cells from which these routes come: across x layers + layer (updated).
     """
     step, width, zones, spacing = frame.length / grid.stages, grid.across.size, data.airspace.zones, grid.layer_spacing
     lateral = 0.0 if stage in (1, grid.stages) else float(data.tracking.across)  # No tracking error at a fixed end.
@@ -261,7 +272,7 @@ def _relax_airspace_stage(
 
 
 class AirspaceSearch(NamedTuple):
-    """Resumable search for the cheapest route over a grid.
+    """Search for the cheapest route over a grid, stage by stage; it can be continued after a pause.
 
     obstacles: `OBSTACLE` records. columns: `COLUMN` records (stages + 1, across). cells: (stages + 1, across, layers),
     the parent of each cell, as across x layers. cost: (across, layers) costs of the routes to the cells of the last
@@ -296,7 +307,7 @@ def cheapest_airspace_route(
     The points are along, across and up, (stages + 1, 3).
 
     extra: (stages + 1, across) additional cost per m.
-    bound: upper limit on the cost of the route.
+    bound: upper limit on the cost of the route; dearer routes are not found.
     pause: called after every `CELLS_PER_PAUSE` cells; an exception raised there stops the search.
 
     Without a route, the points are (0, 3) and the cost is inf.
@@ -312,7 +323,7 @@ def cheapest_airspace_route(
 
 @compiled
 def begin_airspace_route(data: ProblemArrays, frame: RotatedFrame, grid: AirspaceGrid) -> AirspaceSearch:
-    """Return a new search for the cheapest route, before its first stage."""
+    """Return a new search for the cheapest route, before its first stage: only the start has a cost, 0."""
     stages, width, step = grid.stages, grid.across.size, frame.length / grid.stages
     centre_index = int(np.argmin(np.abs(grid.across)))
     columns = np.zeros((stages + 1, width), dtype=COLUMN)
@@ -422,7 +433,7 @@ def end_airspace_route(
 
 @inner
 def _nearest_layer(grid: AirspaceGrid, column: Record, height: float) -> int:
-    """Return the index of the layer that is nearest to a height, m."""
+    """Return the index of the layer that is nearest to a height (m) in a `COLUMN` record."""
     first_height = column.lowest if grid.follows else grid.floor
     return min(grid.layers - 1, max(0, round((height - first_height) / grid.layer_spacing)))
 
@@ -486,6 +497,7 @@ def airspace_routes(
 ) -> Iterator[GridRoute]:
     """Yield routes over grids, for a problem with zones or a maximum height.
 
+    span: lowest and highest position across, m.
     grids: for each grid, its number of stages (multiplied by `STAGE_FACTOR`) and its number of different routes.
     pause: called from time to time; an exception raised there stops the search.
     finer_only: True to skip a grid that is no finer than an earlier grid, because `MAX_CELLS` limits it.

@@ -19,12 +19,14 @@ MAX_SPREAD_FRACTION = 0.3
 
 
 def bridge_modes(inner: int) -> tuple[Floats, Floats]:
-    """Return the modes of the kernel min(s, t) - s t of a Brownian bridge with equal steps.
+    """Return smooth shapes for displacements of a path's inner waypoints, and how strongly each varies.
 
-    inner: number n of inner points.
+    They are the eigenvectors of the kernel min(s, t) - s t of a Brownian bridge, which is fixed at both ends. The
+    inverse of the kernel is the second difference, so the eigenvectors are sines: half a wave, a whole wave, and so on.
 
-    Returns the eigenvectors, (n, n), and their standard deviations relative to the first mode, (n,). The inverse of the
-    kernel is the second difference, so the eigenvectors are sines.
+    inner: number n of inner waypoints.
+
+    Returns the eigenvectors as columns, (n, n), and their standard deviations relative to the first, (n,).
     """
     k = np.arange(1, inner + 1)
     modes = np.sqrt(2.0 / (inner + 1)) * np.sin(np.pi * np.outer(k, k) / (inner + 1))
@@ -35,7 +37,7 @@ def bridge_modes(inner: int) -> tuple[Floats, Floats]:
 def bridge_basis(inner: int) -> Floats:
     """Return an orthogonal basis (3 n, 3 n) for vectors of n inner waypoints in the rotated encoding.
 
-    It consists of bridge modes across and up, and of unit vectors along.
+    The directions, its columns, are the smooth shapes of `bridge_modes` across and up, and single waypoints along.
     """
     modes, _ = bridge_modes(inner)
     basis = np.zeros((3 * inner, 3 * inner))

@@ -45,12 +45,14 @@ ARC_FRACTION = 0.4
 
 
 class FlownCorners(NamedTuple):
-    """Corners of a path of w waypoints that are flown near the ground.
+    """Corners of a path of w waypoints that are flown near the ground or almost as steeply as possible.
 
-    radii: (w,) radii of their turns, m; 0 for other corners. lowered: (w, 2) depth of the flight below the legs before
-    and after, m.
-    steep_radii: (w,) radii of the arcs that are almost as steep as can be flown, m; 0 for other arcs. slopes: (w, 2)
-    tangents of the steepest climb and dive there. slope_margin: margin of arcs, m of length.
+    radii: (w,) radii of the turns near the ground, m; 0 for other corners.
+    lowered: (w, 2) required height in addition to the clearance, because the flight is below the legs before and after
+    the corner, m.
+    steep_radii: (w,) radii of the arcs that are almost as steep as can be flown, m; 0 for other arcs.
+    slopes: (w, 2) tangents of the steepest climb and dive there.
+    slope_margin: length that an arc has in addition to what its climb or descent needs, m.
     """
 
     radii: Floats
@@ -64,6 +66,7 @@ class FlownCorners(NamedTuple):
 def no_corners(count: int, margin: float) -> FlownCorners:
     """Return the `FlownCorners` of a path that has no corners near the ground.
 
+    count: number w of waypoints of the path.
     margin: additional margin, m.
     """
     slope_margin = ARC_MARGIN_M + ARC_FRACTION * margin
@@ -78,7 +81,8 @@ def corners_near_ground(
 ) -> FlownCorners:
     """Find a path's corners that are flown close to the ground, or almost as steeply as allowed.
 
-    Fly-over turns have no such corners.
+    A corner near the ground is one of whose samples any is less than `NEAR_GROUND_HEIGHT_M` above the required height.
+    Corners that hardly leave the legs are omitted. Fly-over waypoints have no such corners.
 
     path: (w, 3) m.
     corners, lags: `CORNER` records of the turns, and `HEIGHT_LAG` records of the legs.
@@ -120,7 +124,7 @@ def corners_near_ground(
 
 @inner
 def _find_steep_arcs(data: ProblemArrays, path: Floats, corners: Records, flown: FlownCorners) -> None:
-    """Fill the radii and the slope limits of the arcs whose slopes are close to their limits.
+    """Fill the radii of arcs whose slopes are close to their limits, and the slope limits of all arcs.
 
     path: (w, 3) m.
     corners: filled `CORNER` records (w,) of the path.
@@ -156,14 +160,14 @@ def _find_steep_arcs(data: ProblemArrays, path: Floats, corners: Records, flown:
 def spare_arc_length(
     previous: Floats, waypoint: Floats, next_waypoint: Floats, radius: float, sign: float, max_slope: float
 ) -> float:
-    """Return the length by which a corner's arc exceeds the length that its climb or descent needs, m.
+    """Return how much longer a corner's arc is than its climb or descent needs, m; negative if too short.
 
     previous, waypoint, next_waypoint: (3,) m.
     radius: radius of the arc, m.
     sign: 1 for a climb, -1 for a descent.
     max_slope: tangent of the maximum slope.
 
-    Slopes are those of `aircraft.path_limits.arc_slope`. The length is negative if the arc is too short.
+    Slopes are those of `aircraft.path_limits.arc_slope`.
     """
     length_in, length_out = _horizontal_length(previous, waypoint), _horizontal_length(waypoint, next_waypoint)
     ux = waypoint[0] - previous[0]
@@ -193,7 +197,7 @@ def _horizontal_length(start: Floats, end: Floats) -> float:
 
 @inner
 def height_above_required(data: ProblemArrays, limits: PrecomputedLimits, point: Floats) -> float:
-    """Return the height of a point (3,) above the lowest allowed altitude below it, m; NaN off the terrain."""
+    """Return the height of a point (3,) above the lowest altitude allowed there, m; NaN off the terrain."""
     column, row = polymap(data.to_pixel, point[0], point[1])
     ground: float = pixel_height(data.heights, column, row)
     return point[2] - ground - clearance_at(limits.required, point[0], point[1])
@@ -256,13 +260,17 @@ def corner_point(
 def corner_derivatives(
     data: ProblemArrays, corner: Floats, radius: float, sample: int, gradient: Floats, point: Floats, slopes: Floats
 ) -> None:
-    """Fill `slopes` (3, 3) with the derivatives of a value at a corner's sample.
+    """Fill `slopes` with the derivatives of a value at a corner's sample by the corner's three waypoints.
 
-    The derivatives are with respect to the coordinates of the corner's three waypoints.
+    A waypoint that moves also moves the sample, which changes the value (chain rule). The motion of the sample is
+    computed by central differences with the step `CORNER_STEP_M`.
 
-    corner: waypoints of the corner, (3, 3).
+    corner: (3, 3) the waypoints, m; changed during the computation, and restored.
+    radius: radius of the arc, m.
+    sample: number of the sample, as in `corner_point`.
     gradient: (3,) derivatives of the value with respect to the position of the sample.
-    point: scratch memory, (3,).
+    point: working memory, (3,).
+    slopes: (3, 3) array to fill: row i is for waypoint i.
     """
     for row in range(3):
         for axis in range(3):
@@ -277,7 +285,7 @@ def corner_derivatives(
 
 @inner
 def spare_length_derivatives(corner: Floats, radius: float, sign: float, max_slope: float, slopes: Floats) -> None:
-    """Fill `slopes` (3, 3) with the derivatives of `spare_arc_length` with respect to a corner's waypoints.
+    """Fill `slopes` (3, 3) with the derivatives of `spare_arc_length`: a row for each waypoint.
 
     corner: (3, 3) the waypoints, m; changed during the computation, and restored.
     radius: radius of the arc, m.

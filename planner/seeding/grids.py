@@ -46,9 +46,9 @@ OBSTACLE = np.dtype(
 class Grid(NamedTuple):
     """Grid of one resolution: stages along, positions across and layers of height.
 
-    stages: number of stages.
-    across: m from the line.
-    layers: altitudes, m.
+    stages: number of stages, which are equal steps along the line from start to destination.
+    across: (across,) positions across, m from the line.
+    layers: (layers,) altitudes, m.
     shrink: fraction of a step by which kill spheres are reduced; 0 for none. Routes on such a grid may have to be
         shortened to be safe, but pass gaps between its cells.
     spread: fraction of a step around a cell over which the highest ground is taken.
@@ -64,7 +64,7 @@ class Grid(NamedTuple):
 
 
 class _PixelSteps(NamedTuple):
-    """Steps in raster columns and rows between samples of the ground, along and across."""
+    """Steps between ground samples, in raster columns and rows: the step along and the step across."""
 
     columns_along: float
     rows_along: float
@@ -94,7 +94,7 @@ def _min_height(
 
     required: required clearance.
     along, across: position of the cell in the rotated frame, m.
-    steps: steps between the 3 x 3 samples; with a step of 0 along the frame only the middle sample is taken.
+    steps: steps between the 3 x 3 samples around the position; if they are 0, only its own ground is taken.
 
     The result is inf outside the map or without data.
     """
@@ -119,7 +119,7 @@ def _min_height(
 
 @inner
 def _pixel_steps(data: ProblemArrays, frame: RotatedFrame, along: float, length: float) -> _PixelSteps:
-    """Return steps along and across the frame, converted to raster columns and rows.
+    """Convert a step along the frame, and one across it, to raster columns and rows.
 
     along: position in the frame at which the steps are converted, m.
     length: length of the steps in the frame, m.
@@ -135,9 +135,10 @@ def _pixel_steps(data: ProblemArrays, frame: RotatedFrame, along: float, length:
 
 @compiled
 def find_obstacles(data: ProblemArrays, frame: RotatedFrame, step: float, shrink: float = 0.0) -> Records:
-    """Convert the missiles to `OBSTACLE` records for a grid with a given step between stages (m).
+    """Convert the missiles to `OBSTACLE` records for a grid, with radii that suit the grid.
 
-    shrink: fraction of a step by which kill spheres are reduced; 0 for none.
+    step: length of a stage, m. Spheres are enlarged on coarse grids, to cover the space between the cells.
+    shrink: fraction of a step by which kill spheres are reduced instead; 0 for none.
     """
     growth = COARSE_GROWTH_STEPS * step if step > COARSE_STEP_M else 0.0
     if shrink > 0.0:
@@ -163,9 +164,10 @@ def _add_kill_cost(
 ) -> None:
     """Add the cost of kill spheres to cells of a stage; the cost increases towards the centre of a sphere.
 
+    obstacles: `OBSTACLE` records: kill spheres in the rotated frame.
     along: position of the stage, m.
     first_across, last_across: range of the cells across, both included.
-    cell_costs: (layers, across) cost per m.
+    cell_costs: (layers, across) cost per m; updated.
     """
     across, layers = grid.across, grid.layers
     across_spacing = across[1] - across[0] if across.size > 1 else 1.0
@@ -242,9 +244,10 @@ SPAN = np.dtype([("first", np.int64), ("last", np.int64)], align=True)
 
 @inner
 def layers_per_step(data: ProblemArrays, frame: RotatedFrame, step: float, layers: Floats, ratio: float) -> Records:
-    """Return the steepest climb and descent of a step, in layers: `STEP_LAYERS` records (sideways, layers).
+    """Return the steepest climb and descent of a step, in whole layers.
 
-    They depend on the course of the step and on the layer at its beginning.
+    The result is `STEP_LAYERS` records (2 * MAX_SIDE + 1, layers). Entry [MAX_SIDE + k, z] is for the step that begins
+    in layer z and goes one stage forward and k cells to the side.
 
     frame: frame of the direct line.
     step: length of a step along the line, m.
@@ -285,10 +288,13 @@ def relax_cells(
 ) -> None:
     """Extend the routes of successive cells to cells of the next stage; keep the cheaper route of each cell.
 
-    cost, next_cost: costs of the routes to the cells of this stage and of the next stage.
+    Cell first_source + k is extended to cell first_target + k, for k from 0 to count - 1. All arrays are flat: layer
+    after layer, and in each layer the cells across.
+
+    cost, next_cost: costs of the routes to the cells of this stage and of the next stage; `next_cost` is updated.
     cell_costs: cost per m of the cells.
-    parents: cells from which the cheapest routes come.
-    first_source, first_target, first_cell_cost: indices of the first cells, and of the first cell cost, in flat arrays.
+    parents: cells from which the cheapest routes come; updated.
+    first_source, first_target, first_cell_cost: indices of the first cells, and of the first cell cost.
     count: number of the cells.
     length: length of each step, m.
     """
@@ -314,12 +320,12 @@ def relax_stage(
     layer_spacing: float,
     ratio: float,
 ) -> None:
-    """Compute the costs of the cheapest routes to the cells of a stage, and store their parents.
+    """Extend all routes by one step to the next stage; keep the cheapest route to each of its cells.
 
     cost, next_cost: (layers, across) costs of the routes to the cells of the previous stage and of this stage.
     parents: (layers, across) cells of the previous stage from which the cheapest routes come.
     spans: `SPAN` records (layers,) of the cells with a finite cost in the previous stage.
-    step_layers: `STEP_LAYERS` records (sideways, layers): steepest climb and descent from the previous stage.
+    step_layers: steepest climb and descent from the previous stage, as `layers_per_step` returns them.
     cell_costs: (layers, across) cost per m of the steps to the cells of this stage.
     step: length of a step along the line, m.
     layer_spacing: m.
@@ -360,7 +366,9 @@ def relax_stage(
 def fill_goal_distances(
     columns: int, goal_index: int, remaining_stages: int, step: float, ratio: float, out: Floats
 ) -> None:
-    """Fill `out` with the shortest horizontal distance to the destination from each position across, m.
+    """Fill `out` with the length of the shortest route to the destination from each position across, m.
+
+    The route is horizontal and ignores obstacles, so that no real route is shorter.
 
     columns: number of positions across.
     goal_index: index across of the destination.
@@ -369,7 +377,7 @@ def fill_goal_distances(
     ratio: spacing across as a fraction of a step.
     out: (columns,) array to fill; inf if the destination cannot be reached in the remaining stages.
 
-    Each step moves k or k + 1 positions across; k is the mean number, rounded down.
+    On the shortest route each step moves k or k + 1 positions across, where k is the mean number, rounded down.
     """
     for y in range(columns):
         offset = abs(y - goal_index)
@@ -392,15 +400,16 @@ def prune_cells(
     first_across: int,
     last_across: int,
 ) -> None:
-    """Set to inf the costs of cells from which the destination cannot be reached within the bound.
+    """Drop the cells of a stage from which the destination cannot be reached within the bound on the cost.
 
-    Fill the spans.
+    The cost of a dropped cell is set to inf. The spans of the remaining cells are stored.
 
     next_cost: (layers, across) costs of the routes to the cells; updated.
     spans: `SPAN` records (layers,) to fill with the remaining cells.
     goal_distances: (across,) horizontal distance to the destination, m.
     height_differences: (layers,) height differences to the destination, m.
-    first_across, last_across: range of cells across, both included.
+    bound: upper limit on the cost of a whole route, m.
+    first_across, last_across: range of cells across that may have a finite cost, both included.
     """
     for z in range(next_cost.shape[0]):
         spans[z].first, spans[z].last = next_cost.shape[1], -1
@@ -419,11 +428,17 @@ def prune_cells(
 
 
 class GridSearch(NamedTuple):
-    """Resumable search for the cheapest route over a grid; arrays are (layers, across).
+    """Search for the cheapest route over a grid, stage by stage; it can be continued after a pause.
 
-    parents: (stages + 1, layers, across).  cost: costs of the last stage reached.  next_cost, cell_costs: scratch.
-    spans: `SPAN` records (layers,) of the cells with a finite cost.  start_layer, goal_layer: layers of the ends.
-    centre_index: index across of both ends.  stage: the last stage reached.
+    step_layers: steepest climb and descent of a step, as `layers_per_step` returns them.
+    obstacles: `OBSTACLE` records.
+    parents: (stages + 1, layers, across) cell of the previous stage from which the cheapest route comes.
+    cost: (layers, across) costs of the routes to the cells of the last stage reached.
+    next_cost, cell_costs: (layers, across) working memory.
+    spans: `SPAN` records (layers,) of the cells with a finite cost.
+    start_layer, goal_layer: layers of the ends.
+    centre_index: index across of both ends.
+    stage: the last stage reached.
     """
 
     step_layers: Records
@@ -470,7 +485,7 @@ def cheapest_route(
 
 @compiled
 def begin_route(data: ProblemArrays, frame: RotatedFrame, grid: Grid) -> GridSearch:
-    """Return a new search for the cheapest route, before its first stage."""
+    """Return a new search for the cheapest route, before its first stage: only the start has a cost, 0."""
     stages, width, layer_count = grid.stages, grid.across.size, grid.layers.size
     step = frame.length / stages
     centre_index, start_layer = int(np.argmin(np.abs(grid.across))), int(np.argmin(np.abs(grid.layers - data.start[2])))
@@ -507,8 +522,8 @@ def continue_route(
 ) -> GridSearch:
     """Continue a search by up to `max_stages` stages, or until no route can continue; return it.
 
-    extra: (stages + 1, across) additional cost per m of path in each position.
-    bound, search: upper limit on the cost of the route, and state of the search, whose arrays are overwritten.
+    extra: (stages + 1, across) additional cost per m of path in each position. search: its arrays are overwritten.
+    bound: upper limit on the cost of the route; cells that only dearer routes can use are dropped.
     """
     stages, width, layer_count = grid.stages, grid.across.size, grid.layers.size
     step = frame.length / stages
@@ -578,7 +593,8 @@ def end_route(search: GridSearch) -> tuple[Records, float]:
 def trace_back(parents: Codes, layer: int, across: int) -> Records:
     """Return `ROUTE_CELL` records of the route from the start to a cell of the last stage.
 
-    parents: parent of each cell, (stages + 1, layers, across).
+    parents: (stages + 1, layers, across) parent of each cell, as layer x width + across.
+    layer, across: the cell of the last stage.
     """
     width = parents.shape[2]
     cells = np.zeros(parents.shape[0], dtype=ROUTE_CELL)
@@ -618,11 +634,14 @@ class GridRoute:
 
 
 def positions_across(span: tuple[float, float], spacing: float, stages: int) -> Floats:
-    """Return the positions across of a grid's cells, m: those within a span that a route over all stages can reach.
+    """Return the positions across of a grid's cells, m: those within a span that a route can reach.
 
     span: lowest and highest position across, m.
+    spacing: distance between neighbouring positions, m.
+    stages: number of stages of the grid.
 
-    A route begins and ends in the middle. If its ends are close together, it can reach only a small part of the map.
+    A route begins and ends at the position 0 and moves by at most `MAX_SIDE` cells per stage. With few stages it can
+    therefore reach only a small part of the map.
     """
     reach = MAX_SIDE * (stages // 2)
     first, last = max(-reach, math.ceil(span[0] / spacing)), min(reach, math.floor(span[1] / spacing))
@@ -686,10 +705,12 @@ def grid_route(
 
 
 def proximity_cost(along: Floats, across: Floats, earlier_routes: tuple[GridRoute, ...]) -> Floats:
-    """Return the additional cost per m near earlier routes, (s, y).
+    """Return the additional cost per m near earlier routes, (s, y), to lead the next route elsewhere.
 
     along: (s,) positions along, m.
     across: (y,) positions across, m.
+
+    Each earlier route adds 1 on the route itself, and less with the distance across from it.
     """
     extra = np.zeros((along.size, across.size))
     width = max(ROUTE_SPACING_M, ROUTE_SPACING_STEPS * along[-1] / (along.size - 1))

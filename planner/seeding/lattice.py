@@ -53,11 +53,13 @@ LATTICE_CELL = np.dtype([("along", np.int64), ("across", np.int64), ("layer", np
 
 @by_reference
 class Lattice(NamedTuple):
-    """Points in the rotated frame and layers of height.
+    """Regular points in the rotated frame, along and across, in layers of height.
+
+    A point (along, across) is also called a column; its number is along * `across` + across.
 
     step: spacing of the points, m.
     behind, right: number of points behind the start and to its right.
-    along, across: number of points.
+    along, across: number of points in each direction.
     goal: index along of the destination.
     low: height of the first layer, m.
     layer_spacing: m.
@@ -80,7 +82,7 @@ class Lattice(NamedTuple):
 
 @inner
 def _set_position(frame: RotatedFrame, lattice: Lattice, along: int, across: int, layer: int, out: Floats) -> None:
-    """Fill `out` (3,) with the world position of a lattice point in a layer."""
+    """Fill `out` (3,) with the world position of the lattice point with the given indices, m."""
     out[0], out[1] = to_world_position(
         frame, (along - lattice.behind) * lattice.step, (across - lattice.right) * lattice.step
     )
@@ -119,12 +121,14 @@ class Heuristic(NamedTuple):
 
 
 class _StateTable(NamedTuple):
-    """Costs (m), parents and expanded flags of the search's states, and the feasibility of its steps.
+    """Tables of an A* search with an entry for each state: a point, a layer and one of eight courses.
 
+    cost: cost of the cheapest known route to each state, m.
     parents: the parent's number plus 1; 0 for an unreached state, whose cost is not set, and `_FIRST` for a state of
         the start.
-    layer_limits: (8, 2) maximum climb and descent in layers.
-    steps: feasibility by cell, course and change of layer.
+    is_expanded: True for a state whose successors have been reached.
+    layer_limits: (8, 2) maximum climb and descent of a step on each course, in layers.
+    steps: whether a step is free, by cell, course and change of layer: `_UNKNOWN`, `_FREE` or `_CLOSED`.
     heuristic: estimate of the remaining length.
     """
 
@@ -140,7 +144,10 @@ class _StateTable(NamedTuple):
 def _remaining_cost(lattice: Lattice, heuristic: Heuristic, position: int, altitude: float) -> float:
     """Return the estimated cost from a column of a lattice at an altitude to the goal, m.
 
+    It is the length of a slope to the goal that is long enough for the distance, and for the climb or descent.
+
     position: index of the column in `heuristic.squared_distances`.
+    altitude: m.
     """
     climb = lattice.low + lattice.goal_layer * lattice.layer_spacing - altitude
     slope_length = climb * heuristic.climb_length if climb > 0.0 else climb * heuristic.descent_length
@@ -159,7 +166,10 @@ def _expand_state(
     max_turn: int,
     open_states: list[tuple[float, int]],
 ) -> None:
-    """Expand a state: push the successors that it reaches at a lower cost than before to the open list.
+    """Expand a state: add the successors that it reaches at a lower cost than before to the open list.
+
+    A successor is the next point on a course that differs by at most `max_turn`. Its layer is one that the aircraft can
+    climb or descend to. The step to it must be free of violations.
 
     lattice: points of the lattice; a state is a point, a layer and one of eight courses.
     table: costs, parents and flags of all states; updated.
@@ -206,10 +216,12 @@ def _expand_state(
 
 
 class LatticeSearch(NamedTuple):
-    """Resumable search: its state table, and its open list in heap order.
+    """A* search over a lattice that can be continued after a pause.
 
-    costs, states: (k,) of the open list. expanded_count: number of states expanded. goal_state: the goal's state once
-    it is reached, or -1.
+    table: costs, parents and flags of all states.
+    costs, states: (k,) priorities and states of the open list, in heap order.
+    expanded_count: number of states expanded.
+    goal_state: the goal's state once it is reached, or -1.
     """
 
     table: _StateTable
@@ -239,10 +251,12 @@ def _straight_distances(frame: RotatedFrame, lattice: Lattice) -> Floats:
 
 @compiled
 def _distances_around_obstacles(data: ProblemArrays, frame: RotatedFrame, lattice: Lattice) -> Floats:
-    """Return the length of the shortest way from each column of a lattice to the goal's column, (along x across,) m.
+    """Return the length of the shortest path around obstacles from each column to the goal, m.
 
-    Dijkstra's algorithm (1959) over steps to the eight neighbours. A step that is free in no layer has
-    `CLOSED_LENGTH_FACTOR` times its length.
+    Dijkstra's algorithm (1959) over steps to the eight neighbours, on the map. A step that is free of violations in at
+    least one layer counts with its length, other steps with `CLOSED_LENGTH_FACTOR` times their length.
+
+    Returns (along x across,): one length for each column.
     """
     limits = precompute_limits(data)
     distances, start, end = np.full(lattice.along * lattice.across, np.inf), np.empty(3), np.empty(3)
@@ -283,18 +297,6 @@ def _distances_around_obstacles(data: ProblemArrays, frame: RotatedFrame, lattic
     return distances
 
 
-def _guiding_heuristic(data: ProblemArrays, frame: RotatedFrame, lattice: Lattice, layer_limits: Codes) -> Heuristic:
-    """Return the estimate of a guided search: around obstacles, and long enough to climb or descend.
-
-    layer_limits: (8, 2) maximum climb and descent of a step in layers.
-    """
-    step_lengths = lattice.step * np.hypot(_STEPS[:, 0], _STEPS[:, 1])
-    slopes = (layer_limits * lattice.layer_spacing / step_lengths[:, None]).max(axis=0)
-    climb_length, descent_length = (1.0 / slope if slope > 0.0 else 0.0 for slope in slopes)
-    distances = _distances_around_obstacles(data, frame, lattice)
-    return Heuristic(distances**2, climb_length, descent_length, GUIDED_WEIGHT)
-
-
 def begin_lattice_search(
     data: ProblemArrays, frame: RotatedFrame, lattice: Lattice, *, is_guided: bool = False
 ) -> LatticeSearch:
@@ -303,11 +305,15 @@ def begin_lattice_search(
     is_guided: True for an estimate of the remaining length that knows obstacles and slopes.
     """
     layer_limits = _climb_layers(data, frame, lattice)
-    heuristic = (
-        _guiding_heuristic(data, frame, lattice, layer_limits)
-        if is_guided
-        else Heuristic(_straight_distances(frame, lattice), 0.0, 0.0, 1.0)
-    )
+    if is_guided:
+        # The path is long enough to climb or descend.
+        step_lengths = lattice.step * np.hypot(_STEPS[:, 0], _STEPS[:, 1])
+        slopes = (layer_limits * lattice.layer_spacing / step_lengths[:, None]).max(axis=0)
+        climb_length, descent_length = (1.0 / slope if slope > 0.0 else 0.0 for slope in slopes)
+        distances = _distances_around_obstacles(data, frame, lattice)
+        heuristic = Heuristic(distances**2, climb_length, descent_length, GUIDED_WEIGHT)
+    else:
+        heuristic = Heuristic(_straight_distances(frame, lattice), 0.0, 0.0, 1.0)
     state_count = lattice.along * lattice.across * lattice.layers * 8
     width = int(layer_limits.max(axis=0).sum()) + 1
     # Large arrays of zeros from NumPy take memory only where they are written to, mostly a small part.
@@ -325,7 +331,7 @@ def begin_lattice_search(
 
 @compiled
 def _start_states(data: ProblemArrays, frame: RotatedFrame, lattice: Lattice, table: _StateTable) -> Codes:
-    """Mark the states at the start as reached, at the prescribed course or on all courses; return them, (k,).
+    """Mark the states at the start as reached, on the prescribed course or on all; return them, (k,).
 
     frame: frame of the direct line.
     lattice: points of the lattice; a state is a point, a layer and one of eight courses.
@@ -352,7 +358,8 @@ def continue_lattice_search(
 
     max_turn: largest turn per step, in units of 45 degrees.
 
-    The search has failed if its open list is empty.
+    The search ends when the goal is reached on the prescribed course (`goal_state`), or in vain when the open list is
+    empty.
     """
     limits, table, expanded_count = precompute_limits(data), search.table, search.expanded_count
     goal_cell = (lattice.goal * lattice.across + lattice.right) * lattice.layers + lattice.goal_layer
@@ -419,7 +426,7 @@ def trace_route(parents: Numbers, goal_state: int, lattice: Lattice) -> Records:
 def simplify_route(data: ProblemArrays, points: Floats) -> Floats:
     """Reduce a route (k, 3) to few points (j, 3), by a greedy choice of long legs.
 
-    From each remaining point, the leg leads to the furthest point that it can reach without a violation.
+    From each remaining point, the next leg leads to the last point of the route that it can reach without a violation.
     """
     limits = precompute_limits(data)
     out = np.empty(points.shape)
@@ -531,15 +538,14 @@ def cheapest_lattice_route(
     *,
     is_guided: bool = False,
 ) -> tuple[Records, int]:
-    """Find the cheapest route over a lattice.
-
-    Return its `LATTICE_CELL` records and the number of expanded states.
+    """Find the cheapest route over a lattice; return its `LATTICE_CELL` records and the work.
 
     max_turn: largest turn per step, in units of 45 degrees.
     max_states: maximum number of expanded states.
     is_guided: as in `begin_lattice_search`.
 
-    There are no records if there is no route.
+    There are no records if no route is found with this number of states. A guided search may find a route that is not
+    the cheapest. The work is the number of expanded states.
     """
     search = begin_lattice_search(data, frame, lattice, is_guided=is_guided)
     while search.goal_state < 0 and len(search.states) and search.expanded_count < max_states:
@@ -588,9 +594,7 @@ def lattice_route(
 def ceiling_route(
     data: ProblemArrays, frame: RotatedFrame, step: float, depth: float, pause: Callable[[], None] = lambda: None
 ) -> Floats:
-    """Find a route at the altitude of the ceiling.
-
-    Return its world points (k, 3), m, or (0, 3) without a route.
+    """Find a route at the altitude of the ceiling; return its world points, (k, 3) m; k is 0 for none.
 
     step: spacing of the lattice, m.
     depth: depth to which the route may enter the missiles' spheres, m.

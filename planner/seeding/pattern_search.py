@@ -54,12 +54,19 @@ EVALUATIONS_PER_PAUSE = 150
 
 
 class _State(NamedTuple):
-    """State of a search; vectors are (d,).
+    """State of a pattern search; vectors are (d,).
 
-    best_vector, best_merit: vector with the lowest merit. feasible_vector, feasible_merit: best feasible vector; inf if
-    there is none. round_start: vector at the beginning of the round. steps: (k,) steps of the moves. move: next move of
-    the round. has_moved: True if a move was tried in the round. evaluations: number of evaluations. is_done: True if no
-    move is left.
+    The merit of a path is its length ratio plus a price for its violations; lower is better. In a round every move is
+    tried once.
+
+    best_vector, best_merit: vector with the lowest merit.
+    feasible_vector, feasible_merit: vector with the lowest merit among those without violations; inf if there is none.
+    round_start: vector at the beginning of the round.
+    steps: (k,) present size of each move, with its sign.
+    move: next move of the round.
+    has_moved: True if a move was tried in the round.
+    evaluations: number of evaluations.
+    is_done: True if all moves have become too small, or the maximum number of evaluations is reached.
     """
 
     best_vector: Floats
@@ -99,6 +106,9 @@ def search_patterns(
 ) -> tuple[Floats, int]:
     """Shorten a path of the rotated encoding; return vectors (k, d) and the number of evaluations.
 
+    Single waypoints and groups of neighbours are moved in turn, along one axis at a time. A move that lowers the merit
+    (the length ratio plus priced violations) is kept and becomes longer, otherwise it turns round and becomes shorter.
+
     vector: the path, (d,).
     evaluations: maximum number of evaluations.
     must_end: called after every `EVALUATIONS_PER_PAUSE` evaluations; if it returns True, the search ends with its
@@ -132,7 +142,7 @@ def search_patterns(
 
 
 def merits(scores: Floats) -> Floats:
-    """Return the merit of each row of scores (n, 8), (n,); a search minimises the merit.
+    """Return the merit of each row of scores (n, 8), (n,): length ratio plus priced violations.
 
     The columns of the scores are those of `planner.plan.Violation` and then of `planner.plan.Objective`.
     """
@@ -147,9 +157,10 @@ def merits(scores: Floats) -> Floats:
 
 @cache
 def _triangular_basis(inner_count: int) -> tuple[Floats, Ints]:
-    """Return moves of waypoints in the shape of triangles, (k, 3 inner_count), and their axes, (k,).
+    """Return the moves of a search, (k, 3 inner_count), and the axis of each, (k,).
 
-    The half-widths of the triangles are 1, 2, 4, ... waypoints.
+    A move displaces one waypoint by 1 and its neighbours by less, in the shape of a triangle with a half-width of 1, 2,
+    4, ... waypoints. The axis is 0 for along, 1 for across and 2 for up; along, only single waypoints are moved.
     """
     moves: list[Floats] = []
     axes: list[int] = []
@@ -171,7 +182,7 @@ def _triangular_basis(inner_count: int) -> tuple[Floats, Ints]:
 
 @inner
 def _make_candidate(data: ProblemArrays, waypoints: int) -> _Candidate:
-    """Make a candidate path with its ends set, and scratch memory to score the path."""
+    """Make a candidate path of a number of waypoints, with its ends set, and working memory to score it."""
     path = np.empty((waypoints, 3))
     copy_into(path[0], data.start)
     copy_into(path[-1], data.destination)
@@ -224,7 +235,10 @@ def _evaluate_merit(
 
 @inner
 def _merit_of_scores(violations: Record, objectives: Record) -> tuple[float, bool]:
-    """Return the merit of scores (length ratio plus priced violations), and True without violations."""
+    """Return the merit of a path (length ratio plus priced violations), and True if it has no violation.
+
+    violations, objectives: `VIOLATIONS` and `OBJECTIVES` records of the path.
+    """
     price, is_feasible = EXPOSURE_PRICE * objectives.kill_exposure, True
     if objectives.kill_exposure > 0.0:
         price += ANY_EXPOSURE_PRICE
@@ -292,10 +306,10 @@ def _continue_search(
     pause_count: int,
     max_evaluations: int,
 ) -> _State:
-    """Continue a search up to `pause_count` evaluations, or to its end at `max_evaluations`.
+    """Continue a search up to `pause_count` evaluations, or to its end; return its state.
 
-    moves, initial_steps: moves, (k, d), and their initial sizes, (k,).
-    frames, state: frame in which each waypoint moves, and state of the search, whose vectors are overwritten.
+    moves, initial_steps: (k, d) moves and (k,) their initial sizes; a move that fails is tried in the other direction.
+    state: its vectors are overwritten. The search ends at `max_evaluations`, or when all moves are too small.
     """
     best_vector, best_merit, feasible_vector, feasible_merit, round_start, steps, move, has_moved, evaluations, _ = (
         state

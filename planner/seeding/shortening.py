@@ -89,7 +89,10 @@ class Shortening(NamedTuple):
     """State of a shortening: path, active constraints, multipliers, and the work done.
 
     path: (w, 3) m.
-    rounds, models: number of rounds done and of models evaluated.
+    active: the constraints of the present round.
+    multipliers: (c,) one for each constraint; it grows while the constraint is violated.
+    rounds: number of rounds done. In a round the constraints and multipliers are fixed.
+    models: number of models evaluated; a model is the augmented Lagrangian of a path with its derivatives.
     corners_too: True to also constrain the height and slope of corners as they are flown.
     """
 
@@ -116,7 +119,14 @@ def begin_shortening(
 
 
 class _DescentScratch(NamedTuple):
-    """Scratch of a round's steps: corners (3,) of the box, model, matrix factor, step and trial path."""
+    """Box of the waypoints, and working memory of a round's steps.
+
+    min_corner, max_corner: (3,) corners of the box, m.
+    model: gradient and Hessian.
+    factor: Cholesky factor of the Hessian.
+    step: (n,) step of the coordinates of the inner waypoints, m.
+    trial: (w, 3) path after the step, m.
+    """
 
     min_corner: Floats
     max_corner: Floats
@@ -130,7 +140,10 @@ class _DescentScratch(NamedTuple):
 def continue_shortening(
     data: ProblemArrays, shortening: Shortening, extra_margin: float, max_rounds: int
 ) -> Shortening:
-    """Continue a shortening by up to `max_rounds` rounds; return its state."""
+    """Continue a shortening by up to `max_rounds` rounds, but not beyond `ROUND_COUNT`; return its state.
+
+    extra_margin: additional margin to spheres and ground, m.
+    """
     path, active, multipliers, round_number, models, corners_too = shortening
     limits, size = precompute_limits(data), 3 * (path.shape[0] - 2)
     descent = _DescentScratch(
@@ -168,6 +181,9 @@ def _descend(
     descent: _DescentScratch,
 ) -> int:
     """Minimise the augmented Lagrangian of a path (w, 3) in place; return the number of models evaluated.
+
+    Newton steps are taken; a step that does not lower the Lagrangian is halved several times. The descent ends after
+    some steps, after a very short step, or if no step is better.
 
     active: the active constraints and their coefficients.
     path: overwritten with the result, m.
@@ -232,7 +248,9 @@ def shorten_path(
     corners_too: bool = False,
     pause: Callable[[], None] = lambda: None,
 ) -> tuple[Floats, int]:
-    """Shorten a path (w, 3), or reduce its violations; return the path and the number of models evaluated.
+    """Shorten a path (w, 3), or reduce its violations or cost; return it and the number of evaluations.
+
+    The cost is that of `data.travel`: length, time or energy.
 
     extra_margin: additional margin to spheres and ground, m.
     corners_too: True to also constrain the height and slope of corners as they are flown, which is slower.

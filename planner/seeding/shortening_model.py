@@ -63,16 +63,17 @@ MAX_TURN_LENGTH_M = 1e4
 
 
 class ActiveConstraints(NamedTuple):
-    """Active constraints of a path of w waypoints, linearised at the path with which a round began.
+    """Constraints of a path of w waypoints, with coefficients that are fixed for a round.
 
-    pairs: (p, 2) leg and missile near it.
-    distances: (p,) required distance from the missile's centre, m.
+    pairs: (p, 2) indices of a leg and of a missile near it.
+    distances: (p,) required distance of the leg from the missile's centre, m.
     samples: number of ground samples on each leg.
-    low: (w - 1,) height required above the clearance, m.
+    low: (w - 1,) height that a leg requires in addition to the clearance, m.
     climb, dive: (w - 1,) tangents of the slope limits.
-    before, after: (w,) length of the legs (m) that a turn takes, divided by the tangent of half the turn.
+    before, after: (w,) lengths (m) that a turn takes of the legs before and after it, divided by the tangent of half
+    the turn.
     roll: (w - 1,) length of a leg taken by the roll between turns to opposite sides, m.
-    turns_in_legs: True if legs must hold their turns.
+    turns_in_legs: True if legs must be as long as their turns.
     turn_margin: length of a leg in addition to its turns, m.
     flown: the corners that are flown near the ground, or almost as steeply as can be.
     """
@@ -138,9 +139,13 @@ def active_constraints(
 def _fill_turn_lengths(
     data: ProblemArrays, limits: PrecomputedLimits, path: Floats, legs: Records, before: Floats, after: Floats
 ) -> None:
-    """Fill the length of legs that the turn at each waypoint takes up, before and after it, (w,) each.
+    """Fill `before` and `after` (w,): lengths of the legs that the turn at each waypoint takes up.
 
-    Each length (m) is divided by the tangent of half the turn.
+    Each length (m) is divided by the tangent of half the turn. The quotient changes little with the turn, so that it
+    can stay fixed in a round.
+
+    path: (w, 3) m.
+    legs: filled `LEG` records (w - 1,) of the path.
     """
     corners = np.zeros(1, dtype=CORNER)
     for i in range(path.shape[0]):
@@ -206,7 +211,10 @@ def _find_near_missiles(
 
 @inner
 def constraint_count(active: ActiveConstraints) -> int:
-    """Return the number of all constraints in `lagrangian`: of missiles, ground, slopes, turns and corners."""
+    """Return the number of all constraints in `lagrangian`.
+
+    Their order is: pairs of leg and missile, ground samples, slopes and lengths of legs, turns, and flown corners.
+    """
     legs = active.low.size
     return active.pairs.shape[0] + legs * (active.samples + 4) + (legs + 1) * (3 + SAMPLES_PER_CORNER)
 
@@ -217,7 +225,8 @@ def carry_multipliers(
 ) -> Floats:
     """Return the multipliers (c,) for a new set of active constraints, taken from the previous set.
 
-    A new pair of leg and missile gets the multiplier 0.
+    Only the pairs of leg and missile differ between the sets. A pair that is in both keeps its multiplier, a new pair
+    gets 0.
     """
     new_multipliers = np.zeros(constraint_count(next_active))
     pair_count = next_active.pairs.shape[0]
@@ -258,9 +267,11 @@ TURN_MARGIN_M = 1.0
 
 
 class LagrangianModel(NamedTuple):
-    """Gradient (n,), Hessian band (n, `HESSIAN_HALF_BANDWIDTH`) and derivatives (4, 3) of one constraint.
+    """Derivatives of the augmented Lagrangian by the n coordinates of the inner waypoints.
 
-    n: number of coordinates of the inner waypoints.
+    gradient: (n,).
+    band: (n, `HESSIAN_HALF_BANDWIDTH`) Hessian; [i, k] is the entry of row i and column i - k.
+    slopes: (4, 3) derivatives of the constraint that is added next: a row for each waypoint on which it depends.
     """
 
     gradient: Floats
@@ -303,7 +314,7 @@ def _add_constraint(
 
 @inner
 def _add_length(path: Floats, model: LagrangianModel) -> float:
-    """Add the path's length to the model, and return the length, m."""
+    """Add the derivatives of the path's length to the model, and return the length, m."""
     total, size, unit = 0.0, model.gradient.size, np.empty(3)
     for i in range(path.shape[0] - 1):
         length = 0.0
@@ -334,7 +345,7 @@ def _add_length(path: Floats, model: LagrangianModel) -> float:
 
 @inner
 def _add_travel_cost(data: ProblemArrays, path: Floats, model: LagrangianModel) -> float:
-    """Add the path's cost to the model, if it is not only the length; return the cost, m."""
+    """Add the derivatives of the path's cost in length, time and energy to the model; return the cost, m."""
     total, size, leg = 0.0, model.gradient.size, LegModel(np.zeros((2, 3)), np.zeros((2, 3, 2, 3)))
     for i in range(path.shape[0] - 1):
         total += model_leg(data.travel, data.aircraft, path[i], path[i + 1], leg)
@@ -504,9 +515,11 @@ def _add_slopes(
     model: LagrangianModel,
     first_number: int,
 ) -> float:
-    """Add the slope margins and the minimum lengths of legs; return their contribution to the merit.
+    """Add the limits on slopes and on lengths of legs; return their contribution to the merit.
 
-    A slope margin is expressed as a height (m), a length as the excess over the minimum (m).
+    A leg has three constraints on its climb, its descent and its length. The
+    value of a slope is the height that could
+    still be climbed or descended (m), that of a length is the excess over the minimum (m).
 
     path: (w, 3) m.
     multipliers: (c,) multipliers of all constraints.
@@ -548,10 +561,11 @@ def _add_turns(
     model: LagrangianModel,
     first_number: int,
 ) -> float:
-    """Add the turn margins and the lengths of legs between turns; return their contribution to the merit.
+    """Add the limits on turns, and on legs that hold them; return their contribution to the merit.
 
-    A turn margin is scaled to m. A length is the part of a leg that its turns, roll and settling leave over, m.
-    multipliers, values: (c,) multipliers and values of all constraints, of which these begin at `first_number`.
+    The value of a turn is the margin to its limit, scaled to m; that of a leg is the length, m, that remains.
+    path, penalty: (w, 3) m, and penalty factor, 1 / m. model: gradient and Hessian, to which the constraints are added.
+    multipliers, values: (c,) of all constraints; the values from `first_number` on are filled.
     """
     merit, slopes, count = 0.0, model.slopes, path.shape[0] - 1
     turn = np.zeros(count + 1)
@@ -601,10 +615,11 @@ def _add_turns(
 
 @inner
 def _add_turn_derivatives(before_derivatives: Floats, after_derivatives: Floats, factor: float, slopes: Floats) -> None:
-    """Add a multiple of a turn's derivatives to `slopes` (3, 3), the derivatives for three waypoints.
+    """Add a multiple of a turn's derivatives by its three waypoints to `slopes` (3, 3), a row for each.
 
     before_derivatives, after_derivatives: derivatives of the turn with respect to the leg before it and to the leg
-        after it, (2,).
+        after it, (2,): east and north. A waypoint changes the legs that end or begin at it.
+    factor: factor on the derivatives.
     """
     for axis in range(2):
         slopes[0, axis] -= factor * before_derivatives[axis]
@@ -623,10 +638,12 @@ def lagrangian(
     penalty: float,
     model: LagrangianModel,
 ) -> float:
-    """Return the augmented Lagrangian of a path (w, 3): its length or cost, m, plus terms of the constraints.
+    """Return the augmented Lagrangian of a path (w, 3), and fill its derivatives.
 
-    multipliers: multipliers of the constraints.
-    values: filled with the values of the constraints.
+    It is the length or cost of the path, m, plus a term for each constraint, which increases with its violation.
+
+    multipliers: (c,) multipliers of the constraints.
+    values: (c,) array to fill with the values of the constraints, in the order of `constraint_count`.
     penalty: weight of the squared violations, per m.
     model: filled with gradient and Hessian.
     """

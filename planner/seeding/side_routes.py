@@ -50,10 +50,14 @@ PASSING = np.dtype(
 
 
 class GridCosts(NamedTuple):
-    """Costs of the cheapest partial routes over a grid, (stages + 1, layers, across); inf above the bound.
+    """Costs of the cheapest routes from the start to each grid cell, and from there to the destination.
 
-    start_costs: costs from the start; parents: the previous cell, as layer x width + across.
-    goal_costs: costs to the destination; successors: the next cell.
+    All arrays are (stages + 1, layers, across). The cost is inf for a cell on no route within the bound.
+
+    start_costs: costs from the start, m.
+    parents: the previous cell on that route, as layer x width + across.
+    goal_costs: costs to the destination, m.
+    successors: the next cell on that route, as layer x width + across.
     """
 
     start_costs: Floats
@@ -81,7 +85,7 @@ def _relax_stage_back(
     costs: output, (layers, across): costs from the cells of this stage to the destination.
     successors: output, (layers, across): cells of the next stage to which the cheapest routes lead.
     spans: `SPAN` records (layers,) of this stage's cells whose cost is within the route-cost bound.
-    step_layers: `STEP_LAYERS` records (sideways, layers): steepest climb and descent from this stage.
+    step_layers: steepest climb and descent from this stage, as `layers_per_step` returns them.
     step: length of a step along the line, m.
     layer_spacing: m.
     ratio: spacing across as a fraction of a step.
@@ -122,6 +126,8 @@ def _drop_cells_above_bound(start_costs: Floats, goal_costs: Floats, spans: Reco
     """Set `goal_costs` to inf for the cells of a stage that are on no route within the bound.
 
     start_costs, goal_costs: (layers, across) costs from the start and to the destination.
+    spans: `SPAN` records (layers,) of the cells that the start can reach.
+    bound: upper limit on the cost of a whole route.
     """
     for z in range(start_costs.shape[0]):
         for y in range(spans[z].first, spans[z].last + 1):
@@ -130,8 +136,9 @@ def _drop_cells_above_bound(start_costs: Floats, goal_costs: Floats, spans: Reco
 
 
 class SideSearch(NamedTuple):
-    """Resumable search for the costs of partial routes, first from the start, then from the destination.
+    """Computation of `GridCosts` that can be continued after a pause: first forward, then backward.
 
+    step_layers: steepest climb and descent of a step, as `layers_per_step` returns them.
     cell_costs: cost per m of the cells, (stages + 1, layers, across). spans: `SPAN` records (stages + 1, layers) of the
     cells within the bound. stages_done: number of completed stages, forwards and then backwards; at the
     end twice the number of stages of the grid.
@@ -267,12 +274,13 @@ def passing_side(lateral_offset: float, vertical_offset: float) -> int:
 
 @compiled
 def cheapest_passings(costs: GridCosts, grid: Grid, obstacles: Records, step: float) -> Records:
-    """Return the cheapest route past each `OBSTACLE` on each side, as `PASSING` records (obstacles, 4).
+    """Find the cheapest route past each obstacle on each side: `PASSING` records (obstacles, 4).
 
     The sides are those of `passing_side`. A route passes an obstacle at the stage that is nearest to the obstacle's
     centre. An obstacle beyond the ends of the grid is not passed, and has the cost inf.
 
     costs: costs of the cheapest routes from the start to each cell, and from there to the destination.
+    obstacles: `OBSTACLE` records.
     step: length of a step along the line, m.
     """
     passings = np.zeros((obstacles.shape[0], 4), dtype=PASSING)
@@ -325,6 +333,7 @@ def sides_passed(points: Floats, obstacles: Records) -> Ints:
     """Return the side on which a route passes each obstacle, (k,); -1 for an obstacle beyond the route's ends.
 
     points: (s, 3) along, across, up, m.
+    obstacles: `OBSTACLE` records (k,).
 
     Two routes with the same sides can be deformed into each other without touching an obstacle. Routes with different
     sides are treated as different, although a route over a sphere on the ground could be moved to either side of it.
@@ -391,7 +400,7 @@ def closest_places(data: ProblemArrays, path: Floats, distance: float) -> Floats
 
     distance: required distance from the spheres, m.
 
-    There is one point per leg and sphere.
+    Each leg has at most one point for each sphere: the one that is closest to the sphere.
     """
     threats = data.threats[data.threats["kill_radius"] > 0.0]
     centres = np.column_stack([threats["east"], threats["north"], threats["up"]])

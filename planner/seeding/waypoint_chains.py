@@ -35,7 +35,13 @@ _CURSOR = np.dtype([(name, np.int64) for name in ("step", "waypoint", "candidate
 
 
 class _Sweeps(NamedTuple):
-    """Costs (w, k) of the best partial paths from both ends, and the neighbouring candidate of each."""
+    """Best partial paths to each of k candidates of w waypoints: from the start, and from the destination.
+
+    forward: (w, k) cost of the best path from the start to each candidate, m; inf if none is known.
+    before: (w, k) previous candidate on this path.
+    backward: (w, k) cost of the best path from each candidate to the destination, m.
+    after: (w, k) next candidate on this path.
+    """
 
     forward: Floats
     before: Ints
@@ -44,9 +50,9 @@ class _Sweeps(NamedTuple):
 
 
 class WaypointChains(NamedTuple):
-    """Best paths through candidates (w, k).
+    """Best path through each of k candidates of w waypoints.
 
-    cost: cost of the best path through each, in m of path; inf if none is within the bound.
+    cost: (w, k) cost of the best path through each candidate, in m of path; inf if none is within the bound.
     before, after: (w, k) previous and next candidate on that path.
     legs: number of legs evaluated.
     """
@@ -57,7 +63,7 @@ class WaypointChains(NamedTuple):
     legs: int
 
     def path_through(self, waypoint: int, candidate: int) -> Ints:
-        """Return the candidates of the best path through a candidate, (w,)."""
+        """Return which candidate of each waypoint the best path through a given candidate uses, (w,)."""
         out = np.empty(len(self.cost), dtype=np.int64)
         out[waypoint] = candidate
         for i in range(waypoint, 0, -1):
@@ -105,10 +111,14 @@ def _advance_sweeps(
 ) -> bool:
     """Continue both sweeps until `max_legs` legs are evaluated; return True if both are complete.
 
-    The forward sweep extends partial paths from the start. Then the backward sweep extends partial paths from the
-    destination.
+    The forward sweep extends partial paths from the start, waypoint by waypoint. Then the backward sweep extends
+    partial paths from the destination.
 
-    legs: (w - 1, k, k) costs of legs, filled when needed; a negative number -x means that x is a lower bound.
+    candidates: (w, k, 3) m.
+    legs: (w - 1, k, k) costs of legs: [i, j, m] is the leg from candidate j of waypoint i to candidate m of the next.
+        They are filled when needed: 0 is unknown, and a negative number -x means that the cost is at least x.
+    bound: upper limit on the cost of a path, m.
+    sweeps: costs and neighbours of the partial paths; updated.
     cursor: a `_CURSOR` record (1,), at which the sweeps continue.
     """
     count, width, _ = candidates.shape
@@ -159,6 +169,7 @@ def _costs_through(data: ProblemArrays, candidates: Floats, bound: float, sweeps
     The cost includes the turn at the candidate.
 
     candidates: (w, k, 3) k candidates of each waypoint, m.
+    bound: upper limit on the cost of a path, m.
     sweeps: costs of the best paths to and from each candidate, and the candidates before and after it on these paths.
     """
     limits, corners = precompute_limits(data), np.zeros(1, dtype=CORNER)
@@ -189,12 +200,12 @@ def _extend_paths(
     lower_bounds: Floats,
     corners: Records,
 ) -> int:
-    """Extend partial paths to candidate k of waypoint i; return the number of legs that were evaluated.
+    """Extend the best partial path to candidate k of waypoint i; return the number of legs evaluated.
 
-    step: 1 for paths from the start, -1 for paths from the destination.
-    cost, link: (w, k) cost and neighbouring candidate of each partial path.
-    max_cost: upper limit on the cost of a partial path.
-    legs, open_ends: costs of legs (-x: x is a lower bound), and candidates of the previous waypoint with partial paths.
+    step: 1 for paths from the start, -1 for paths from the destination. candidates: (w, k, 3) m.
+    cost, link: (w, k) cost and neighbouring candidate of each partial path; updated for the candidate.
+    max_cost: upper limit on the cost of a partial path. legs: costs of legs, as in `_advance_sweeps`; updated.
+    open_ends: candidates of the previous waypoint with a partial path. lower_bounds, corners: working memory.
     """
     previous, evaluated_count, point = i - step, 0, candidates[i, k]
     if not max_cost > 0.0 or open_ends.size == 0:
@@ -260,7 +271,7 @@ def _corner_cost(
     next_waypoint: Floats,
     corners: Records,
 ) -> float:
-    """Return the cost of a turn beyond the limit, and of legs that are too short for the turn, m of path.
+    """Return the cost of a turn that is too sharp, or whose legs are too short, m of path; else 0.
 
     previous_waypoint, waypoint, next_waypoint: (3,) m.
     corners: scratch, one `CORNER` record.

@@ -100,14 +100,15 @@ def _max_depth_below_leg(
     start_altitude: float,
     end_altitude: float,
 ) -> float:
-    """Return the largest distance of the aircraft below a long leg, m; negative if it stays above the leg.
+    """Return the largest distance of the aircraft below a long leg, m; negative if it flies above the leg.
 
     east, north: unit course of the leg.
     horizontal_length: m.
     start_altitude, end_altitude: m AMSL.
 
-    The altitude lags by the lag length times the slope. A leg with a smaller change of altitude than the step of the
-    tracking error is demanded at its final altitude from its start, so that the aircraft is low by the whole change.
+    The altitude lags by the lag length times the slope. On a leg with a smaller change of altitude than the step of the
+    tracking error, the final altitude is demanded from the start. The aircraft then flies at that altitude, and differs
+    from the leg by the whole change.
     """
     altitude_change = end_altitude - start_altitude
     if abs(altitude_change) < data.tracking.step:
@@ -120,7 +121,10 @@ def _max_depth_below_leg(
 def _choose_candidates(data: ProblemArrays, candidates: Floats) -> tuple[Ints, int]:
     """Choose one of the candidates (w, c, 3) of each waypoint, so that the sum of the leg costs is smallest.
 
-    Return the indices of the chosen candidates (w,) and the number of legs evaluated.
+    Dynamic programming, waypoint by waypoint: of all paths to a candidate only the cheapest is kept. The first
+    candidates of both ends are used.
+
+    Returns the indices of the chosen candidates (w,) and the number of legs evaluated.
     """
     count, width, _ = candidates.shape
     parents = np.zeros((count, width), dtype=np.int64)
@@ -160,8 +164,8 @@ class WaypointFit:
     """Effort of fitting waypoints to a route.
 
     candidates: number of candidates along each interval.
-    lifts: heights above the route, m.
-    rounds: number of moves of each waypoint.
+    lifts: heights above the route at which each candidate is tried, m.
+    rounds: number of times that every waypoint may move.
     diagonal: True if moves lead to all 26 neighbours, not just the 6 along the axes.
     """
 
@@ -187,9 +191,11 @@ _AXIS_NEIGHBOURS = _NEIGHBOURS[np.abs(_NEIGHBOURS).sum(axis=1) <= 1.0]
 def fit_waypoints(
     data: ProblemArrays, frame: RotatedFrame, route: Floats, waypoints: int, fit: WaypointFit = CLOSE_FIT
 ) -> Floats:
-    """Return waypoints along a route, one per interval of the rotated frame, (w, 3) m.
+    """Fit waypoints to a route, one per interval of the rotated frame; return the path, (w, 3) m.
 
     route: (s, 3) along, across and up in the frame, m.
+    waypoints: number w of waypoints.
+    fit: effort.
     """
     edges = np.linspace(0.0, frame.length, waypoints - 1)
     interval = edges[1] - edges[0]
@@ -225,7 +231,8 @@ def move_all_waypoints(
     """Shorten a path of the rotated encoding by moving all its waypoints at once.
 
     vector: the path, (d,).
-    scale: initial moves relative to `FIRST_MOVES`.
+    rounds: number of times that all waypoints may move.
+    scale: size of the first moves relative to `FIRST_MOVES`.
 
     Single legs are evaluated, turns are not. Returns the new vector and the equivalent number of path evaluations.
     """
@@ -247,9 +254,15 @@ def _move_waypoints(
     moves: Floats,
     shrink: float,
 ) -> tuple[Floats, int]:
-    """Move waypoints (w, 3) in their frames, in rounds of up to `moves` steps along, across and up.
+    """Move waypoints (w, 3) in their frames; return the moved waypoints and the number of legs evaluated.
 
-    Return the moved waypoints and the number of legs evaluated.
+    In each round every waypoint may take one of `steps`, and the combination with the lowest sum of leg costs is
+    chosen. The steps become smaller from round to round.
+
+    steps: (c, 3) directions in which a waypoint may move: -1, 0 or 1 along, across and up; (0, 0, 0) to stay.
+    rounds: number of rounds.
+    moves: (3,) length of the first steps along and across, as fractions of an interval, and up, m.
+    shrink: factor on the steps after each round.
     """
     legs = 0
     min_along, max_along = frames.edges[:-1, None], frames.edges[1:, None]
@@ -267,7 +280,10 @@ def _move_waypoints(
 
 
 def _pick_candidates(data: ProblemArrays, frames: WaypointFrames, candidates: Floats) -> tuple[Floats, int]:
-    """Return the best candidate of each waypoint in the waypoint's frame, (w, 3), and the number of legs evaluated.
+    """Return the chosen candidate of each waypoint in its frame, (w, 3), and the number of legs evaluated.
+
+    The sum of the costs of the legs between the chosen candidates is smallest.
+
 
     frames: origin and rotation of the frame in which each waypoint moves.
     candidates: (w, k, 3) candidates in these frames, m; the ends are overwritten with the fixed ends.

@@ -38,7 +38,7 @@ def test_an_error_is_one_line_and_its_code(
     def fail(_args: argparse.Namespace) -> int:
         raise met
 
-    monkeypatch.setitem(COMMANDS_BY_NAME, "scenarios", SimpleNamespace(load=lambda: fail))
+    monkeypatch.setitem(COMMANDS_BY_NAME, "scenarios", SimpleNamespace(run=fail))
     assert main(["scenarios"]) == code
     printed = capsys.readouterr()
     assert (printed.out, printed.err) == ("", line)
@@ -93,7 +93,7 @@ def test_an_error_of_planfly_itself_is_in_both_files(tmp_path: Path, monkeypatch
     def fail(_args: argparse.Namespace) -> int:
         raise ZeroDivisionError("float division by zero")
 
-    monkeypatch.setitem(COMMANDS_BY_NAME, "fly", SimpleNamespace(load=lambda: fail))
+    monkeypatch.setitem(COMMANDS_BY_NAME, "fly", SimpleNamespace(run=fail))
     answer, cases = tmp_path / "r.json", tmp_path / "r.xml"
     with pytest.raises(ZeroDivisionError):
         main(["fly", "well.waypoints", "--json", str(answer), "--junit", str(cases)])
@@ -157,7 +157,7 @@ def test_a_fault_of_our_own_is_not_hidden(monkeypatch: pytest.MonkeyPatch) -> No
     def fail(_args: argparse.Namespace) -> int:
         raise ZeroDivisionError
 
-    monkeypatch.setitem(COMMANDS_BY_NAME, "scenarios", SimpleNamespace(load=lambda: fail))
+    monkeypatch.setitem(COMMANDS_BY_NAME, "scenarios", SimpleNamespace(run=fail))
     with pytest.raises(ZeroDivisionError):
         main(["scenarios"])
 
@@ -171,7 +171,7 @@ def test_too_little_memory_is_one_line(
     def fail(*_: object) -> int:
         raise MemoryError(*([said] if said else []))
 
-    monkeypatch.setitem(COMMANDS_BY_NAME, "scenarios", SimpleNamespace(load=lambda: fail))
+    monkeypatch.setitem(COMMANDS_BY_NAME, "scenarios", SimpleNamespace(run=fail))
     assert main(["scenarios"]) == 1
     assert capsys.readouterr().err == f"planfly: too little memory{told}\n"
 
@@ -183,7 +183,7 @@ def test_the_commands_own_code_is_the_process_exit_code(monkeypatch: pytest.Monk
         taken.append(args.what)
         return 4
 
-    monkeypatch.setitem(COMMANDS_BY_NAME, "check", SimpleNamespace(load=lambda: run))
+    monkeypatch.setitem(COMMANDS_BY_NAME, "check", SimpleNamespace(run=run))
     assert main(["check", "m.plan"]) == 4
     assert taken == ["m.plan"]
 

@@ -39,7 +39,7 @@ def test_a_file_is_read_up_to_its_largest_size(tmp_path: Path, size: int, ok: bo
         return
     with pytest.raises(MissionError) as caught:
         read_small_file(file, 1000, "mission", MissionError)
-    assert str(caught.value) == f"{file}: 1,001 bytes: a mission file has at most 1,000"
+    assert str(caught.value) == f"{file}: 1,001 bytes: a mission file has at most 1,000 bytes"
 
 
 @pytest.mark.parametrize("name", ["pipe", "/dev/zero", "link"])
@@ -63,7 +63,7 @@ def test_a_pipe_of_the_shell_is_read_to_its_end(size: int, ok: bool) -> None:
         if ok:
             assert read_at_most(path, 1000, "mission") == b"x" * size
             return
-        with pytest.raises(ValueError, match="more than 1,000 bytes: a mission file has no more"):
+        with pytest.raises(ValueError, match="more than 1,000 bytes: a mission file has at most 1,000 bytes"):
             read_at_most(path, 1000, "mission")
     finally:
         os.close(ours)
@@ -130,7 +130,7 @@ def test_toml_is_a_table_or_one_line(tmp_path: Path) -> None:
         with pytest.raises(ValueError, match=said):
             read_toml(file, "gains")
     file.write_text("a = 1000000", encoding="utf-8")
-    with pytest.raises(ValueError, match="11 bytes: a gains file has at most 10"):
+    with pytest.raises(ValueError, match="11 bytes: a gains file has at most 10 bytes"):
         read_toml(file, "gains", max_bytes=10)
 
 

@@ -316,5 +316,5 @@ def test_zones_are_counted_with_those_that_are_there(scenario: Scenario, monkeyp
     tables = [ZoneTable(name="mill", kind="exclusion", east_m=9000.0, north_m=9000.0, radius_m=5.0)]
     two = with_zones(with_zones(scenario, tables, "a"), tables, "b")
     assert len(two.zones) == 2
-    with pytest.raises(ScenarioError, match="c: 1 zone more: at most 2 in all"):
+    with pytest.raises(ScenarioError, match="c: 1 zone cannot be added: a scenario has at most 2 zones"):
         with_zones(two, tables, "c")

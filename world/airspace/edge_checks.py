@@ -21,6 +21,8 @@ MAX_CROSSINGS = 50_000
 def check_edges(rings: Sequence[Sequence[Sequence[float]]], *, closed: bool = True) -> None:
     """Raise ValueError for outlines with too many corners, or with too many edges in one place.
 
+    Edges are in one place if their bounding boxes meet; the number of such pairs is limited.
+
     rings: corners (east, north) of each outline.
     closed: True for rings; False for lines, in which the last corner is not joined to the first.
 
@@ -36,7 +38,9 @@ def check_edges(rings: Sequence[Sequence[Sequence[float]]], *, closed: bool = Tr
     for first_row in range(0, corner_count, batch_size):
         pair_count += tree.query(edges[first_row : first_row + batch_size]).shape[1]
         if pair_count > MAX_EDGE_PAIRS:
-            raise ValueError(f"too many edges at the same place: at most {MAX_EDGE_PAIRS:,} pairs are allowed")
+            raise ValueError(
+                f"too many edges at the same place: at most {MAX_EDGE_PAIRS:,} pairs of neighbouring edges are allowed"
+            )
 
 
 def count_crossings(rings: Sequence[Sequence[Sequence[float]]], max_count: int, *, closed: bool = True) -> int:

@@ -62,7 +62,10 @@ def geopackage_features(path: Path, source: str) -> Iterator[tuple[str, dict[str
 
 
 def _crs_definition(database: sqlite3.Connection, system: int) -> str:
-    """Return the coordinate reference system of a table, as PROJ reads it; "" for WGS84 degrees."""
+    """Return the coordinate reference system of a table as a text that PROJ reads; "" for WGS84 degrees.
+
+    system: number of the reference system in the file. An unknown or undefined system is taken as WGS84 degrees.
+    """
     system_row = database.execute(
         "select organization, organization_coordsys_id, definition from gpkg_spatial_ref_sys where srs_id = ?", [system]
     ).fetchone()

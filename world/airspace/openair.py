@@ -129,6 +129,8 @@ def _clean_line(line: str) -> str:
 def _finish_block(block: _Block, source: str) -> tuple[str, dict[str, Any] | str]:
     """Return the location of an airspace in its file, and its [[zones]] entries or the reason why it is skipped.
 
+    It is skipped if it is open to all, or has neither a name nor limits nor a shape.
+
     Raises ScenarioError if the airspace does not have exactly one shape.
     """
     name = "".join(character for character in block.name if character.isprintable())[:80]
@@ -200,6 +202,8 @@ def _parse_limit(text: str, key: str) -> dict[str, Any] | None:
     """Convert the text of a limit to openAIP's form; return None for the ground or no limit.
 
     key: "lowerLimit" or "upperLimit".
+
+    Raises ValueError for any other text.
     """
     if text.upper() in ("GND", "SFC", "SURFACE", "0") and key == "lowerLimit":
         return None
@@ -216,7 +220,10 @@ def _parse_limit(text: str, key: str) -> dict[str, Any] | None:
 
 
 def _read_variable(block: _Block, text: str) -> None:
-    """Set a variable (V): the centre or direction of arcs and circles, or the width of an airway."""
+    """Set a variable (V): the centre or direction of arcs and circles, or the width of an airway.
+
+    Other variables are ignored. Raises ValueError for an invalid value.
+    """
     name, _, value = (part.strip() for part in text.partition("="))
     if name.upper() == "X":
         block.centre = _parse_position(value)

@@ -289,6 +289,7 @@ def _daily_period(start: datetime | None, end: datetime | None, schedule_entry: 
     """Convert one entry of a schedule (days of the week, and hours) to a period of activity.
 
     start, end: first and last time of the schedule; None if unknown.
+    schedule_entry: keys day, startTime and endTime, as the file states them.
 
     Hours that are stated by sunrise or sunset, or without a UTC offset, become the whole day.
     """

@@ -67,7 +67,19 @@ def zone_entries(properties: Mapping[str, Any], source: str) -> dict[str, Any]:
     {'kind': 'exclusion', 'ceiling_agl_m': 90.0}
     """
     entries: dict[str, Any] = {"kind": "exclusion"}
-    for key, value in {**_faa_limits(properties, source), **properties}.items():
+    # The FAA's properties LOWER_VAL, LOWER_UOM, LOWER_CODE (and UPPER) in openAIP's form.
+    faa_limits = {}
+    for limit_name, key in _FAA_LIMIT_KEYS.items():
+        if (value := properties.get(f"{limit_name}_VAL")) is None:
+            continue
+        try:
+            height = float(value)
+        except (TypeError, ValueError) as error:
+            raise ScenarioError.at(source, f"{limit_name}_VAL", value, "expected a number", shown="") from error
+        if height != _FAA_NOT_APPLICABLE:
+            unit, datum = properties.get(f"{limit_name}_UOM"), properties.get(f"{limit_name}_CODE")
+            faa_limits[key] = {"value": height, "unit": unit, "referenceDatum": datum}
+    for key, value in {**faa_limits, **properties}.items():
         if value is None:
             continue
         if key in _LIMITS:
@@ -115,29 +127,16 @@ def published_entries(limits: Mapping[str, Any], source: str) -> dict[str, Any]:
 
 
 def _comparable_limit(limit: Any) -> tuple[bool, float] | None:
-    """Return two values for a limit: True if it is a height above ground, and its value in m; None if invalid."""
+    """Return a limit in a form in which limits can be compared; None for an invalid limit.
+
+    The form is True for a height above ground, and the limit's value, m.
+    """
     if not isinstance(limit, dict):
         return None
     try:
         return _DATUMS[limit["referenceDatum"]] == "agl", round(limit["value"] * _UNITS[limit["unit"]], 3)
     except (KeyError, TypeError):
         return None
-
-
-def _faa_limits(properties: Mapping[str, Any], source: str) -> dict[str, Any]:
-    """Convert the limits in the FAA's properties (LOWER_VAL, LOWER_UOM, LOWER_CODE; UPPER) to openAIP's form."""
-    limits = {}
-    for limit_name, key in _FAA_LIMIT_KEYS.items():
-        if (value := properties.get(f"{limit_name}_VAL")) is None:
-            continue
-        try:
-            height = float(value)
-        except (TypeError, ValueError) as error:
-            raise ScenarioError.at(source, f"{limit_name}_VAL", value, "expected a number", shown="") from error
-        if height != _FAA_NOT_APPLICABLE:
-            unit, datum = properties.get(f"{limit_name}_UOM"), properties.get(f"{limit_name}_CODE")
-            limits[key] = {"value": height, "unit": unit, "referenceDatum": datum}
-    return limits
 
 
 def _limit_entry(value: Any, key: str, kind: Any, source: str) -> dict[str, float]:

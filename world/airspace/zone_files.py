@@ -115,7 +115,14 @@ def _geojson_zone(feature: Any, location: str, index: int, source: str) -> tuple
             coordinates, geometry_type = [coordinates], "MultiPolygon"
         if geometry_type == "MultiPolygon":
             parts = [[[_parse_corner(corner) for corner in ring] for ring in part] for part in coordinates]
-            _check_holes(parts, f"{source}: {label}")
+            place = f"{source}: {label}"
+            try:
+                is_inside = all(are_holes_inside(part) for part in parts if part)
+            except ValueError as error:
+                raise ScenarioError(f"{place}: coordinates: {error}", file=place, field="coordinates") from error
+            if not is_inside:
+                fault = f"{place}: coordinates: a hole lies outside its outline"
+                raise ScenarioError(fault, file=place, field="coordinates")
             rings = [[list(corner) for corner in ring] for part in parts for ring in part]
             return label, entries | {"rings_deg": rings}
     except (TypeError, ValueError, IndexError) as error:
@@ -125,20 +132,6 @@ def _geojson_zone(feature: Any, location: str, index: int, source: str) -> tuple
     allowed = "expected a Polygon, MultiPolygon or Point"
     message = f"{source}: {label}: geometry {json.dumps(geometry_type)[:40]}: {allowed}"
     raise ScenarioError(message, file=source, field="geometry", value=geometry_type, allowed=allowed)
-
-
-def _check_holes(parts: list[list[list[tuple[float, float]]]], source: str) -> None:
-    """Raise ScenarioError if a hole of a polygon lies outside its outline.
-
-    parts: polygons, each as rings of (latitude, longitude), the outline first.
-    """
-    try:
-        is_inside = all(are_holes_inside(part) for part in parts if part)
-    except ValueError as error:
-        raise ScenarioError(f"{source}: coordinates: {error}", file=source, field="coordinates") from error
-    if not is_inside:
-        message = f"{source}: coordinates: a hole lies outside its outline"
-        raise ScenarioError(message, file=source, field="coordinates")
 
 
 def _parse_corner(coordinates: Any) -> tuple[float, float]:
@@ -299,7 +292,7 @@ def _extended_data(placemark: _Element, source: str) -> dict[str, Any]:
 # ----------------------------------------------------------------------
 # Formats by suffix, and reading of files.
 
-# A function of a text and the file's name in messages.
+# A function of a file's text, and of the file's name in messages, that yields the zones.
 Reader = Callable[[str, str], Iterator[Found]]
 # Readers of text formats by suffix; a GeoPackage is not a text.
 FORMATS: dict[str, Reader] = {
@@ -392,11 +385,11 @@ def read_zone_file(path: Path, source: str, max_zones: int = MAX_ZONES) -> FileZ
             unrestricted_counts[entries] += 1
             continue
         if len(file_zones.zones) >= max_zones:
-            message = f"{source}: too many zones: at most {MAX_ZONES:,} in all files"
-            raise ScenarioError(message, file=source, field="zones", allowed=f"at most {MAX_ZONES:,}")
+            allowed = f"at most {MAX_ZONES:,} are allowed in all files together"
+            raise ScenarioError(f"{source}: too many zones: {allowed}", file=source, field="zones", allowed=allowed)
         corner_count += sum(map(len, entries.get("rings_deg", ())))
         if corner_count > MAX_FILE_CORNERS:
-            allowed = f"at most {MAX_FILE_CORNERS:,}"
+            allowed = f"at most {MAX_FILE_CORNERS:,} are allowed in one file"
             raise ScenarioError(f"{source}: too many corners: {allowed}", file=source, allowed=allowed)
         outline_notes, crossing_count = _repair_outline(
             entries, MAX_CROSSINGS - total_crossings, f"{source}: {location}"
@@ -416,7 +409,7 @@ def read_zone_file(path: Path, source: str, max_zones: int = MAX_ZONES) -> FileZ
         file_zones.notes.append(f"{source}: {subject} no flight: {reason}")
     for note_text, names in repaired_names.items():
         if names:
-            remainder = f", {len(names) - 5:,} more" if len(names) > 5 else ""
+            remainder = f" and {len(names) - 5:,} more" if len(names) > 5 else ""
             file_zones.notes.append(f"{source}: {note_text}: {', '.join(names[:5])}{remainder}")
     return file_zones
 
@@ -459,7 +452,7 @@ def _check_size(path: Path, source: str) -> None:
         raise ScenarioError(f"{source}: {missing_text(path)}", file=source)
     if path.stat().st_size > MAX_BYTES:
         raise ScenarioError(
-            f"{source}: {path.stat().st_size:,} bytes: a file of zones has at most {MAX_BYTES:,}", file=source
+            f"{source}: {path.stat().st_size:,} bytes: a file of zones has at most {MAX_BYTES:,} bytes", file=source
         )
 
 

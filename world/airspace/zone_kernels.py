@@ -50,7 +50,7 @@ class ZoneRecords(NamedTuple):
 
 
 def zone_records(zones: Sequence[Zone]) -> ZoneRecords:
-    """Convert zones to the records that kernels read.
+    """Convert zones to the records that kernels read: one per zone, and one per edge of all polygons.
 
     >>> records = zone_records([Zone("mast", "exclusion", Cylinder(0.0, 500.0, 200.0))])
     >>> float(records.zones[0].north), len(records.edges)
@@ -106,7 +106,12 @@ def _level_record(level: ZoneLevel | None, default_height: float) -> tuple[float
 
 @inlined
 def box_distance(records: ZoneRecords, z: int, west: float, east: float, south: float, north: float) -> float:
-    """Return the horizontal distance between a box on the map and the bounding box of zone z, m; 0 if they overlap."""
+    """Return the horizontal distance between a box on the map and the bounding box of zone z, m.
+
+    west, east, south, north: edges of the box, m.
+
+    The distance is 0 if the boxes overlap.
+    """
     zone = records.zones[z]
     east_gap = max(0.0, zone.west - east, west - zone.east)
     north_gap = max(0.0, zone.south - north, south - zone.north)

@@ -154,7 +154,10 @@ def is_active(times: Sequence[str], start: datetime, end: datetime) -> bool:
 
 
 def _may_overlap(period: Period, start: datetime, end: datetime) -> bool:
-    """Return True if a period may include a time from `start` to `end`, both included."""
+    """Return True if a period may include a time from `start` to `end`, both included.
+
+    Each day of this time is tested with the hours and the days of the week of the period.
+    """
     start = start if period.start is None else max(start, period.start)
     end = end if period.end is None else min(end, period.end)
     if start > end:

@@ -111,23 +111,28 @@ def make_polygon(rings: Sequence[Sequence[tuple[float, float]]]) -> Polygon:
         return Polygon((clean_rings[0] if shapes[0].exterior.is_ccw else clean_rings[0][::-1],))
     tree = shapely.STRtree(shapes)
     for first, second in tree.query(shapes, predicate="intersects").T:
-        if first < second and _do_rings_cross(shapes[first], shapes[second]):
+        # Rings may touch at a corner.
+        if first < second and (
+            shapes[first].overlaps(shapes[second])
+            or shapes[first].exterior.intersection(shapes[second].exterior).length > 0.0
+        ):
             raise ValueError("its rings cross each other, or share an edge")
     # Minus 1, as a ring is within itself.
     depths = [len(tree.query(shape, predicate="within")) - 1 for shape in shapes]
     _check_area(sum(shape.area * (1 if depth % 2 == 0 else -1) for shape, depth in zip(shapes, depths, strict=True)))
-    return Polygon(tuple(_orient_ring(ring, depth) for ring, depth in zip(clean_rings, depths, strict=True)))
+    # Corners are anticlockwise, but clockwise in a hole, which lies in an odd number of other rings.
+    return Polygon(
+        tuple(
+            ring if shapely.LinearRing(ring).is_ccw == (depth % 2 == 0) else ring[::-1]
+            for ring, depth in zip(clean_rings, depths, strict=True)
+        )
+    )
 
 
 def _check_area(area: float) -> None:
     """Raise ValueError for an area below the minimum."""
     if not area >= MIN_AREA:
         raise ValueError(f"nothing inside: {area:.3g} m2; at least {MIN_AREA:g} m2 are needed")
-
-
-def _do_rings_cross(first: shapely.Polygon, second: shapely.Polygon) -> bool:
-    """Return True if two rings cross or share a part of an edge; touching at a corner is allowed."""
-    return bool(first.overlaps(second)) or float(first.exterior.intersection(second.exterior).length) > 0.0
 
 
 def _clean_ring(ring: Sequence[tuple[float, float]]) -> Ring:
@@ -141,15 +146,6 @@ def _clean_ring(ring: Sequence[tuple[float, float]]) -> Ring:
     if len(distinct) < 3:
         raise ValueError(f"{len(distinct)} corners: at least three different ones are needed")
     return tuple(distinct)
-
-
-def _orient_ring(ring: Ring, depth: int) -> Ring:
-    """Return a ring with anticlockwise corners, or with clockwise corners if it bounds a hole.
-
-    depth: number of other rings that contain the ring; odd for a hole.
-    """
-    anticlockwise = shapely.LinearRing(ring).is_ccw
-    return ring if anticlockwise == (depth % 2 == 0) else ring[::-1]
 
 
 def make_cylinder(east: float, north: float, radius: float) -> Cylinder:

@@ -265,7 +265,10 @@ def zone_parts(zone: Zone) -> list[tuple[Floats, ...]]:
         return [zone_rings(zone)]
     rings = list(zip(zone_rings(zone), map(is_hole, zone.shape.rings), strict=True))
     # Smallest first: a hole belongs to the smallest outline around it.
-    outlines = sorted((ring for ring, is_ring_hole in rings if not is_ring_hole), key=_doubled_ring_area)
+    outlines = sorted(
+        (ring for ring, is_ring_hole in rings if not is_ring_hole),
+        key=lambda ring: abs(float((ring[:-1, 0] * ring[1:, 1] - ring[1:, 0] * ring[:-1, 1]).sum())),
+    )
     # The last corner of a closed ring repeats the first.
     shapes = zone_records(
         [
@@ -279,11 +282,6 @@ def zone_parts(zone: Zone) -> list[tuple[Floats, ...]]:
             enclosing_outlines = (k for k in range(len(outlines)) if edge_distance(shapes, k, *ring[0]) <= 0.0)
             parts[next(enclosing_outlines)].append(ring)
     return [tuple(part) for part in parts]
-
-
-def _doubled_ring_area(ring: Floats) -> float:
-    """Return twice the area of a closed ring, m^2."""
-    return abs(float((ring[:-1, 0] * ring[1:, 1] - ring[1:, 0] * ring[:-1, 1]).sum()))
 
 
 def level_heights(level: ZoneLevel | None, ground: Floats, default: float) -> Floats:

@@ -87,9 +87,10 @@ class Forecast:
         )
 
     def end_of_steps(self, departure: datetime) -> datetime:
-        """Return the last time of the forecast after a departure, before any step longer than `LONGEST_STEP`.
+        """Return the time up to which the wind after a departure can be interpolated.
 
-        The wind is not interpolated over a longer step.
+        It is the time before the first step longer than `LONGEST_STEP`, or the last time of the forecast if there is
+        no such step.
         """
         times = self.times[self.times >= departure.timestamp()]
         long_steps = np.flatnonzero(np.diff(times) > LONGEST_STEP.total_seconds())

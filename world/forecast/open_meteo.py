@@ -111,24 +111,15 @@ def _read_place(path: Path, entry: dict[str, Any], ground_amsl: float) -> _Place
     latitude = _number(path, entry, "latitude", -90.0, 90.0)
     longitude = _number(path, entry, "longitude", -180.0, 360.0)
     ground = _number(path, entry, "elevation", -500.0, 9000.0) if "elevation" in entry else ground_amsl
-    # Times of the hourly variables, s since 1970 in UTC.
-    values = hourly.get("time")
-    if not isinstance(values, list) or not values:
-        raise _fault(path, "hourly.time", "missing: a list of times is needed")
-    try:
-        if units.get("time") == "unixtime":
-            times = np.array([float(value) for value in values])
-        else:
-            zone = timezone(timedelta(seconds=_number(path, entry, "utc_offset_seconds", -86_399.0, 86_399.0, 0.0)))
-            read_times = [datetime.fromisoformat(value) for value in values]
-            times = np.array([(time if time.tzinfo else time.replace(tzinfo=zone)).timestamp() for time in read_times])
-    except (TypeError, ValueError, OverflowError, AttributeError):
-        raise _fault(path, "hourly.time", "allowed ISO 8601 times, or unixtime") from None
-    if not np.isfinite(times).all() or (np.diff(times) <= 0.0).any():
-        raise _fault(path, "hourly.time", "the times are not in ascending order")
+    times = _read_times(path, hourly, units, entry)
     all_levels = [_find_level(path, hourly, match) for name in hourly if (match := _SPEED_NAME.match(name)) is not None]
     # The values of a level that a model does not have are null at all times.
-    levels = [level for level in all_levels if not any(_is_null(hourly[name]) for name in level if name)]
+    null_names = {
+        name
+        for name, values in hourly.items()
+        if isinstance(values, list) and values and all(value is None for value in values)
+    }
+    levels = [level for level in all_levels if null_names.isdisjoint(filter(None, level))]
     if not levels:
         allowed = "no wind: wind_speed_10m and wind_direction_10m, or speed and direction of other levels, are needed"
         raise _fault(path, "hourly", allowed)
@@ -175,9 +166,23 @@ def _find_level(path: Path, hourly: dict[str, Any], match: re.Match[str]) -> tup
     return name, direction, height
 
 
-def _is_null(values: Any) -> bool:
-    """Return True if a variable is null at all times."""
-    return isinstance(values, list) and bool(values) and all(value is None for value in values)
+def _read_times(path: Path, hourly: dict[str, Any], units: dict[str, Any], entry: dict[str, Any]) -> Floats:
+    """Return the times of the hourly variables, (t,) s since 1970 in UTC."""
+    values = hourly.get("time")
+    if not isinstance(values, list) or not values:
+        raise _fault(path, "hourly.time", "missing: a list of times is needed")
+    try:
+        if units.get("time") == "unixtime":
+            times = np.array([float(value) for value in values])
+        else:
+            zone = timezone(timedelta(seconds=_number(path, entry, "utc_offset_seconds", -86_399.0, 86_399.0, 0.0)))
+            read_times = [datetime.fromisoformat(value) for value in values]
+            times = np.array([(time if time.tzinfo else time.replace(tzinfo=zone)).timestamp() for time in read_times])
+    except (TypeError, ValueError, OverflowError, AttributeError):
+        raise _fault(path, "hourly.time", "allowed ISO 8601 times, or unixtime") from None
+    if not np.isfinite(times).all() or (np.diff(times) <= 0.0).any():
+        raise _fault(path, "hourly.time", "the times are not in ascending order")
+    return times
 
 
 def _number(

@@ -170,7 +170,8 @@ class _ForecastReader:
         groups = [self._group(decoded, *pair) for pair in pairs]
         members = {len(group.velocities) for group in groups} - {1}
         if len(members) > 1:
-            raise self._error("members", f"{' and '.join(map(str, sorted(members)))}: allowed as many at all levels")
+            stated = " and ".join(map(str, sorted(members)))
+            raise self._error("members", f"{stated}: expected the same number of members at all levels")
         ground_source = ""
         if any(group.kind == "height" for group in groups):
             ground_source = "of the forecast's model" if self.ground is not None else "at the mission's start"
@@ -216,7 +217,7 @@ class _ForecastReader:
             if coordinate is None or (name != "valid_time" and coordinate.ndim == 0 and "step" in array.dims):
                 continue
             if coordinate.ndim > 1:
-                raise self._error(str(name), "several times of issue in one file: allowed one")
+                raise self._error(str(name), "several times of issue in one file: only one is allowed")
             seconds = (coordinate.values.reshape(-1) - np.datetime64(0, "s")) / np.timedelta64(1, "s")
             if not np.isfinite(seconds).all() or (np.diff(seconds) <= 0.0).any():
                 raise self._error(str(name), "the times are not in ascending order")
@@ -282,9 +283,9 @@ class _ForecastReader:
             ("longitude", wrapped_longitudes, self.box.west, self.box.east),
         ):
             if len(values) < 2:
-                raise self._error(name, "one node: allowed at least two nodes around the mission")
+                raise self._error(name, "one node: expected at least two nodes around the mission")
             if not np.isfinite(values).all() or (name == "latitude" and np.abs(values).max() > 90.0):
-                raise self._error(name, "not numbers of degrees")
+                raise self._error(name, "expected numbers of degrees")
             steps = np.diff(values)
             if name == "latitude" and not ((steps > 0.0).all() or (steps < 0.0).all()):
                 raise self._error(name, "neither ascending nor descending")
@@ -473,7 +474,7 @@ class _ForecastReader:
                 rises = np.diff(heights[..., np.argsort(-level[2])], axis=-1)
                 if (rises <= 0.0).any():
                     raise self._error(
-                        str(name), "the height of a pressure level is not above the height of a higher pressure"
+                        str(name), "the heights of its levels do not increase from high pressure to low pressure"
                     )
                 return heights
         raise self._error(
@@ -516,7 +517,7 @@ class _ForecastReader:
             nodes = near_nodes(latitude.values, longitude.values, self.latitudes, self.longitudes)
         array = array.isel(dict(zip(grid_dims, nodes, strict=True)))
         if array.size > MAX_NODES:
-            raise self._error(str(array.name), f"{array.size:,} values around the mission: allowed {MAX_NODES:,}")
+            raise self._error(str(array.name), f"{array.size:,} values around the mission: allowed up to {MAX_NODES:,}")
         array = _call_library(self.path, array.load)
         for dim, name in ((member_dim, "_member"), (time_dim, "_time"), (level_dim, "_level")):
             array = array.expand_dims(name) if dim is None else array.rename({dim: name})

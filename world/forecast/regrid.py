@@ -33,9 +33,11 @@ def regular_axes(latitudes: Floats, longitudes: Floats, box: Any) -> tuple[Float
 
 
 def near_nodes(latitudes: Floats, longitudes: Floats, rows: Floats, columns: Floats) -> tuple[Ints, Ints]:
-    """Return the indices of the rows and columns of a grid that surround a regular grid.
+    """Return the indices of the rows and columns of a projected grid that surround a regular grid.
 
-    latitudes, longitudes: (r, c) deg, of the nodes.
+    Nodes up to three steps outside the regular grid are included.
+
+    latitudes, longitudes: (r, c) deg, of the projected grid's nodes.
     rows, columns: (y,), (x,) deg, of the regular grid.
     """
     wrapped_longitudes = _near_longitudes(longitudes, columns[0], columns[-1])

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 # Height above the highest ground up to which the mean profile of a mission's wind is fitted, m.
 _CLEARANCE_M = 150.0
-# Greatest height above the start of ground that counts for this, m.
+# Ground higher above the start than this is treated as if it were this high, m: a mission does not climb over it.
 _MAX_CLIMB_M = 2000.0
 # Altitude above which the levels of a forecast are left out, m AMSL: the highest altitude of a scenario.
 MAX_AMSL_M = 9000.0
@@ -117,7 +117,7 @@ def forecast_wind(
     field = without_levels_above(forecast.field_from(departure, member), MAX_AMSL_M)
     if field.packed().size > MAX_FIELD_NUMBERS:
         shown = f"{field.packed().size:,} numbers for a flight"
-        raise ForecastError.at(file, "nodes", shown, f"allowed {MAX_FIELD_NUMBERS:,}: make its area smaller")
+        raise ForecastError.at(file, "nodes", shown, f"allowed up to {MAX_FIELD_NUMBERS:,}: make its area smaller")
     # A mission flies from its lower end to somewhat above the highest ground.
     highest = max(float(altitudes.max()), min(site.max_ground, reference + _MAX_CLIMB_M)) + _CLEARANCE_M
     place = float(latitudes[0]), float(longitudes[0])

@@ -121,9 +121,12 @@ class WindField:
 
 @inner
 def _bracket(field: Floats, start: int, count: int, value: float) -> tuple[int, float]:
-    """Return the index of the last node of an axis not above a value, and the fraction of the step to the next node.
+    """Find the two neighbouring nodes of an axis between which a value lies.
 
-    The axis is ``field[start : start + count]``, in ascending order. A value beyond an end is moved to that end.
+    Returns the index of the first of them, and the fraction of the step from it to the second. A value beyond an end is
+    moved to that end.
+
+    field: packed field; the axis is ``field[start : start + count]``, in ascending order.
     """
     low, high = 0, count - 1
     if high == 0 or value <= field[start]:
@@ -282,7 +285,7 @@ def without_levels_above(field: WindField, amsl: float) -> WindField:
 
 
 def fit_profile_line(heights: Floats, samples: Floats) -> MeanProfile:
-    """Return the straight mean profile through winds at several heights.
+    """Fit a mean profile, whose speed is linear in height, to winds at several heights.
 
     heights: (h,) m above the reference altitude.
     samples: (h, 2) m/s, east and north.

@@ -51,7 +51,7 @@ from flight.autopilots.parts import (
     TurnRules,
 )
 from flight.guidance.equivalent_airspeed import eas_to_tas_ratio
-from flight.mission.ground_phases import GroundPhases, TakeOff
+from flight.mission.ground_phases import GroundPhases
 from flight.mission.items import LANDINGS, Command
 from flight.mission.itinerary import Loiter
 from flight.mission.loiter_circles import LoiterRules
@@ -201,8 +201,18 @@ class ArduPlane(Autopilot):
         """ArduPlane's rules for mission commands, and checks by TERRAIN_ENABLE, MIS_OPTIONS, FENCE_OPTIONS and BATT_*.
 
         The checks list settings that the simulated ArduPlane ignores; the ArduPlane program itself uses some of them.
+
+        >>> default = ArduPilotParameters.defaults()
+        >>> [len(ArduPlane(default.changed(MIS_OPTIONS=bits)).checks.parameter_notes) for bits in (0, 1, 8)]
+        [0, 1, 0]
         """
-        parameters = self.parameters
+        parameters, mission_notes = self.parameters, list[str]()
+        if int(parameters["MIS_OPTIONS"]) & _CLEAR_AT_START:
+            # `AP_Mission::init`; a mission uploaded after the start is flown.
+            mission_notes.append(
+                f"MIS_OPTIONS {parameters['MIS_OPTIONS']:g} clears the mission each time ArduPlane starts: upload the"
+                " mission after the last power-up"
+            )
         return MissionChecks(
             dialect="ardupilot",
             resets_jump_counters=parameters.resets_jump_counters,
@@ -212,7 +222,7 @@ class ArduPlane(Autopilot):
             ),
             battery_failsafes=battery_failsafes(parameters),
             describe_unsimulated_settings=partial(self.describe_unsimulated_settings, by_program=False),
-            parameter_notes=(*parameters.notes, *_mission_notes(parameters)),
+            parameter_notes=(*parameters.notes, *mission_notes),
         )
 
     @property
@@ -583,7 +593,13 @@ class ArduPlaneFromGround:
             ground.home_up = take_off.home_altitude
             ground.takeoff_end_altitude = take_off.end_altitude
             ground.launch_up = take_off.home[2]
-            ground.takeoff_pitch, ground.leg = self._climb_pitch(take_off), take_off.waypoint
+            ground.takeoff_pitch, ground.leg = take_off.pitch, take_off.waypoint
+            # If the motor runs before the launch, TECS runs too. The launch then winds up the pitch integrator of TECS
+            # to the maximum pitch, as two flights of ArduPlane 4.6.3 showed. If the launch acceleration starts the
+            # motor, ArduPlane climbs with the item's pitch, as five flights showed.
+            if self.motor_start == -math.inf and take_off.acceleration > 0.0:
+                max_pitch = min(parameters.pitch_limit_max, parameters.tecs_pitch_max or math.inf)
+                ground.takeoff_pitch = max(take_off.pitch, max_pitch)
             # Time since the ground speed reached 5 m/s, from which on ArduPlane knows its course over the ground.
             acceleration = take_off.acceleration
             ground.time_at_course_speed = (
@@ -601,18 +617,6 @@ class ArduPlaneFromGround:
             ground.flares_by_demand = self.parameters.version != "4.6"
             ground.flare_height, ground.flare_distance = glide.flare_height, glide.flare_distance
             ground.airspeed = landing_airspeed(self.parameters, approach.tail_wind)
-
-    def _climb_pitch(self, take_off: TakeOff) -> float:
-        """Return the climb pitch of a take-off, rad: the pitch of the take-off item, or the maximum pitch.
-
-        If the motor runs before the launch, TECS runs too. The launch then winds up the pitch integrator of TECS to the
-        maximum pitch, as two flights of ArduPlane 4.6.3 showed. If the launch acceleration starts the motor, ArduPlane
-        climbs with the item's pitch, as five flights showed.
-        """
-        if self.motor_start > -math.inf or take_off.acceleration <= 0.0:
-            return take_off.pitch
-        parameters = self.parameters
-        return max(take_off.pitch, min(parameters.pitch_limit_max, parameters.tecs_pitch_max or math.inf))
 
 
 # On a field lower than home by more than this, m, the flare climbs ...
@@ -696,20 +700,3 @@ def _radius_growth(amsl: float) -> float:
     The ratio is the square of the ratio of true to equivalent airspeed.
     """
     return float(eas_to_tas_ratio(amsl)) ** 2
-
-
-def _mission_notes(parameters: ArduPilotParameters) -> list[str]:
-    """Return a note if ArduPlane clears its mission when it starts (`AP_Mission::init`).
-
-    The note says that a mission uploaded after the start is flown.
-
-    >>> default = ArduPilotParameters.defaults()
-    >>> [len(_mission_notes(default.changed(MIS_OPTIONS=bits))) for bits in (0, 1, 8)]
-    [0, 1, 0]
-    """
-    if not int(parameters["MIS_OPTIONS"]) & _CLEAR_AT_START:
-        return []
-    return [
-        f"MIS_OPTIONS {parameters['MIS_OPTIONS']:g} clears the mission each time ArduPlane starts: upload the mission"
-        " after the last power-up"
-    ]

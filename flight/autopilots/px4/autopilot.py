@@ -243,13 +243,32 @@ class Px4(Autopilot):
 
         >>> Px4(Px4Parameters.defaults()).checks.feasibility.requires
         2
+        >>> parameters = Px4Parameters.defaults().changed(COM_LOW_BAT_ACT=3.0, BAT1_CAPACITY=5000.0, BAT_CRIT_THR=0.1)
+        >>> Px4(parameters).checks.battery_failsafes[0].used_charge
+        4500.0
         """
-        parameters = self.parameters
+        parameters, battery_failsafes = self.parameters, tuple[BatteryFailsafe, ...]()
+        if parameters["COM_LOW_BAT_ACT"] in _LEAVE_AT_CRITICAL_CHARGE:
+            # The failsafe that ends a mission first; the PX4 program flies without it. COM_LOW_BAT_ACT sets PX4's
+            # reaction at both thresholds. `Battery::determineWarning` tests BAT_EMERGEN_THR first.
+            name = max("BAT_CRIT_THR", "BAT_EMERGEN_THR", key=lambda threshold_name: parameters[threshold_name])
+            threshold, capacity = parameters[name], parameters["BAT1_CAPACITY"]
+            # Without a capacity the charge is estimated from the voltage.
+            failsafe = BatteryFailsafe(name, threshold, remaining_fraction=threshold)
+            if capacity > 0.0:
+                failsafe = BatteryFailsafe(
+                    name,
+                    threshold,
+                    (1.0 - threshold) * capacity,
+                    capacity_parameter="BAT1_CAPACITY",
+                    capacity=capacity,
+                )
+            battery_failsafes = (failsafe,)
         is_stated = parameters.is_complete_set or "MIS_TKO_LAND_REQ" in parameters.by_origin("file")
         return MissionChecks(
             dialect="px4",
             feasibility=FeasibilityLimits(parameters["FW_LND_ANG"], int(parameters["MIS_TKO_LAND_REQ"]), is_stated),
-            battery_failsafes=self._battery_failsafes(),
+            battery_failsafes=battery_failsafes,
             return_time_failsafe=self._return_time_failsafe(),
             describe_unsimulated_settings=partial(self.describe_unsimulated_settings, by_program=False),
             parameter_notes=parameters.notes,
@@ -274,7 +293,19 @@ class Px4(Autopilot):
             for name, neutral in _NEUTRAL.items()
             if not neutral.lowest <= parameters[name] <= neutral.highest and not (by_program and neutral.by_program)
         ]
-        ending_texts += self._describe_endings(mission)
+        if mission.fence_at_home and parameters["GF_ACTION"] > 0.0:
+            # `GeofenceChecks::checkAndReport`.
+            home_text = f"prevents arming, because home is {mission.fence_at_home}"
+            ending_texts.append(f"GF_ACTION {parameters['GF_ACTION']:g} {home_text}")
+        if mission.has_fence and parameters["GF_PREDICT"] > 0.0 and parameters["GF_ACTION"] > _WARN_OF_FENCE:
+            ending_texts.append("GF_PREDICT 1 leaves the mission before its fence is reached, which is not simulated")
+        if parameters["CBRK_FLIGHTTERM"] != _NO_TERMINATION:
+            ending_texts += [
+                f"{name} {parameters[name]:g} terminates a flight at an angle that {limit} allows, which is not"
+                " simulated"
+                for name, limit in (("FD_FAIL_R", "FW_R_LIM"), ("FD_FAIL_P", "FW_P_LIM_MAX"))
+                if 0.0 < parameters[name] <= round(math.degrees(parameters[limit]), 6)
+            ]
         changing_texts += describe_open_settings(parameters, mission.aircraft, by_program=by_program)
         return [*ending_texts, *changing_texts, *([] if by_program else self._describe_mission_settings(mission))]
 
@@ -322,42 +353,6 @@ class Px4(Autopilot):
             yield "PX4 ignores a rally point within 10 m of home, but the simulated return goes to it"
         if parameters["RTL_LAND_DELAY"] >= 0.0:
             yield f"RTL_LAND_DELAY {parameters['RTL_LAND_DELAY']:g} lands after the return, which is not simulated"
-
-    def _describe_endings(self, mission: MissionParts) -> Iterator[str]:
-        """Describe settings with which PX4 may abort a mission in flight."""
-        parameters = self.parameters
-        if mission.fence_at_home and parameters["GF_ACTION"] > 0.0:
-            # `GeofenceChecks::checkAndReport`.
-            yield f"GF_ACTION {parameters['GF_ACTION']:g} prevents arming, because home is {mission.fence_at_home}"
-        if mission.has_fence and parameters["GF_PREDICT"] > 0.0 and parameters["GF_ACTION"] > _WARN_OF_FENCE:
-            yield "GF_PREDICT 1 leaves the mission before its fence is reached, which is not simulated"
-        if parameters["CBRK_FLIGHTTERM"] != _NO_TERMINATION:
-            limits = {"FD_FAIL_R": "FW_R_LIM", "FD_FAIL_P": "FW_P_LIM_MAX"}
-            for name, limit in limits.items():
-                if 0.0 < parameters[name] <= round(math.degrees(parameters[limit]), 6):
-                    allowed_text = f"an angle that {limit} allows"
-                    yield f"{name} {parameters[name]:g} terminates a flight at {allowed_text}, which is not simulated"
-
-    def _battery_failsafes(self) -> tuple[BatteryFailsafe, ...]:
-        """Return the battery failsafe that ends a mission first; the PX4 program flies without it.
-
-        COM_LOW_BAT_ACT sets PX4's reaction at BAT_CRIT_THR and at BAT_EMERGEN_THR. `Battery::determineWarning` tests
-        BAT_EMERGEN_THR first.
-
-        >>> parameters = Px4Parameters.defaults().changed(COM_LOW_BAT_ACT=3.0, BAT1_CAPACITY=5000.0, BAT_CRIT_THR=0.1)
-        >>> Px4(parameters).checks.battery_failsafes[0].used_charge
-        4500.0
-        """
-        parameters = self.parameters
-        if parameters["COM_LOW_BAT_ACT"] not in _LEAVE_AT_CRITICAL_CHARGE:
-            return ()
-        name = max("BAT_CRIT_THR", "BAT_EMERGEN_THR", key=lambda threshold_name: parameters[threshold_name])
-        threshold, capacity = parameters[name], parameters["BAT1_CAPACITY"]
-        if capacity > 0.0:
-            failsafe = BatteryFailsafe(name, threshold, (1.0 - threshold) * capacity)
-            return (failsafe._replace(capacity_parameter="BAT1_CAPACITY", capacity=capacity),)
-        # Without a capacity the charge is estimated from the voltage.
-        return (BatteryFailsafe(name, threshold, remaining_fraction=threshold),)
 
     def _return_time_failsafe(self) -> ReturnTimeFailsafe | None:
         """Return the failsafe on the remaining flight time (`rtlEstimateCheck`); None if PX4 does not react.

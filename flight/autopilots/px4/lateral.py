@@ -192,7 +192,8 @@ def guide_to_path(
 ) -> None:
     """Set ``memory.lateral_acceleration`` to join and follow a track (`guideToPath`).
 
-    The course points to the track far from it, and along it on the track. The acceleration turns the aircraft to it.
+    Far from the track the course points to it, on the track along it. The acceleration turns the aircraft to
+    this course.
 
     path_east, path_north, curvature: the track's nearest point, m, and curvature there, 1/m, positive to the right.
     tangent_east, tangent_north, wind_east, wind_north: unit vector along the track there; velocity of the air, m/s.

@@ -103,8 +103,12 @@ def navigate(
     """
     target_index = find_target(waypoints, memory)
     target = waypoints[target_index]
-    if target_index > memory.leg + 1 and _is_past_gate(estimated, waypoints[memory.leg + 1], target):
-        memory.leg += 1
+    if target_index > memory.leg + 1:
+        # A gate is passed in the vertical plane through it, perpendicular to the course from the gate to the target.
+        gate = waypoints[memory.leg + 1]
+        normal_east, normal_north = target.east - gate.east, target.north - gate.north
+        if (estimated.east - gate.east) * normal_east + (estimated.north - gate.north) * normal_north >= 0.0:
+            memory.leg += 1
     if target.is_rtl:
         # An RTL is one leg, which lasts until the flight ends.
         _navigate_rtl(estimated, target, wind_east, wind_north, target_airspeed, parameters, memory)
@@ -128,20 +132,6 @@ def find_target(waypoints: Records, memory: Record) -> int:
     while waypoints[target_index].is_gate:
         target_index += 1
     return target_index
-
-
-@inner
-def _is_past_gate(estimated: Record, gate: Record, target: Record) -> bool:
-    """Return True if the aircraft is past a gate.
-
-    It is past the gate if it has crossed the vertical plane through the gate that is perpendicular to the course from
-    the gate to the target.
-
-    estimated: estimated position and velocity over the ground, a `MOTION` record.
-    """
-    normal_east, normal_north = target.east - gate.east, target.north - gate.north
-    distance_past = (estimated.east - gate.east) * normal_east + (estimated.north - gate.north) * normal_north
-    return distance_past >= 0.0
 
 
 @inlined

@@ -76,7 +76,24 @@ def describe_open_settings(parameters: Px4Parameters, aircraft: Aircraft | None,
             if not any(first_function <= function <= last_function for function in functions):
                 yield f"the output functions (PWM_MAIN_FUNC1 and others) connect no {part}, which is not simulated"
     if not by_program:
-        yield from _describe_rate_gains(parameters, aircraft)
+        # Gains of the user's file that are too low or too high to control the attitude. The gains in the aircraft's
+        # file for ArduPlane, and PX4's defaults, are assumed to suit the aircraft.
+        has_aircraft_gains = aircraft is not None and (aircraft.folder / AIRCRAFT_FILE).exists()
+        aircraft_gains = rate_gains(aircraft) if aircraft is not None and has_aircraft_gains else {}
+        for axis, time_constant in (("FW_RR", "FW_R_TC"), ("FW_PR", "FW_P_TC")):
+            names = [f"{axis}_{gain}" for gain in ("FF", "P", "I", "D")]
+            if file_values.keys().isdisjoint((*names, time_constant)):
+                continue
+            default = parameters.table.by_name[names[0]].default
+            feed_forwards = (aircraft_gains.get(names[0]) or default, default)
+            fault = judge_rate_gains(
+                RateGains(*(parameters[name] for name in names)),
+                (min(feed_forwards), max(feed_forwards)),
+                parameters[time_constant],
+            )
+            if fault:
+                gains_text = ", ".join(f"{name} {parameters[name]:g}" for name in [*names, time_constant])
+                yield f"{gains_text}: these gains are {fault} to hold the attitude, which is not simulated"
 
 
 def _describe_control_allocation(parameters: Px4Parameters) -> Iterator[str]:
@@ -101,30 +118,6 @@ def _describe_control_allocation(parameters: Px4Parameters) -> Iterator[str]:
             }
             if moved_types.isdisjoint(types):
                 yield f"CA_SV_CS_COUNT {len(names)} and CA_SV_CS*_TYPE leave no {part}, which is not simulated"
-
-
-def _describe_rate_gains(parameters: Px4Parameters, aircraft: Aircraft | None) -> Iterator[str]:
-    """Describe gains of the user's file that are too low or too high to control the aircraft's attitude.
-
-    The gains in the aircraft's file for ArduPlane, and PX4's defaults, are assumed to suit the aircraft.
-    """
-    has_aircraft_gains = aircraft is not None and (aircraft.folder / AIRCRAFT_FILE).exists()
-    aircraft_gains = rate_gains(aircraft) if aircraft is not None and has_aircraft_gains else {}
-    file_values = parameters.by_origin("file")
-    for axis, time_constant in (("FW_RR", "FW_R_TC"), ("FW_PR", "FW_P_TC")):
-        names = [f"{axis}_{gain}" for gain in ("FF", "P", "I", "D")]
-        if file_values.keys().isdisjoint((*names, time_constant)):
-            continue
-        default = parameters.table.by_name[names[0]].default
-        feed_forwards = (aircraft_gains.get(names[0]) or default, default)
-        fault = judge_rate_gains(
-            RateGains(*(parameters[name] for name in names)),
-            (min(feed_forwards), max(feed_forwards)),
-            parameters[time_constant],
-        )
-        if fault:
-            gains_text = ", ".join(f"{name} {parameters[name]:g}" for name in [*names, time_constant])
-            yield f"{gains_text}: these gains are {fault} to hold the attitude, which is not simulated"
 
 
 def rate_gains(aircraft: Aircraft) -> dict[str, float]:

@@ -289,7 +289,23 @@ class SitlFlight(ProgramFlight):
             self._prepare_program()
         with self._name_program_in_errors(CrashError):
             if self._release is None:
-                self._fly_to_first_waypoint()
+                # Fly to the first waypoint in the mean wind, without turbulence and without ground. The run-in ends
+                # before the waypoint if a tick ends the flight, or at a timeout.
+                work, timing, steps = self._work, self._work.timing, self._steps
+                self._set_unit_factors()
+                tick = partial(autopilot_tick, self._workspace.block, Ground(None).heights)
+                loop = self._lockstep.make_loop(tick, steps, gusts=self._windy, ground=False)
+                saved_settings = work.wind.w20, work.settings.navigation_sigma
+                work.wind.w20 = work.settings.navigation_sigma = 0.0
+                for _ in range(round((2.0 * MIN_RUN_IN_TIME_S + _RUN_IN_TIMEOUT_S) / self.dt)):
+                    timing.row = 0
+                    if loop(1) or self.guidance_memory.distance >= 0.0:
+                        break
+                work.wind.w20, work.settings.navigation_sigma = saved_settings
+                timing.tick = timing.row = 0
+                work.air.energy = 0.0
+                self.guidance_memory.piece = 0
+                self._make_loop(autopilot_tick)
             else:
                 # The simulated motion starts at the end of the launch, or at rest on the runway.
                 self._set_unit_factors()
@@ -380,27 +396,6 @@ class SitlFlight(ProgramFlight):
         self._loop = self._lockstep.make_loop(
             tick_with_gnss_error, self._steps, gusts=self._windy, ground=self._ground.known
         )
-
-    def _fly_to_first_waypoint(self) -> None:
-        """Fly to the first waypoint in the mean wind, without turbulence and without ground.
-
-        The run-in ends before the waypoint if a tick ends the flight, or at a timeout.
-        """
-        work, timing, steps = self._work, self._work.timing, self._steps
-        self._set_unit_factors()
-        tick = partial(autopilot_tick, self._workspace.block, Ground(None).heights)
-        loop = self._lockstep.make_loop(tick, steps, gusts=self._windy, ground=False)
-        saved_settings = work.wind.w20, work.settings.navigation_sigma
-        work.wind.w20 = work.settings.navigation_sigma = 0.0
-        for _ in range(round((2.0 * MIN_RUN_IN_TIME_S + _RUN_IN_TIMEOUT_S) / self.dt)):
-            timing.row = 0
-            if loop(1) or self.guidance_memory.distance >= 0.0:
-                break
-        work.wind.w20, work.settings.navigation_sigma = saved_settings
-        timing.tick = timing.row = 0
-        work.air.energy = 0.0
-        self.guidance_memory.piece = 0
-        self._make_loop(autopilot_tick)
 
     def _tick(self, tick: "partial[int]", has_gnss_error: bool) -> int:
         """Run one tick; if there is a GNSS error, update the error of the next frames. Return the end code or 0."""

@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from flight.mission.ground_phases import GroundPhases
 from flight.mission.items import Command, Frame, Home, MissionItem, is_navigation, round_to_grid
 from flight.mission.itinerary import NO_ITEM, stated_loiter
 from flight.mission.route import Route, ends_at_plain_waypoint
@@ -54,7 +53,20 @@ def make_uploaded_mission(setup: FlightSetup) -> UploadedMission:
     A mission that begins and ends on the ground is uploaded unchanged.
     """
     if setup.ground_phases:
-        return _make_unchanged_mission(setup, setup.ground_phases)
+        # The mission as in its file; a home without an altitude gets the altitude of the ground.
+        home, mission = setup.mission.home, setup.mission
+        if home is None or setup.ground_phases.take_off is None or setup.ground_phases.approach is None:
+            raise ValueError("a mission from the ground to the ground needs a home, a take-off and a landing")
+        if math.isnan(home.alt):
+            home = replace(home, alt=setup.ground_phases.take_off.home_altitude)
+        unchanged_items = []
+        for item in mission.items:
+            p1, p2, p3, p4 = (0.0 if math.isnan(value) else value for value in item.params)
+            unchanged_items.append(replace(item, params=(p1, p2, p3, p4)))
+        last_number = next(
+            number for number, item in enumerate(unchanged_items, 1) if item.seq == setup.ground_phases.approach.item
+        )
+        return UploadedMission(home, _renumber(unchanged_items), mission.rally, last_number)
     route, origin = setup.route, setup.scenario.origin
     items: list[MissionItem] = []
     has_landing = route.rtl_start is not None and route.rtl_end <= route.legs
@@ -93,24 +105,6 @@ def make_uploaded_mission(setup: FlightSetup) -> UploadedMission:
         )
     )
     return UploadedMission(_home_for_upload(setup), _renumber(items), setup.mission.rally if has_landing else ())
-
-
-def _make_unchanged_mission(setup: FlightSetup, ground_phases: GroundPhases) -> UploadedMission:
-    """Return the mission as in its file; a home without an altitude gets the altitude of the ground.
-
-    Raises ValueError without a home, a take-off or a landing.
-    """
-    home, mission = setup.mission.home, setup.mission
-    if home is None or ground_phases.take_off is None or ground_phases.approach is None:
-        raise ValueError("a mission from the ground to the ground needs a home, a take-off and a landing")
-    if math.isnan(home.alt):
-        home = replace(home, alt=ground_phases.take_off.home_altitude)
-    items = []
-    for item in mission.items:
-        p1, p2, p3, p4 = (0.0 if math.isnan(value) else value for value in item.params)
-        items.append(replace(item, params=(p1, p2, p3, p4)))
-    last_number = next(number for number, item in enumerate(items, 1) if item.seq == ground_phases.approach.item)
-    return UploadedMission(home, _renumber(items), mission.rally, last_number)
 
 
 def _item_with_position(

@@ -122,7 +122,11 @@ def check_signs_and_units(log: ColumnLog) -> None:
     if log.has("yaw"):
         _check_heading(log, grid)
     if log.has("throttle", "current"):
-        _check_throttle(log, grid)
+        throttle, current = (_average_on_grid(log.series(name), grid) for name in ("throttle", "current"))
+        low, high = np.percentile(current, [5.0, 95.0]).tolist()
+        if np.ptp(throttle) < _MIN_THROTTLE_RANGE and high - low > _MIN_CURRENT_RANGE_A:
+            message = f"stays at {throttle[0]:.3g} in flight while the current goes from {low:.3g} to {high:.3g} A"
+            raise _make_contradiction_error(log, "throttle", message, "check the column")
     if log.has("airspeed"):
         _check_airspeed(log, grid)
     for pair in _list_pairs(log, grid):
@@ -429,15 +433,6 @@ def _read_mean_winds(log: ColumnLog, grid: Floats) -> Iterator[tuple[str, comple
             "wind_direction",
             complex(-np.mean(_average_on_grid(log.series("wind_speed"), grid) * np.exp(1j * origin))),
         )
-
-
-def _check_throttle(log: ColumnLog, grid: Floats) -> None:
-    """Raise LogError for a throttle that is constant in flight while the current changes."""
-    throttle, current = (_average_on_grid(log.series(name), grid) for name in ("throttle", "current"))
-    low, high = np.percentile(current, [5.0, 95.0]).tolist()
-    if np.ptp(throttle) < _MIN_THROTTLE_RANGE and high - low > _MIN_CURRENT_RANGE_A:
-        message = f"stays at {throttle[0]:.3g} in flight while the current goes from {low:.3g} to {high:.3g} A"
-        raise _make_contradiction_error(log, "throttle", message, "check the column")
 
 
 def _check_heading(log: ColumnLog, grid: Floats) -> None:

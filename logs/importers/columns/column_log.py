@@ -416,7 +416,15 @@ class ColumnLog:
         self._check_plausible(quantity, entry, values)
         time = self._align_times(entry.clock)
         if entry.rate is not None:
-            time, values = self._select_changes(quantity, entry, time, values)
+            # The measurements of a column that is written more often than it is measured are the rows in which its
+            # value changes.
+            is_changed: Flags = np.concatenate([[True], np.diff(values) != 0.0]) & np.isfinite(values)
+            rate = is_changed.sum() / max(1e-9, float(np.ptp(time)))
+            stated_rate = entry.rate or 0.0
+            if rate > _MAX_RATE_RATIO * stated_rate:
+                problem = f"the value changes {rate:.3g} times a second"
+                raise self._make_error(f"columns.{quantity}.rate", f"{stated_rate:g} Hz", problem)
+            time, values = time[is_changed], values[is_changed]
         if self.table.span_s is not None:
             start, end = self.table.span_s
             is_in_span = (time >= start) & (time <= end)
@@ -456,20 +464,6 @@ class ColumnLog:
         bounds = " to ".join(f"{(limit - zero) / factor:.4g}" for limit in (limits.low, limits.high))
         allowed = f"expected {bounds} {entry.unit}".rstrip()
         raise self._make_error(f"columns.{quantity}", f"{entry.column} has {shown}", f"{allowed}{hint}")
-
-    def _select_changes(self, quantity: str, entry: ColumnTable, time: Floats, values: Floats) -> tuple[Floats, Floats]:
-        """Return the times and values of the rows in which the value changes.
-
-        They are the measurements of a column that is written more often than it is measured.  Raises LogError if the
-        value changes more often than the rate that the table states for the column.
-        """
-        is_changed: Flags = np.concatenate([[True], np.diff(values) != 0.0]) & np.isfinite(values)
-        rate = is_changed.sum() / max(1e-9, float(np.ptp(time)))
-        stated_rate = entry.rate or 0.0
-        if rate > _MAX_RATE_RATIO * stated_rate:
-            allowed = f"the value changes {rate:.3g} times a second"
-            raise self._make_error(f"columns.{quantity}.rate", f"{stated_rate:g} Hz", allowed)
-        return time[is_changed], values[is_changed]
 
 
 def decode_cell(value: Any) -> str:

@@ -72,27 +72,22 @@ def _read_series(log: ColumnLog) -> Iterator[tuple[str, LogSeries]]:
     if len(air.wind.time):
         yield "wind", LogSeries(air.wind_source, air.wind.time, air.wind.values[:, ::-1])
     if log.has("current"):
-        yield "battery", _read_battery(log)
+        # The energy is NaN if the voltage is not logged.
+        if not log.has("voltage"):
+            current = join_series([log.series("current")])
+            battery_series = LogSeries(
+                "battery", current.time, np.column_stack([current.values, np.full(len(current.time), math.nan)])
+            )
+        else:
+            battery = join_series([log.series("current"), log.series("voltage")])
+            power = battery.values.prod(axis=1)
+            steps = np.diff(battery.time, prepend=battery.time[:1])
+            energy: Floats = np.cumsum(power * steps) / 3600.0
+            battery_series = LogSeries("battery", battery.time, np.column_stack([battery.values[:, 0], energy]))
+        yield "battery", battery_series
     if log.has("throttle"):
         throttle = join_series([log.series("throttle")])
         yield "throttle", LogSeries(log.column("throttle"), throttle.time, throttle.values)
-
-
-def _read_battery(log: ColumnLog) -> LogSeries:
-    """Return the current (A) and the energy taken from the battery (Wh), (n, 2).
-
-    The energy is NaN if the voltage is not logged.
-    """
-    if not log.has("voltage"):
-        current = join_series([log.series("current")])
-        return LogSeries(
-            "battery", current.time, np.column_stack([current.values, np.full(len(current.time), math.nan)])
-        )
-    battery = join_series([log.series("current"), log.series("voltage")])
-    power = battery.values.prod(axis=1)
-    steps = np.diff(battery.time, prepend=battery.time[:1])
-    energy: Floats = np.cumsum(power * steps) / 3600.0
-    return LogSeries("battery", battery.time, np.column_stack([battery.values[:, 0], energy]))
 
 
 def _read_missions(log: ColumnLog) -> Iterator[LoggedMission]:

@@ -119,7 +119,13 @@ class LogTable(_Table):
                 known = did_you_mean(quantity, QUANTITIES) or f": expected one of {', '.join(QUANTITIES)}"
                 raise ValueError(f"columns.{quantity}: unknown quantity{known}")
             for entry in entries:
-                self._check_entry(quantity, entry)
+                entry_field, known_quantity = f"columns.{quantity}", QUANTITIES[quantity]
+                if entry.unit or "" not in UNITS[known_quantity.dimension]:
+                    _check_choice(f"{entry_field}.unit", entry.unit, UNITS[known_quantity.dimension])
+                if entry.frame:
+                    _check_choice(f"{entry_field}.frame", entry.frame, known_quantity.frames)
+                if entry.value is None and entry.clock not in self.clocks:
+                    _check_choice(f"{entry_field}.clock", entry.clock, self.clocks)
         for name, clock in self.clocks.items():
             _check_choice(f"clocks.{name}.unit", clock.unit, UNITS["time"])
             if clock.column is None and clock.rate is None:
@@ -132,16 +138,6 @@ class LogTable(_Table):
         if self.span_s is not None and not self.span_s[0] < self.span_s[1]:
             raise ValueError(f"span_s: {list(self.span_s)}: expected a start before an end")
         return self
-
-    def _check_entry(self, quantity: str, entry: ColumnTable) -> None:
-        """Raise ValueError for an entry with an unknown unit, frame or clock."""
-        field, known = f"columns.{quantity}", QUANTITIES[quantity]
-        if entry.unit or "" not in UNITS[known.dimension]:
-            _check_choice(f"{field}.unit", entry.unit, UNITS[known.dimension])
-        if entry.frame:
-            _check_choice(f"{field}.frame", entry.frame, known.frames)
-        if entry.value is None and entry.clock not in self.clocks:
-            _check_choice(f"{field}.clock", entry.clock, self.clocks)
 
 
 def _check_choice(field: str, value: str, allowed: Iterable[str]) -> None:

@@ -100,7 +100,22 @@ def _read_csv(path: Path) -> DataFile:
     if rows and not any(_NUMBER.fullmatch(cell) for cell in rows[0][1].split(separator) if cell.strip()):
         cells = [cell.strip().strip('"[]()') for cell in rows.pop(0)[1].split(separator)]
         units = dict(zip(names, cells, strict=False))
-    _check_cell_counts(path, rows, separator, len(names))
+    width = len(names)
+    for number, line in rows:
+        cell_count = line.count(separator) + 1
+        # A separator at the end of each row adds an empty cell; quoted cells may contain separators.
+        if (
+            cell_count != width
+            and '"' not in line
+            and not (cell_count == width + 1 and line.rstrip().endswith(separator))
+        ):
+            allowed = f"expected {width}, as in the header"
+            raise LogError(
+                f"{path}: line {number}: {count_text(cell_count, 'cell')}: {allowed}",
+                file=path,
+                value=cell_count,
+                allowed=allowed,
+            )
     decimal = "," if separator == ";" and any("," in line for _, line in rows[:10]) else "."
     from io import StringIO
 
@@ -121,25 +136,6 @@ def _is_remark(line: str, next_lines: list[str]) -> bool:
     separator = max(_SEPARATORS, key=line.count)
     widths = [text.rstrip(f" {separator}").count(separator) for text in (line, *next_lines)]
     return widths[0] == 0 or widths[0] != widths[-1] or not next_lines
-
-
-def _check_cell_counts(path: Path, rows: list[tuple[int, str]], separator: str, width: int) -> None:
-    """Raise LogError if a row of a CSV file has another number of cells than the header.
-
-    rows: number and text of each line.
-    width: number of cells in the header.
-    """
-    for number, line in rows:
-        cells = line.count(separator) + 1
-        # A separator at the end of each row adds an empty cell; quoted cells may contain separators.
-        if cells != width and '"' not in line and not (cells == width + 1 and line.rstrip().endswith(separator)):
-            allowed = f"expected {width}, as in the header"
-            raise LogError(
-                f"{path}: line {number}: {count_text(cells, 'cell')}: {allowed}",
-                file=path,
-                value=cells,
-                allowed=allowed,
-            )
 
 
 def _convert_numbers(values: Column) -> Column:

@@ -323,7 +323,14 @@ def _guess_entry(quantity: str, column: str, clock: _Clock, values: Column, stat
     reason = f": largest value {np.abs(known).max():.4g}" + (
         f", named {stated_unit}" if stated_unit and unit == stated_unit else ""
     )
-    return _Guess(quantity, column, clock, unit, _guess_frame(quantity, column, known), reason)
+    if quantity == "airspeed":
+        frame = "true" if "tas" in column.lower() or "true" in column.lower() else "indicated"
+    elif quantity == "acceleration_down":
+        frame = "FLU" if float(np.median(known)) > 0.0 else "FRD"
+    else:
+        frames = QUANTITIES[quantity].frames
+        frame = frames[0] if frames else ""
+    return _Guess(quantity, column, clock, unit, frame, reason)
 
 
 def _find_plausible_unit(quantity: str, known: Floats) -> str | None:
@@ -345,41 +352,19 @@ def _find_plausible_unit(quantity: str, known: Floats) -> str | None:
     return None
 
 
-def _guess_frame(quantity: str, column: str, known: Floats) -> str:
-    """Guess the frame of a column from its name or the sign of its values.
-
-    Return "" for a quantity without frames.
-
-    known: finite values of the column.
-    """
-    if quantity == "airspeed":
-        return "true" if "tas" in column.lower() or "true" in column.lower() else "indicated"
-    if quantity == "acceleration_down":
-        return "FLU" if float(np.median(known)) > 0.0 else "FRD"
-    frames = QUANTITIES[quantity].frames
-    return frames[0] if frames else ""
-
-
-def _name_clocks(guesses: Sequence[_Guess]) -> dict[_Clock, str]:
-    """Return a name for each clock that the guesses use.
-
-    The clock with the most guesses is the main clock.
-    """
-    counts = Counter(guess.clock for guess in guesses)
-    names: dict[_Clock, str] = {}
-    for clock, _ in counts.most_common():
-        source_name = clock.prefix.rpartition(".")[2] or Path(clock.file).stem
-        name = re.sub(r"\W", "_", source_name) if names else MAIN_CLOCK
-        names[clock] = name if name not in names.values() else f"{name}_{len(names)}"
-    return names
-
-
 def _format_table(guesses: Sequence[_Guess], alternatives: Sequence[_Guess], files: dict[str, DataFile]) -> str:
     """Return the guessed table of columns as TOML, each guess with a remark.
 
     alternatives: columns for the guessed quantities on other clocks, used to align these clocks with the main clock.
     """
-    file, names = next(iter(files)), _name_clocks(guesses)
+    # The clock with the most guesses is the main clock.
+    counts = Counter(guess.clock for guess in guesses)
+    names: dict[_Clock, str] = {}
+    for used_clock, _ in counts.most_common():
+        source_name = used_clock.prefix.rpartition(".")[2] or Path(used_clock.file).stem
+        name = re.sub(r"\W", "_", source_name) if names else MAIN_CLOCK
+        names[used_clock] = name if name not in names.values() else f"{name}_{len(names)}"
+    file = next(iter(files))
     lines = [*_HEAD, f'file = "{file}"', 'program = ""']
     main_clock = next(clock for clock, name in names.items() if name == MAIN_CLOCK)
     for clock, name in names.items():

@@ -1,4 +1,7 @@
-"""Find the legs of a route that were flown in each stretch of an imported log; a stretch may contain only some legs."""
+"""Find the legs of a route that were flown in each stretch of an imported log.
+
+A stretch is a part of the log in which the aircraft followed the mission; it may contain only some of the legs.
+"""
 
 from dataclasses import dataclass, replace
 
@@ -130,8 +133,8 @@ def rows_between(track: Track, start: float, end: float) -> Track:
 def identified_waypoints(requirements: RouteRequirements, aligned: AlignedTrack) -> NDArray[np.intp]:
     """Return the indices, in order, of the waypoints that the track passes closely enough to identify.
 
-    At the start and the end of the track, a waypoint must be within its fly-by offset plus a tolerance, or within the
-    corridor.
+    The track must come within `CAPTURE_RADIUS_M` of the place where the planned path passes the waypoint.  At the start
+    and the end of the track it must come closer: within the fly-by offset plus a tolerance, or within the corridor.
     """
     edge_distance = np.maximum(requirements.fly_by_offset + FINAL_WAYPOINT_TOLERANCE_M, requirements.setup.corridor)
     is_inner = (aligned.rows > 0) & (aligned.rows < len(aligned.track) - 1)

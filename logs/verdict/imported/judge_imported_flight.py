@@ -72,9 +72,18 @@ def imported_lines(
     )
     log_text = f"{imported_log.format} {imported_log.file}{start_time_text}"
     lines.append(f"{autopilot_line(conditions, is_flown=True)} ({log_text})")
+    # One line for each rule that has unjudged findings: their number, unless none was judged, and the first reason.
+    unjudged_lines = []
+    for rule in RULE_WORDS.values():
+        rule_findings = [finding for finding in findings if finding.rule == rule.name]
+        unjudged = [finding for finding in rule_findings if finding.ok is None]
+        if not unjudged:
+            continue
+        count_text = "" if len(unjudged) == len(rule_findings) else f" on {len(unjudged)} of {len(rule_findings)}"
+        unjudged_lines.append(f"Not judged: {rule.title}{count_text} ({unjudged[0].brief})")
     lines += [
         *_judged_lines(imported_log, flown_stretches, setup.route.leg_numbers.tolist()),
-        *_unjudged_lines(findings),
+        *unjudged_lines,
     ]
     lines += [line] if (line := corridor_line(setup, findings)) else []
     if imported_log.mission:
@@ -117,22 +126,6 @@ def _judged_lines(
         lines.append(
             f"Judged: {time_text}, legs {first} to {last}{partial_text}; leg {first} begins at {start_time:.1f} s"
         )
-    return lines
-
-
-def _unjudged_lines(findings: Sequence[Finding]) -> list[str]:
-    """Return one line for each rule that has unjudged findings: their number and the first reason.
-
-    The number is left out if none of the rule's findings was judged.
-    """
-    lines = []
-    for rule in RULE_WORDS.values():
-        rule_findings = [finding for finding in findings if finding.rule == rule.name]
-        unjudged = [finding for finding in rule_findings if finding.ok is None]
-        if not unjudged:
-            continue
-        count_text = "" if len(unjudged) == len(rule_findings) else f" on {len(unjudged)} of {len(rule_findings)}"
-        lines.append(f"Not judged: {rule.title}{count_text} ({unjudged[0].brief})")
     return lines
 
 
@@ -329,12 +322,6 @@ def _pauses_text(flown_stretches: Sequence[FlownLegs]) -> str:
     return f"not judged from {start:.1f} s to {end:.1f} s{others_text}, because the log has no rows there"
 
 
-def _stretch_times(legs: FlownLegs) -> tuple[float, float]:
-    """Return the times of the first and the last row on a stretch's legs, s."""
-    time = legs.aligned.track.time
-    return float(time[0]), float(time[-1])
-
-
 def _stretch_findings(setup: FlightSetup, legs: FlownLegs) -> list[Finding]:
     """Judge one stretch; its findings number legs and waypoints as in the whole route."""
     findings = []
@@ -348,15 +335,9 @@ def _stretch_findings(setup: FlightSetup, legs: FlownLegs) -> list[Finding]:
             index = place.index + legs.first
             renumbered = replace(checked_finding, place=replace(place, index=index))
         findings.append(renumbered)
-    return [*findings, *_findings_without_data(setup, {finding.rule for finding in findings})]
-
-
-def _findings_without_data(setup: FlightSetup, judged_rules: set[str]) -> list[Finding]:
-    """Return an unjudged finding for each rule for which the log lacks the data.
-
-    Rules without `LogNeeds.reports_missing` are left out.
-    """
-    findings = []
+    # An unjudged finding for each rule for which the log lacks the data, unless `LogNeeds.reports_missing` is False.
+    judged_rules = {finding.rule for finding in findings}
+    findings_without_data = []
     for rule in RULES.values():
         missing_quantities = [
             quantity
@@ -366,10 +347,10 @@ def _findings_without_data(setup: FlightSetup, judged_rules: set[str]) -> list[F
         margin = RULE_WORDS[rule.name].margin
         if rule.log.reports_missing and margin is not None and missing_quantities and rule.name not in judged_rules:
             reason = f"the log contains no {_QUANTITY_LABELS[missing_quantities[0]]}"
-            findings.append(
+            findings_without_data.append(
                 make_finding(rule.name, FLIGHT, ok=None, reason=reason, source="aircraft", unit=margin.unit)
             )
-    return findings
+    return [*findings, *findings_without_data]
 
 
 def _unjudge_without_data(setup: FlightSetup, legs: FlownLegs, finding: Finding) -> Finding:

@@ -49,7 +49,8 @@ class AcceptanceCondition:
 def acceptance_condition(requirements: RouteRequirements, waypoint: int) -> AcceptanceCondition:
     """Return the distance within which a waypoint is reached, and its source.
 
-    The radius of the mission item applies, or else the autopilot's radius.  ArduPlane turns to the next leg at
+    The radius of the mission item applies, or else the autopilot's radius, or for an autopilot that follows the path
+    the distance at which the path itself passes.  ArduPlane turns to the next leg at
     WP_RADIUS before a corner of 90 degrees or more, and at a fraction of WP_RADIUS before a gentler corner.  The full
     WP_RADIUS is allowed at the mission's end and where a return to launch begins.
     """
@@ -88,6 +89,7 @@ def corner_depths(requirements: RouteRequirements, leg: int) -> Floats:
 def corridor_limit(requirements: RouteRequirements, leg: int) -> tuple[float, str]:
     """Return the half width (m) of the corridor along a leg, and the name of its source.
 
+    The source is "scenario", "circle" (a loiter), "fly-by path" (the planned turns), "default" or "autopilot".
     Without a corridor in the scenario, the half width allows the planned turns at the leg's ends.  If the autopilot
     steers to the center of a loiter at the leg's end, the corridor includes the whole loiter and a turn back next to
     it.
@@ -152,10 +154,11 @@ def farthest_from_legs(points: Floats, legs: Floats) -> tuple[float, int]:
 
 
 def negligible_kink_distance(requirements: RouteRequirements, waypoint: int) -> float | None:
-    """Return the largest distance of a flyable shortcut from the waypoints that it omits, m.
+    """Return how far a shortcut past a waypoint passes from the waypoints that it omits, m.
 
-    The shortcut omits the waypoint and up to `KINK_WAYPOINT_COUNT` - 1 of its neighbours.  Return None if there is no
-    such shortcut.
+    An aircraft that cannot fly the corner at the waypoint as drawn can fly the shortcut instead.  The shortcut omits
+    the waypoint and up to `KINK_WAYPOINT_COUNT` - 1 of its neighbours; the distance is that of the farthest of them.
+    Return None if no shortcut is flyable.
     """
     for count in range(1, KINK_WAYPOINT_COUNT + 1):
         for first in range(max(1, waypoint - count + 1), min(waypoint, requirements.legs - count) + 1):
@@ -168,9 +171,8 @@ def negligible_kink_distance(requirements: RouteRequirements, waypoint: int) -> 
 
 
 def shortcut_distance(requirements: RouteRequirements, first: int, last: int) -> float | None:
-    """Return the distance of waypoints `first` to `last` from a straight path without them, m.
+    """Return the largest distance of waypoints `first` to `last` from a straight leg instead of them, m.
 
-    The distance is the largest one of these waypoints.
     Return None if the distance exceeds `KINK_FRACTION` of the corridor's half width, if a waypoint belongs to a loiter,
     if the path is vertical, or if there is no room for the turns at its ends.
     """
@@ -226,7 +228,7 @@ def _gap_has_room(requirements: RouteRequirements, first: int, last: int) -> boo
 
 
 def _turn_fits_alone(requirements: RouteRequirements, before: int, corner: int, after: int) -> bool:
-    """Return True if a turn between straight legs from and to two other waypoints fits these legs.
+    """Return True if the turn at `corner` fits the straight legs from `before` and to `after`.
 
     Neighbouring turns are ignored.  This necessary condition is ten times faster than the full check of
     `_gap_has_room`.  The first and the last waypoint of the route have no turn.
@@ -256,7 +258,7 @@ def _turn_fits_alone(requirements: RouteRequirements, before: int, corner: int, 
 
 
 def step_height(requirements: RouteRequirements, leg: int) -> float | None:
-    """Return the altitude change of a leg steeper than its limit, m, if it is negligible; otherwise None.
+    """Return the altitude change of a too steep leg, m, if the change is negligible; otherwise None.
 
     The change is positive for a climb and for a descent.
     A change up to `NEGLIGIBLE_STEP_M` is negligible.  If a sequence of legs around the leg is too steep overall, the

@@ -34,7 +34,9 @@ _MAX_LEVELS = 12
 def find_hazards(
     requirements: RouteRequirements, center: Floats, min_altitude: float, max_altitude: float, reach: float
 ) -> list[str]:
-    """Describe ground, missiles, zones and area edges within a distance of a center; [] without hazards.
+    """Describe the ground, missiles, zones and area edges that a flight around a center may meet.
+
+    Return [] if there are none.
 
     center: east and north, m, (2,).
     min_altitude, max_altitude: minimum and maximum altitude of the flight, m AMSL.
@@ -48,9 +50,22 @@ def find_hazards(
             for coordinate, (min_edge, max_edge) in zip(center, scenario.bounds, strict=True)
         )
         edge_hazards = ["the area's edge is in reach"] if edge_distance < reach - ROUNDING_M else []
+    # Missiles whose sphere overlaps the disc between the altitudes; the threats of a mission without a scenario are
+    # unknown.
+    missile_hazards = []
+    if not scenario.external:
+        threats = scenario.threats
+        for number, threat in enumerate(scenario.spec.threats):
+            radius, (east, north, up) = float(threats.kill_radius[number]), threats.position[number]
+            horizontal_distance = max(0.0, math.hypot(east - center[0], north - center[1]) - reach)
+            if (
+                radius > 0.0
+                and math.hypot(horizontal_distance, max(0.0, min_altitude - up, up - max_altitude)) <= radius
+            ):
+                missile_hazards.append(f"missile {threat_label(threat.name or '', number)} is in range")
     return [
         *_ground_hazards(requirements, center, min_altitude, max_altitude, reach),
-        *_missile_hazards(requirements, center, min_altitude, max_altitude, reach),
+        *missile_hazards,
         *_zone_hazards(requirements, center, min_altitude, max_altitude, reach),
         *edge_hazards,
     ]
@@ -108,27 +123,6 @@ def _ground_hazards(
         max_height = -float(np.nanmin(inverted_clearances, initial=math.inf))
         if max_height > limits.max_height_m + HEIGHT_TOLERANCE_M:
             hazards.append(f"the ground is {max_height:.0f} m below, more than the {limits.max_height_m:.0f} m allowed")
-    return hazards
-
-
-def _missile_hazards(
-    requirements: RouteRequirements, center: Floats, min_altitude: float, max_altitude: float, reach: float
-) -> list[str]:
-    """Describe the missiles whose sphere overlaps a disc between two altitudes (m AMSL).
-
-    The disc has the radius `reach`, m.
-    Return [] for a mission without a scenario, because its threats are unknown.
-    center: east and north, m, (2,).
-    """
-    scenario = requirements.setup.scenario
-    if scenario.external:
-        return []
-    threats, hazards = scenario.threats, []
-    for number, threat in enumerate(scenario.spec.threats):
-        radius, (east, north, up) = float(threats.kill_radius[number]), threats.position[number]
-        horizontal_distance = max(0.0, math.hypot(east - center[0], north - center[1]) - reach)
-        if radius > 0.0 and math.hypot(horizontal_distance, max(0.0, min_altitude - up, up - max_altitude)) <= radius:
-            hazards.append(f"missile {threat_label(threat.name or '', number)} is in range")
     return hazards
 
 

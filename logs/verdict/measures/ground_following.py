@@ -65,7 +65,9 @@ def demanded_altitudes(requirements: RouteRequirements, leg: int, positions: Flo
 
 
 def altitude_error(requirements: RouteRequirements, leg: int, position: Floats) -> float:
-    """Return the altitude above a leg's line, or above the altitude demanded over the ground that it follows, m.
+    """Return the altitude error of a position on a leg, m, positive above.
+
+    The demanded altitude lies on the straight line of the leg, or above the ground on a leg that follows the ground.
 
     position: east, north and up, m, (3,).
     """
@@ -77,7 +79,7 @@ def altitude_error(requirements: RouteRequirements, leg: int, position: Floats) 
 
 
 def steepest_ground(requirements: RouteRequirements, leg: int, limit: float) -> GroundSlope | None:
-    """Find the part of a ground-following leg on which an aircraft with a limited climb gets lowest.
+    """Find the part of a ground-following leg that rises most above a climb at the aircraft's limit.
 
     The ground is sampled in steps of `GROUND_STEP_M`, like ArduPlane's terrain data.  Return None if no part of the leg
     exceeds the limit, or if the ground or the limit is unknown.

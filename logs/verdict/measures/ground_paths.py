@@ -79,9 +79,10 @@ def min_path_clearance(terrain: Terrain, path: GroundPath) -> tuple[float, float
 
 
 def first_hazard_on_path(requirements: RouteRequirements, path: GroundPath) -> str:
-    """Return the name of the first missile sphere or zone that a path enters, or "" if it enters none.
+    """Return the name of a missile sphere or zone that a path enters, or "" if it enters none.
 
-    Ignore zones that contain the path's start, and inclusion zones with a floor.
+    If it enters several, the missile with the lowest number is named, or else the zone with the lowest number.  Ignore
+    zones that contain the path's start, and inclusion zones with a floor.
     """
     scenario, airspace = requirements.setup.scenario, requirements.airspace
     if not scenario.external:
@@ -138,10 +139,10 @@ def landing_item(setup: FlightSetup) -> tuple[int, MissionItem] | None:
 
 
 def first_landing_leg(setup: FlightSetup, landing: int, final_leg: int) -> int:
-    """Return the first leg of a landing sequence: from DO_LAND_START, or else the leg before the final approach.
+    """Return the first leg of a landing: from DO_LAND_START, or else the leg before the final approach.
 
     landing: number of the landing's item.
-    final_leg: index of the final approach.
+    final_leg: leg of the final approach.
     """
     starts = [item.seq for item in setup.mission.items if item.command == Command.DO_LAND_START and item.seq < landing]
     later_waypoints = np.flatnonzero(setup.route.items > max(starts)) if starts else np.zeros(0)

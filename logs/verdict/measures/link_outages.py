@@ -100,19 +100,15 @@ def link_along_path(
     times = np.linspace(time[0], time[-1], count)
     points = np.stack([np.interp(times, time, axis_positions) for axis_positions in positions.T], axis=1)
     path_link_points = link_points(link, terrain, antenna, points)
-    return LinkAlongPath(times, points, path_link_points, _find_outages(times, path_link_points.margin))
-
-
-def _find_outages(time: Floats, margin: Floats) -> tuple[Outage, ...]:
-    """Find the periods with a negative margin; margins are interpolated linearly between known values."""
+    # Periods with a negative margin; margins are interpolated linearly between known values.
     outages: list[Outage] = []
-    for k in range(len(time) - 1):
-        first, last = float(margin[k]), float(margin[k + 1])
+    for k in range(len(times) - 1):
+        first, last = float(path_link_points.margin[k]), float(path_link_points.margin[k + 1])
         if math.isnan(first) or math.isnan(last) or (first >= 0.0 and last >= 0.0):
             continue
-        duration = float(time[k + 1] - time[k])
-        start = float(time[k])
-        end = float(time[k + 1])
+        duration = float(times[k + 1] - times[k])
+        start = float(times[k])
+        end = float(times[k + 1])
         if first >= 0.0:
             start += duration * first / (first - last)
         elif last >= 0.0:
@@ -121,4 +117,4 @@ def _find_outages(time: Floats, margin: Floats) -> tuple[Outage, ...]:
             outages[-1] = Outage(outages[-1].start, end)
         else:
             outages.append(Outage(start, end))
-    return tuple(outages)
+    return LinkAlongPath(times, points, path_link_points, tuple(outages))

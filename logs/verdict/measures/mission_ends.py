@@ -63,7 +63,7 @@ def unjudged_return_text(setup: FlightSetup) -> str:
 
 
 def missing_home_text(setup: FlightSetup) -> str:
-    """Explain that a return after the last item is not judged for lack of a home; otherwise ""."""
+    """State that the return after the last item cannot be judged without a home; "" if none is missing."""
     if setup.mission.home is not None or not judges_return_after_last_item(setup):
         return ""
     return f"the mission has no home, to which {setup.autopilot.title} returns by itself after the last item"

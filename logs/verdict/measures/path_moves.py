@@ -67,8 +67,11 @@ def planned_moves(requirements: RouteRequirements, first: int = 0, last: int | N
 
 
 def path_moves(path: FlyByPath, speeds: Floats, first_leg: int, last_leg: int) -> Records:
-    """Return the moves of a fly-by path on some legs; the first move starts at time 0.
+    """Return the moves of all pieces of a fly-by path that touch some legs; they start at time 0.
 
+    A piece may also cover part of a neighbouring leg.
+
+    first_leg, last_leg: range of these legs.
     speeds: ground speed on each leg, m/s, (legs,).
     """
     nodes = path.nodes

@@ -88,7 +88,9 @@ def path_spheres(points: Floats, time: Floats, centres: Floats, radii: Floats, s
 
 @compiled
 def _sphere_visits(points: Floats, time: Floats, centres: Floats, radii: Floats, scales: Floats) -> SphereVisits:
-    """Measure the visits of a path to all spheres, block by block of its segments; see `path_spheres`.
+    """Measure the visits of a path to all spheres; see `path_spheres`.
+
+    The segments are checked block by block; a block whose bounding box is outside a sphere is skipped.
 
     points, time: positions, m, (n, 3), and times, s, (n,), of the path.
     centres, radii, scales: one entry per sphere, as in `path_spheres`; a sphere with radius 0 is skipped.
@@ -130,7 +132,7 @@ def _sphere_visits(points: Floats, time: Floats, centres: Floats, radii: Floats,
 
 @inner
 def _block_boxes(points: Floats) -> _Boxes:
-    """Return the bounding boxes of all blocks of segments."""
+    """Return the bounding box of each block of `_BLOCK_SEGMENTS` successive segments of a path (n, 3)."""
     segments = max(0, points.shape[0] - 1)
     count = -(-segments // _BLOCK_SEGMENTS)
     boxes = _Boxes(np.empty((count, 3)), np.empty((count, 3)), np.empty(count))
@@ -165,7 +167,7 @@ def _box_distances(boxes: _Boxes, block: int, centre: Floats) -> tuple[float, fl
 
 @inner
 def _update_closest(points: Floats, time: Floats, block: int, centre: Floats, m: int, visits: SphereVisits) -> None:
-    """Update the minimum distance from sphere `m` and the time of this minimum in `visits` with one block."""
+    """Update the closest approach to sphere `m` in `visits` with the segments of one block."""
     for k in range(block * _BLOCK_SEGMENTS, min(points.shape[0] - 1, (block + 1) * _BLOCK_SEGMENTS)):
         length_square = 0.0
         projection = 0.0

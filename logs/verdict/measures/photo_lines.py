@@ -148,8 +148,8 @@ def measure_line(
 ) -> LineMeasure | None:
     """Measure a photo line on a flown track; return None if it was not reached or has only one row.
 
-    The conditions of a usable photo are applied one after another.  A step of the line is lost by the first condition
-    that it does not meet.
+    The line is divided into steps of about `PHOTO_STEP_M`.  The conditions of a usable photo are applied to each step
+    one after another; the first condition that a step fails is the cause of its loss.
     """
     rows = _line_rows(requirements, aligned, survey, line)
     if rows is None:
@@ -266,6 +266,17 @@ def _switch_radii(
     return acceptance_condition(requirements, waypoint).radius
 
 
+def planned_switch_radius(requirements: RouteRequirements, waypoint: int) -> float:
+    """Return the distance before a waypoint at which the items after it switch the camera on the planned path, m."""
+    turns = requirements.setup.autopilot.turns
+    if turns.follows_path or _is_gate(requirements, waypoint):
+        return 0.0
+    if turns.radii_at is not None:
+        leg = max(0, waypoint - 1)
+        return float(turns.radii_at(requirements.ground_speed[leg : leg + 1])[0])
+    return acceptance_condition(requirements, waypoint).radius
+
+
 def _is_gate(requirements: RouteRequirements, waypoint: int) -> bool:
     """Return True if a waypoint of the route is a gate (CONDITION_GATE)."""
     seq = int(requirements.setup.route.items[waypoint])
@@ -312,6 +323,8 @@ def _count_photos(line: PhotoLine, is_taken: Flags, length: float, spacing: Floa
 
 def _photo_spacing(mission: Mission, photo_spacing: float, speeds: Floats) -> Floats:
     """Return the distance between photos that the camera achieves at each ground speed, m, (n,).
+
+    It is longer than the stated distance if the camera needs more time between two photos.
 
     photo_spacing: distance between photos that the items state, m.
     speeds: m/s, (n,).
@@ -576,6 +589,9 @@ def _with_side_overlap(
 ) -> OverlapMeasure:
     """Return a copy of the measure with the minimum side overlap, between photos of neighbouring lines.
 
+    All lines are projected onto the first line and divided into the same steps along it.  From one side of the survey
+    to the other, each line is compared at every step with the line that was last seen there.
+
     Two lines are neighbours if they run side by side, no other line lies between them (even one that was lost), and
     their distance is close to the survey's spacing.  A much larger distance spans a notch in the survey's area.
     """
@@ -587,12 +603,13 @@ def _with_side_overlap(
     length = max(float(along.max()) for along in end_distances) - min_along
     count = max(1, math.ceil(length / PHOTO_STEP_M))
     step_middles = (np.arange(count) + 0.5) * length / count
-    previous_line, lowest_overlap = np.full((4, count), np.nan), math.inf
+    # The line that was last seen at each step: offset (m), height above ground (m) and number.
+    previous_line, lowest_overlap = np.full((3, count), np.nan), math.inf
     for number in np.argsort(survey.offsets).tolist():
         strip, along = strips[number], end_distances[number] - min_along
         on_line = (step_middles >= along.min()) & (step_middles <= along.max())
-        this_line = np.full((4, count), np.nan)
-        this_line[3, on_line] = number
+        this_line = np.full((3, count), np.nan)
+        this_line[2, on_line] = number
         if strip is not None and strip.is_usable.any():
             point_along, across, _ = axis.project(strip.positions)
             is_forward = along[-1] >= along[0]
@@ -608,7 +625,7 @@ def _with_side_overlap(
                 this_line[row] = np.where(is_used, line_values, np.nan)
         gaps = np.abs(this_line[0] - previous_line[0])
         heights = 0.5 * (this_line[1] + previous_line[1])
-        previous_numbers = np.nan_to_num(previous_line[3], nan=number).astype(int)
+        previous_numbers = np.nan_to_num(previous_line[2], nan=number).astype(int)
         is_neighbor = (ranks[number] - ranks[previous_numbers] == 1) & (
             np.abs(offsets[number] - offsets[previous_numbers]) <= _MAX_NEIGHBOR_SPACINGS * survey.spacing
         )
@@ -617,7 +634,7 @@ def _with_side_overlap(
             lowest_index = int(np.nanargmin(overlaps))
             if overlaps[lowest_index] < lowest_overlap:
                 lowest_overlap = float(overlaps[lowest_index])
-                pair = (int(previous_line[3, lowest_index]), number)
+                pair = (int(previous_line[2, lowest_index]), number)
                 measure = replace(
                     measure,
                     side=max(0.0, lowest_overlap),

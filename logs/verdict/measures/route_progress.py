@@ -200,9 +200,11 @@ def rtl_arrival_circle(route: Route) -> tuple[Floats, float] | None:
 def _match_rows(track: Floats, samples: Floats, radii: Floats, capture: float, anywhere: bool) -> Numbers:
     """Match the rows of a track to the samples of a route, both in order, at the lowest total cost.
 
-    The cost of a row is min(distance, capture)^2.  The cost of a skipped sample is `_SKIP_FRACTION` of this cost plus
-    `_SKIP_DISTANCE_M`^2.  If several ends have the same cost, the earliest is taken.
-    A start at a later sample costs `_LATE_START_M`^2 for each sample before it.
+    Dynamic programming fills a table of rows and samples: a cell holds the lowest cost of all matches in which this row
+    is at this sample.  A match gets there from the sample before, stays at the sample, skips it, or starts there.  A
+    row costs min(distance, capture)^2.  A skipped sample costs `_SKIP_FRACTION` of this plus `_SKIP_DISTANCE_M`^2.  A
+    start at a later sample costs `_LATE_START_M`^2 for each sample before it.  If several ends have the same cost, the
+    earliest is taken.
 
     track: positions, m, (n, 2).
     samples, radii: route samples, m, (m, 2), and the radii within which they are reached, m, (m,).

@@ -142,7 +142,8 @@ class TurnRequirements:
     min_radius: (w,) m, radius of the arc at the bank limit.
     radius: (w,) m, radius of the arc that is flown: `min_radius`, or the radius of a loiter.
     length_before, length_after: (w,) m of leg that the turn uses on either side, inf for a U-turn.
-    reversal: (w - 1,) m of leg that the roll from a turn into one to the other side uses.
+    reversal: (w - 1,) m of leg on which the aircraft rolls from a turn to one side into a turn to the other side; 0 on
+        all other legs.
     limit: (w,) rad, the sharpest turn there that fits both legs next to the neighbouring turns.
     """
 
@@ -171,9 +172,9 @@ def leg_performance(limits: Limits, winds: Sequence[Wind] = ()) -> LegPerformanc
 def find_leg_winds(setup: FlightSetup, route: Route) -> tuple[Wind, ...]:
     """Return each leg's wind from a forecast, at the middle of the leg; () without a forecast.
 
-    The wind is taken at the time when the aircraft reaches the middle of the leg, without loiters. For this time the
-    legs before are flown at the ground speed in their wind, and the first half of the leg at its airspeed. In a head
-    wind that leaves less than 1 m/s of ground speed, the airspeed replaces the ground speed.
+    The wind is taken at the time when the aircraft reaches the middle of the leg, without loiters. This time
+    assumes that the legs before are flown at the ground speed in their wind, and the first half of the leg at its
+    airspeed. In a head wind that leaves less than 1 m/s of ground speed, the airspeed replaces the ground speed.
     """
     if setup.scenario.wind.field is None:
         return ()
@@ -359,8 +360,9 @@ class RouteRequirements:
     blend: (w,) m of leg beyond each turn on which the slope still changes.
     fly_by_offset: (w,) m by which the fly-by passes the waypoint.
     turn_limit: (w,) rad, as `TurnRequirements.limit`; inf if the envelope is omitted.
-    climb, dive: (w - 1,) rad over the ground, the minimum along the leg; inf if the envelope is omitted.
-    certain_climb, certain_dive: (w - 1,) the certain part of these limits if the aircraft model is uncertain.
+    climb, dive: (w - 1,) steepest climb and descent over the ground that the aircraft can fly everywhere on the leg,
+        rad; inf if the envelope is omitted.
+    certain_climb, certain_dive: (w - 1,) the same, lowered by the uncertainty of the aircraft's model.
     ground_speed: (w - 1,) m/s, NaN if the wind leaves no ground speed.
     possible_bank: largest bank limit that the aircraft may have, rad; the setup's bank limit unless it is a guess.
     possible_turn_limit, possible_min_radius: (w,) as `turn_limit` and `min_radius`, with this bank limit.
@@ -506,7 +508,14 @@ def route_requirements(setup: FlightSetup, *, envelope: bool = True) -> RouteReq
     certain_climb, certain_dive = climb, dive
     if certain_limits.envelope is not limits.envelope:
         certain_climb, certain_dive, _ = _leg_limits(route, leg_performance(certain_limits, winds), points, courses)
-    possible_turns, possible_bank = turns, _possible_bank(setup)
+    # The largest bank limit that may apply, rad: more than the setup's only if that is a guess.
+    setup_envelope, stated_bank = setup.envelope, setup.scenario.flight.max_bank_deg
+    if not setup_envelope.bank_guessed or setup.max_bank < setup_envelope.max_bank:
+        possible_bank = setup.max_bank
+    else:
+        other_limit = math.inf if stated_bank is None else math.radians(stated_bank)
+        possible_bank = min(POSSIBLE_BANK_RAD, setup.autopilot.turns.max_bank, other_limit)
+    possible_turns = turns
     if possible_bank > limits.max_bank:
         possible_limits = replace(limits, max_bank=possible_bank)
         possible_turns = turn_requirements(route, leg_performance(possible_limits, winds))
@@ -542,15 +551,6 @@ def route_requirements(setup: FlightSetup, *, envelope: bool = True) -> RouteReq
         airspace=judged_airspace(setup),
         surveys=judged_surveys(setup),
     )
-
-
-def _possible_bank(setup: FlightSetup) -> float:
-    """Return the largest bank limit that may apply, rad: more than the setup's only if that is a guess."""
-    envelope, stated_bank = setup.envelope, setup.scenario.flight.max_bank_deg
-    if not envelope.bank_guessed or setup.max_bank < envelope.max_bank:
-        return setup.max_bank
-    other_limit = math.inf if stated_bank is None else math.radians(stated_bank)
-    return min(POSSIBLE_BANK_RAD, setup.autopilot.turns.max_bank, other_limit)
 
 
 # Setups whose surveys were searched last, and these surveys, which several parts of one verdict need.
@@ -698,7 +698,7 @@ class SteepArc:
 
 
 def turn_limit(requirements: RouteRequirements, waypoint: int) -> tuple[float, str]:
-    """Return the turn limit at a waypoint (rad), the lower of scenario and aircraft, and its source."""
+    """Return the lower turn limit at a waypoint, the scenario's or the aircraft's (rad), and its source."""
     return tighter_turn_limit(requirements, waypoint, float(requirements.turn_limit[waypoint]))
 
 
@@ -719,7 +719,7 @@ def tighter_turn_limit(requirements: RouteRequirements, waypoint: int, aircraft_
 
 
 def slope_limits(requirements: RouteRequirements, leg: int) -> tuple[float, float]:
-    """Return the limits on climb and dive along a leg, rad, each the lower of scenario and aircraft."""
+    """Return the lower of the scenario's and the aircraft's limits on climb and dive along a leg, rad."""
     return (
         slope_limit(requirements, leg, is_climb=True)[0],
         slope_limit(requirements, leg, is_climb=False)[0],
@@ -744,7 +744,7 @@ class GroundSlopeLimit(NamedTuple):
     """Limit on the slope between the ground and a waypoint.
 
     limit: rad, positive.
-    certain: the certain part of the limit if the aircraft's model is uncertain, rad.
+    certain: the limit lowered by the uncertainty of the aircraft's model, rad.
     source: "scenario" or "aircraft".
     airspeed: true airspeed to which the limit applies, m/s.
     """

@@ -261,7 +261,14 @@ def _height_error(requirements: RouteRequirements, leg: int, position: Floats) -
     position: positions of the track on the leg, m, (n, 3).
     """
     if follows_ground(requirements, leg):
-        return _ground_following_error(requirements, leg, position), False
+        # Largest error from the demanded height above ground between the leg's turns; None if no row lies there over
+        # known ground.
+        distance_along, _ = project_onto_leg(requirements, leg, position)
+        span_start, span_end = straight_span(requirements, leg, 0.0)
+        straight_positions = position[(distance_along >= span_start) & (distance_along <= span_end)]
+        errors = straight_positions[:, 2] - demanded_altitudes(requirements, leg, straight_positions)
+        errors = errors[np.isfinite(errors)]
+        return float(errors[np.argmax(np.abs(errors))]) if errors.size else None, False
     distance_along, _ = project_onto_leg(requirements, leg, position)
     span_start, span_end = straight_span(requirements, leg, TURN_EXCLUSION_M, excludes_blends=True)
     is_inside = (distance_along >= span_start) & (distance_along <= span_end)
@@ -274,22 +281,6 @@ def _height_error(requirements: RouteRequirements, leg: int, position: Floats) -
     line_altitudes = requirements.points[leg, 2] + distance_along[is_inside] * math.tan(requirements.slopes[leg])
     height_errors = position[is_inside, 2] - line_altitudes
     return float(height_errors[np.argmax(np.abs(height_errors))]), is_short
-
-
-def _ground_following_error(requirements: RouteRequirements, leg: int, position: Floats) -> float | None:
-    """Return the largest error from a leg's demanded height above ground, m, with its sign.
-
-    Only the part between the leg's turns is measured.
-    Return None if no row lies between the turns over known ground.
-
-    position: positions of the track, m, (n, 3).
-    """
-    distance_along, _ = project_onto_leg(requirements, leg, position)
-    span_start, span_end = straight_span(requirements, leg, 0.0)
-    straight_positions = position[(distance_along >= span_start) & (distance_along <= span_end)]
-    errors = straight_positions[:, 2] - demanded_altitudes(requirements, leg, straight_positions)
-    errors = errors[np.isfinite(errors)]
-    return float(errors[np.argmax(np.abs(errors))]) if errors.size else None
 
 
 def steady_rows(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> slice:
@@ -314,7 +305,12 @@ def _saturation_times(
     commanded = float(requirements.route.leg_airspeeds[leg])
     error = track.airspeed[rows].astype(np.float64) - commanded
     # A gust along the track changes the airspeed but not the energy.  So the error in the mean wind counts, too.
-    gust_free_error = _speed_in_mean_wind(requirements, aligned, rows) - commanded
+    mean_wind = requirements.setup.scenario.wind_velocities(track.position[rows], track.time[rows])
+    east = track.velocity[rows, 0] - mean_wind[:, 0]
+    north = track.velocity[rows, 1] - mean_wind[:, 1]
+    gust_free_error = (
+        np.asarray(np.sqrt(east**2 + north**2 + track.velocity[rows, 2].astype(np.float64) ** 2)) - commanded
+    )
     row_count = max(1, round(SATURATED_TIME_S / tick))
     lift_gain = aligned.lift_gain[rows]
     speed_deficit = np.minimum(-error, -gust_free_error) - np.maximum(0.0, -lift_gain)
@@ -329,7 +325,8 @@ def _saturation_times(
 def _rows_at_limits(requirements: RouteRequirements, aligned: AlignedTrack, rows: slice) -> tuple[Flags, Flags]:
     """Return masks of the rows with full throttle and of the rows with idle throttle, (n,) each.
 
-    Full throttle means the autopilot's upper throttle limit.
+    Full throttle means the autopilot's upper throttle limit.  If the aircraft's motor does not brake, rows without
+    motor current also have idle throttle.
     """
     track = aligned.track
     throttle = track.controls[rows, THROTTLE]
@@ -415,15 +412,6 @@ def _fit_plane_at_origin(value: Floats, x: Floats, y: Floats, sample_count: floa
     return float(coefficients[0]), math.sqrt(
         float((residuals.var() + CLIMB_RATE_RESOLUTION_MPS**2) * inverse[0, 0]) / sample_count
     )
-
-
-def _speed_in_mean_wind(requirements: RouteRequirements, aligned: AlignedTrack, rows: slice) -> Floats:
-    """Return the airspeed calculated with the mean wind instead of the gusty wind, m/s."""
-    track = aligned.track
-    mean_wind = requirements.setup.scenario.wind_velocities(track.position[rows], track.time[rows])
-    east = track.velocity[rows, 0] - mean_wind[:, 0]
-    north = track.velocity[rows, 1] - mean_wind[:, 1]
-    return np.asarray(np.sqrt(east**2 + north**2 + track.velocity[rows, 2].astype(np.float64) ** 2))
 
 
 def _max_mean_in_mask(mask: NDArray[np.bool_], value: Floats, width: int) -> float:

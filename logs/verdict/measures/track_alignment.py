@@ -227,10 +227,10 @@ def _advance_last_leg(
     centers: Floats,
     arrival_radius: Floats,
 ) -> None:
-    """Move the start of the last leg in `rows` to the row in which the track entered the arrival circle.
+    """Move the row of the last passed waypoint back to the entry into its arrival circle, in place.
 
-    `rows` changes only if the track ends before the last passed waypoint, but inside its arrival circle.  The autopilot
-    is then already on the next leg.
+    This is done only if the track ends inside this circle, before the waypoint itself.  The autopilot is then already
+    on the next leg.
     """
     last_passed = int(np.flatnonzero(passed)[-1]) if passed.any() else 0
     if (
@@ -363,14 +363,13 @@ def airspeed_gain_in_rising_air(time: Floats, airspeed: Singles, vertical_wind: 
 def _match_chords(
     position: Floats, marks: Floats, first: RowNumbers, last: RowNumbers, step: int, capture: float
 ) -> tuple[RowNumbers, NDArray[np.bool_]]:
-    """Assign each mark to a chord of the track, which spans `step` rows; the chords are in order of time.
+    """Assign each mark, such as a waypoint, to a chord of the track, in order of time.
 
-    The assignment minimizes the sum of min(distance, capture)^2 by dynamic programming.  The earliest of equally good
-    assignments is taken.  Only the chords from `first` to `last` can capture a mark.
-    position: positions of the track, m, (t, 3).
-    marks: positions of the marks, m, (n, 3).
+    A chord is the straight line from a row of the track to the row `step` rows later.  Dynamic programming minimizes
+    the sum of min(distance, capture)^2.  The earliest of equally good assignments is taken.
+
+    position, marks: positions of the track, m, (t, 3), and of the marks, m, (n, 3).
     first, last: first and last chord that can capture each mark, (n,).
-    step: number of rows from one chord to the next.
     capture: distance within which a mark is captured, m.
 
     Return the chord of each mark, and a mask: True for each mark that is farther than `capture` from all rows of its
@@ -466,7 +465,7 @@ _END_DELAY_S = 2.0
 
 
 def flown_phases(whole_requirements: RouteRequirements, track: Track) -> tuple[RouteRequirements, AlignedTrack | None]:
-    """Return requirements and aligned track of a flight's part between take-off and landing.
+    """Return requirements and aligned track of the part of a flight between take-off and landing.
 
     The track is None if it has fewer than two usable rows.
     whole_requirements: requirements of the whole route, returned unchanged for a flight without ground phases.
@@ -499,7 +498,7 @@ def _takeoff_end_row(track: Track, procedures: GroundPhases) -> int:
 
 
 def takeoff_and_approach_rows(track: Track, procedures: GroundPhases) -> Flags:
-    """Return a mask (t,): True for the rows of the take-off, and for all rows from the start of the approach leg.
+    """Return a mask (t,): True for the rows of the take-off, and from the start of the approach leg on.
 
     A take-off or an approach that the flight does not simulate has no rows. The example's flight has neither:
 

@@ -99,7 +99,8 @@ def _corner_overshoot(
 ) -> tuple[float | None, float]:
     """Return the overshoot at a waypoint (m) and the overrun (m), as in `CornerPass`.
 
-    The overshoot is None if the aircraft was already beyond the next leg at the start; only then is there an overrun.
+    If the aircraft was already beyond the end of the next leg at time `start`, the overshoot is None, and the overrun
+    is its distance from that end.  Otherwise the overrun is 0.
 
     start, end: times of the closest approach to this waypoint and to the next waypoint, s.
     """
@@ -153,7 +154,10 @@ class TurnMeasure:
 
 
 def measure_turns(requirements: RouteRequirements, aligned: AlignedTrack) -> list[TurnMeasure]:
-    """Measure the turn at every inner waypoint, in order."""
+    """Measure the turn at every inner waypoint, in order.
+
+    In an imported flight, overshoot and minimum distance are those of the corner (`CornerPass`).
+    """
     measures = [measure_turn(requirements, aligned, waypoint) for waypoint in range(1, requirements.legs)]
     if requirements.setup.imported_log is None:
         return measures
@@ -192,6 +196,11 @@ def measure_turn(requirements: RouteRequirements, aligned: AlignedTrack, waypoin
     is_watched = np.arange(position.shape[0]) <= max(exit_row, end_row)
     is_watched &= track.time[first : last + 1] <= track.time[first + exit_row] + SETTLING_WATCH_TIME_S
     course_change = abs(float(aligned.course[first + exit_row] - aligned.course[first + entry_row]))
+    time = aligned.track.time[first : first + end_row + 1]
+    start = int(np.searchsorted(time, time[-1] - 1.0))
+    rows = np.arange(start, end_row + 1)
+    rows = rows[distance_along[rows] >= requirements.length_after[waypoint]]
+    settled_distance = float(np.abs(lateral_offset[rows]).mean()) if rows.size else float(abs(lateral_offset[end_row]))
     return TurnMeasure(
         angle=angle,
         tolerance=tolerance,
@@ -207,9 +216,7 @@ def measure_turn(requirements: RouteRequirements, aligned: AlignedTrack, waypoin
             distance_along[is_watched],
             lateral_offset[is_watched],
         ),
-        settled_distance=_settled_distance(
-            requirements, aligned, waypoint, first, end_row, distance_along, lateral_offset
-        ),
+        settled_distance=settled_distance,
         min_distance=float(closest_approaches(position, requirements.points[waypoint])[0].min()),
         full_circles=max(0, round((course_change - abs(float(requirements.turns[waypoint]))) / (2.0 * math.pi))),
         is_complete=bool(aligned.passed[waypoint + 1] or end_row < last - first or exit_row < last - first),
@@ -292,25 +299,3 @@ def _arc_overshoot(
     center_offset = position[is_in_arc, :2] - center
     distance_outside[is_in_arc] = np.hypot(center_offset[:, 0], center_offset[:, 1]) - requirements.radius[waypoint]
     return max(0.0, float(distance_outside.max())) if distance_outside.size else 0.0
-
-
-def _settled_distance(
-    requirements: RouteRequirements,
-    aligned: AlignedTrack,
-    waypoint: int,
-    first_row: int,
-    end_row: int,
-    distance_along: Floats,
-    lateral_offset: Floats,
-) -> float:
-    """Return the mean distance from the next leg's line in the last second before the next turn, m.
-
-    If this second has no row after the turn at a waypoint, return the distance in the last row.
-    """
-    time = aligned.track.time[first_row : first_row + end_row + 1]
-    start = int(np.searchsorted(time, time[-1] - 1.0))
-    rows = np.arange(start, end_row + 1)
-    rows = rows[distance_along[rows] >= requirements.length_after[waypoint]]
-    if rows.size:
-        return float(np.abs(lateral_offset[rows]).mean())
-    return float(abs(lateral_offset[end_row]))

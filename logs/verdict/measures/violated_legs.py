@@ -1,6 +1,6 @@
 """Find the legs on which a plan violates a threat, a zone or the area, or passes a missile's sphere closely.
 
-Findings name only the object.
+A finding names only the threat, the zone or the area, not the legs.
 """
 
 import math
@@ -42,9 +42,9 @@ def violated_legs(requirements: RouteRequirements, finding: Finding) -> tuple[in
 
 
 def legs_near_missiles(requirements: RouteRequirements, max_distance: float) -> dict[int, tuple[float, int]]:
-    """Return the legs of the planned path that pass a missile's sphere within `max_distance` (m).
+    """Find the legs of the planned path that pass a missile's sphere within `max_distance` (m).
 
-    The values are the leg's distance from the nearest sphere (m, negative inside), and the index of the threat.
+    Return, by leg, the distance from the nearest sphere (m, negative inside) and the index of its threat.
     """
     path, threats = requirements.path, requirements.setup.scenario.threats
     radii = threats.kill_radius

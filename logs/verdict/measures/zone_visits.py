@@ -46,7 +46,7 @@ PART = record_dtype(
 def distances_outside_zone(
     records: ZoneRecords, z: int, heights: Heights, to_pixel: PolyMapRecord, east: float, north: float, up: float
 ) -> tuple[float, float, int]:
-    """Return a position's distances outside zone `z`'s outline and altitude band, m, and the closest edge.
+    """Return how far a position is outside outline and altitude band of zone `z`, m, and the nearest edge.
 
     heights, to_pixel: terrain heights, m, and map from positions to their pixels.
     east, north, up: the position, m.
@@ -66,7 +66,9 @@ def violation_depth(exclusion: bool, outline_distance: float, band_distance: flo
 
     The depth is the shortest distance to the zone's limit, horizontally or vertically.  It is NaN if it depends on
     unknown ground.
-    outline_distance, band_distance: from `distances_outside_zone`.
+
+    exclusion: True for an exclusion zone, False for an inclusion zone.    outline_distance, band_distance: from
+    `distances_outside_zone`.
     """
     if band_distance != band_distance:
         # A position outside the zone's outline is outside the zone whatever the height of the ground.
@@ -102,6 +104,8 @@ def depth_bounds(
     """Return lower and upper bounds of the depth of a violation along one part of a move, m.
 
     The depth is the distance into an exclusion zone, or out of an inclusion zone; it is negative for a compliant point.
+    A distance changes by at most the length that is flown.  Along the part it is therefore at most half of (sum of the
+    distances at both ends + length), and at least half of (this sum - length).
 
     length: length of the part, m.
     height_change: largest change of the part's height relative to the zone's altitude band, m.
@@ -128,6 +132,8 @@ def max_violation_bound(records: ZoneRecords, z: int, move: Record, part: Record
     The bound is inf if the part turns by more than a radian.  It uses the edges nearest to the part's ends: on a
     straight line, the distance from an edge, or from the centre of a circle, is largest at an end.  An arc of less than
     a radian deviates from its chord by at most curvature x length^2 / 8.
+
+    length: length of the part, m.
     """
     zone = records.zones[z]
     chord_deviation: float = 0.125 * abs(move.curvature) * length * length
@@ -193,7 +199,7 @@ _MERGE_TIME_S = 1e-6
 
 
 def path_zones(moves: Records, records: ZoneRecords, terrain: Terrain | None) -> Records:
-    """Return the visits of a path to z zones, (z,) of dtype `VISIT`.
+    """Measure where and how deep a path violates each of z zones; return (z,) of dtype `VISIT`.
 
     moves: the path, (m,) of dtype `logs.verdict.measures.path_moves.MOVE`.
     terrain: None if unknown.
@@ -211,7 +217,7 @@ def path_zones(moves: Records, records: ZoneRecords, terrain: Terrain | None) ->
 def _visit_zones(
     moves: Records, records: ZoneRecords, heights: Heights, to_pixel: PolyMapRecord, spacing: float
 ) -> Records:
-    """Return the visits of a path to all zones, (z,) of dtype `VISIT`, computed for the nearest zone first.
+    """Return the visits of a path to all zones, (z,) of dtype `VISIT`; the nearest zone is visited first.
 
     For a zone that is certainly further away than the nearest zone, the depth is only an upper bound.
 
@@ -412,7 +418,7 @@ def _bisect_move(
 
 @inner
 def _is_unknown(exclusion: bool, part: Record) -> bool:
-    """Return True if the violation depth at both ends of a part of a move is unknown (NaN), as is the ground."""
+    """Return True if the violation depth is NaN at both ends of a part, because the ground is unknown."""
     start_depth = violation_depth(exclusion, part.outline_distance, part.band_distance)
     end_depth = violation_depth(exclusion, part.end_outline_distance, part.end_band_distance)
     return start_depth != start_depth and end_depth != end_depth
@@ -434,7 +440,11 @@ def _update_depth(move: Record, part: Record, exclusion: bool, visit: Record) ->
 
 @inner
 def _add_part(move: Record, part: Record, exclusion: bool, visit: Record) -> None:
-    """Add the violation in a part of a move to a visit.  The part crosses the zone's limit at most once."""
+    """Add the violation in a part of a move to a visit.
+
+    The part crosses the zone's limit at most once; the crossing is interpolated linearly between the depths at its
+    ends.
+    """
     start_depth = violation_depth(exclusion, part.outline_distance, part.band_distance)
     end_depth = violation_depth(exclusion, part.end_outline_distance, part.end_band_distance)
     if not (start_depth > 0.0 or end_depth > 0.0):

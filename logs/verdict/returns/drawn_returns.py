@@ -161,7 +161,11 @@ def worst_returns(world: ReturnWorld, starts: ReturnStarts, returns: Returns) ->
 
 
 def _marked_position(world: ReturnWorld, ret: SimulatedReturn, path: Floats) -> Floats:
-    """Return the position at which a return fails, m, (3,); if it is safe, its lowest position."""
+    """Return the position that a drawing marks on the path of a return, m, (3,).
+
+    It is the position nearest to an entered sphere, the lowest position, or the end of the path for a failure without
+    a place, such as a return that does not arrive.
+    """
     if ret.kind == "threat":
         distances = np.linalg.norm(path - world.environment.spheres[ret.threat], axis=1)
         return np.asarray(path[int(np.argmin(distances))])

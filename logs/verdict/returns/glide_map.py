@@ -507,7 +507,8 @@ def _step_start_altitude(
 ) -> float:
     """Return the minimum altitude at the start of a step that clears all crossed cells, m AMSL.
 
-    The result is NaN if the ground is unknown.
+    From the end of the step back to its start, the altitude is raised to the floor of each crossed cell and above the
+    kill spheres in it.  The result is NaN if the ground is unknown.
 
     floor, sphere_bottoms, sphere_tops: see `GlideMap`.
     crossed_cells, step: the cells of all steps, and the step; see `glide_steps`.
@@ -543,7 +544,7 @@ def _raise_above_spheres(altitude: float, bottom: float, top: float) -> float:
 
 @inner
 def _insert_into_band(cell: int, band: int, band_heads: Codes, links: Codes) -> None:
-    """Insert a cell at the head of a band."""
+    """Insert a cell at the head of the linked list of a band."""
     first = band_heads[band]
     links[cell, 0], links[cell, 1] = -1, first
     if first >= 0:
@@ -553,7 +554,7 @@ def _insert_into_band(cell: int, band: int, band_heads: Codes, links: Codes) -> 
 
 @inner
 def _remove_from_band(cell: int, band: int, band_heads: Codes, links: Codes) -> None:
-    """Remove a cell from a band if the band contains it."""
+    """Remove a cell from the linked list of a band, if the list contains it."""
     previous, next_cell = links[cell, 0], links[cell, 1]
     if previous >= 0:
         links[previous, 1] = next_cell

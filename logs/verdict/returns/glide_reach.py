@@ -89,6 +89,10 @@ def cell_position(grid: GlideMap, cell: int) -> tuple[float, float, float]:
     return (*grid.cell_center(row, column), float(grid.ground[row, column]))
 
 
+# After the reaction time the aircraft turns left or right, in steps of `_TURN_STEP_RAD`, until it heads along the path
+# that the glide map stores for its cell.  Its altitude there, less the minimum altitude of the cell, is the altitude
+# left; the better of the two turns counts.
+#
 # The starts are of dtype `flight.autopilots.simulated_returns.RETURN_START`.  spheres, radii: centres, m, (s, 3), and
 # radii, m, (s,), of the kill spheres.  floor: lowest altitude allowed in each cell, m.  min_altitude, destination,
 # next_step: see `GlideAltitudes`; step_records: step of each index in `next_step`, in cells.  aircraft, excess_table,

@@ -370,20 +370,14 @@ def _engine_out_return(world: ReturnWorld, target: ReturnTarget, result: Record)
     if result["outcome"] == RETURN_GROUND_IMPACT:
         impact = (float(result["clearance_east"]), float(result["clearance_north"]), float(result["clearance_up"]))
         shortfall = math.dist(impact[:2], target.position[:2])
-    return EngineOutReturn(
-        target, _engine_out_end(result, clearance, arrival_height), arrival_height, clearance, impact, shortfall
-    )
-
-
-def _engine_out_end(result: Record, clearance: float, arrival_height: float) -> EngineOutEnd:
-    """Classify the outcome of a simulated return without thrust.
-
-    clearance, arrival_height: minimum height above ground, and height above ground on arrival, m.
-    """
     if result["outcome"] == RETURN_GROUND_IMPACT:
-        return "ground"
-    if result["sphere_distance"] <= 0.0:
-        return "threat"
-    if result["outcome"] != RETURN_ARRIVED:
-        return "unknown"
-    return "arrives" if min(clearance, arrival_height) >= MARGIN else "low"
+        end: EngineOutEnd = "ground"
+    elif result["sphere_distance"] <= 0.0:
+        end = "threat"
+    else:
+        end = (
+            "unknown"
+            if result["outcome"] != RETURN_ARRIVED
+            else ("arrives" if min(clearance, arrival_height) >= MARGIN else "low")
+        )
+    return EngineOutReturn(target, end, arrival_height, clearance, impact, shortfall)

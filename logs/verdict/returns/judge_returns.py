@@ -19,7 +19,7 @@ import numpy as np
 from aircraft.catalog import Aircraft, find_logged_aircraft
 from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
-from flight.autopilots.autopilot import Autopilot, Parameters
+from flight.autopilots.autopilot import Autopilot
 from flight.autopilots.parts import Cause, ReturnMission
 from flight.autopilots.point_mass import PointMass, make_point_mass
 from flight.autopilots.px4.parameters import FROM_ARDUPILOT, Px4Parameters
@@ -289,7 +289,10 @@ class Returns:
 
 
 def _report_key(ret: SimulatedReturn) -> tuple[object, ...]:
-    """Return the grouping key of returns: outcome and destination, and the entered sphere or zone."""
+    """Return the key by which returns are grouped: outcome, destination, and the entered sphere or zone.
+
+    Returns that are too low are also grouped by whether the flight itself is too low at their start.
+    """
     key = (ret.kind, ret.target.name)
     if ret.kind == "low":
         return (*key, ret.starts_too_low)
@@ -431,7 +434,9 @@ class ReturnWorld:
         if begins_with_landing and any(ending != "circle" for ending in self.endings):
             parts.append("landing")
         if self.setup.imported_log is None and home_height(self.setup) > HOME_ERROR_M:
-            parts.append(f"{home_height_text(self.setup)}; after arming on that ground, every return is so much lower")
+            parts.append(
+                f"{home_height_text(self.setup)}; after arming on that ground, every return is lower by this height"
+            )
         return tuple(parts)
 
     def target(self, row: Record, ending: Ending | None = None) -> ReturnTarget:
@@ -523,29 +528,24 @@ def make_return_world(setup: FlightSetup, rtl_autopilot: Autopilot | None = None
 
 
 def without_engine_world(world: ReturnWorld) -> ReturnWorld:
-    """Return the world for returns without an engine, with ArduPlane if the autopilot has no such return.
+    """Return a world for returns without an engine; ArduPlane returns if the autopilot has no such return.
 
     ArduPlane then has the aircraft's parameters, and the airspeeds of the user's PX4 parameter file.
     """
     if world.autopilot.returns.flies_without_engine:
         return world
     aircraft = find_logged_aircraft(world.setup.aircraft, world.scenario.flight.aircraft)
-    parameters = _with_px4_airspeeds(ArduPilotParameters.load(aircraft), world.autopilot.parameters)
+    # ArduPlane's parameters, with the airspeeds of the user's PX4 parameter file.
+    own_parameters = ArduPilotParameters.load(aircraft)
+    user_parameters = world.autopilot.parameters
+    parameters = own_parameters
+    if isinstance(user_parameters, Px4Parameters):
+        file_parameters = user_parameters.by_origin("file")
+        names = {name: FROM_ARDUPILOT[name][0] for name in ("AIRSPEED_MIN", "AIRSPEED_CRUISE", "AIRSPEED_MAX")}
+        parameters = own_parameters.changed(
+            **{name: file_parameters[px4_name] for name, px4_name in names.items() if px4_name in file_parameters}
+        )
     return make_return_world(world.setup, ArduPlane(parameters))
-
-
-def _with_px4_airspeeds(parameters: ArduPilotParameters, user_parameters: Parameters | None) -> ArduPilotParameters:
-    """Return ArduPlane's parameters with the airspeeds of the user's PX4 parameter file.
-
-    user_parameters: the user's parameters; without PX4 parameters, the result is unchanged.
-    """
-    if not isinstance(user_parameters, Px4Parameters):
-        return parameters
-    file_parameters = user_parameters.by_origin("file")
-    names = {name: FROM_ARDUPILOT[name][0] for name in ("AIRSPEED_MIN", "AIRSPEED_CRUISE", "AIRSPEED_MAX")}
-    return parameters.changed(
-        **{name: file_parameters[px4_name] for name, px4_name in names.items() if px4_name in file_parameters}
-    )
 
 
 # Function that flies a return in JSBSim and returns the minimum height above ground and the minimum distance outside a
@@ -563,7 +563,7 @@ def judge_returns(
     max_flights: int = MAX_JSBSIM_FLIGHTS,
     advance: Callable[[float, float], None] = lambda done, total: None,
 ) -> Returns:
-    """Simulate and judge the return from each start, once for each ending (loiter or landing) to be judged.
+    """Simulate and judge the return from each start, once for each of its endings (loiter or landing).
 
     A return from a low start that only sinks to the ground is left out, but counted in `omitted_count`.
 
@@ -634,9 +634,10 @@ def _no_returns(world: ReturnWorld, starts: ReturnStarts, interval: float) -> Re
 
 
 def sinks_to_ground(ret: SimulatedReturn, height: float) -> bool:
-    """Return True if an RTL from low in a take-off or landing sinks to the ground before it can return.
+    """Return True if an RTL from a low start sinks to the ground before the aircraft can return.
 
-    The path of the return is then not at fault.  Returns that fly into rising ground or hit a hill later do not count.
+    Low starts are those in a take-off or a landing.  The path of the return is then not at fault.  Returns that fly
+    into rising ground or hit a hill later do not count.
     height: height of the start above ground, m.  Above `MIN_JUDGED_HEIGHT_M`, the return must also lose half of this
         height.
     """
@@ -657,7 +658,7 @@ def simulate_judged_returns(
     min_heights: Floats,
     min_sphere_distances: Floats | None = None,
 ) -> tuple[Records, tuple[Floats, ...]]:
-    """Simulate returns for judging, without the clearance on approaches to a landing.
+    """Simulate returns for judging; their clearance excludes the approach to a landing.
 
     After the first item of a landing sequence, a return flies the mission's approach, which descends to the landing.
     The clearance of a return that becomes too low on the approach is therefore measured only up to the first item.
@@ -697,8 +698,8 @@ def simulate_judged_returns(
 def required_heights(world: ReturnWorld, starts: ReturnStarts) -> Floats:
     """Return the required height above ground of the RTL from each start, m, (n,).
 
-    This is the limit, also where the flight itself is lower.  Only in a take-off or a landing it is what the flight's
-    own height permits.
+    This is the limit of `ReturnWorld.limit`, even where the flight itself is lower.  In a take-off or a landing it is
+    only the height that the flight's own height permits (`possible_heights`).
     """
     return np.where(starts.is_ground_phase, possible_heights(world, starts), world.limit)
 
@@ -706,7 +707,8 @@ def required_heights(world: ReturnWorld, starts: ReturnStarts) -> Floats:
 def possible_heights(world: ReturnWorld, starts: ReturnStarts) -> Floats:
     """Return the height above ground that the RTL from each start can keep, at most the limit, m, (n,).
 
-    It is below the limit for a start at which the flight itself is below the limit, or soon will be.
+    It is below the limit for a start at which the flight itself is below the limit, or soon will be.  From a low start
+    in a take-off or landing it is `_LOW_START_FRACTION` of the height of the start.
     """
     start_heights = heights_above_ground(world, starts)
     flight_heights = start_heights - starts.height_loss

@@ -88,7 +88,18 @@ def flown_starts(setup: FlightSetup, track: Track, interval: float) -> ReturnSta
     sample_times = np.arange(time[0], time[-1] + 1e-9, interval)
     # Take the next row at or after each sample time; a gap in the log gives only one row.
     sampled_rows = usable_rows[np.unique(np.searchsorted(time, sample_times - 1e-9).clip(0, len(usable_rows) - 1))]
-    is_low, is_slow = _low_and_slow_rows(setup, track, sampled_rows)
+    # Low rows of a take-off or landing, and low rows too slow to fly. Without terrain, both are all rows of the
+    # take-off and the landing.
+    procedures, terrain = setup.ground_phases, setup.scenario.terrain
+    is_ground_phase = takeoff_and_approach_rows(track, procedures)[sampled_rows]
+    position = np.asarray(track.position[sampled_rows], dtype=np.float64)
+    if terrain is None or not procedures:
+        is_low, is_slow = is_ground_phase, is_ground_phase.copy()
+    else:
+        height_above_ground = position[:, 2] - terrain.height(position[:, 0], position[:, 1])
+        is_low = is_ground_phase & (height_above_ground < setup.limits.min_clearance + SINK_HEIGHT_LOSS_M)
+        min_airspeed = setup.envelope.level_speeds(float(setup.route.positions[0, 2]))[0]
+        is_slow = is_low & (track.airspeed[sampled_rows] < min_airspeed)
     start_rows, is_low_start = sampled_rows[~is_slow], is_low[~is_slow]
     velocity = _ground_velocities(track, start_rows)
     roll = track.attitude[start_rows, ROLL].astype(np.float64)
@@ -156,23 +167,6 @@ def _ground_phase_starts(
     return np.asarray(is_ground_phase[np.searchsorted(time, start_times, side="right") - 1])
 
 
-def _low_and_slow_rows(setup: FlightSetup, track: Track, rows: NDArray[np.intp]) -> tuple[Flags, Flags]:
-    """Return masks of low rows of a take-off or landing, and of low rows too slow to fly, (n,).
-
-    Without terrain, both masks contain all rows of the take-off and the landing.
-    rows: rows of the track, (n,).
-    """
-    procedures, terrain = setup.ground_phases, setup.scenario.terrain
-    is_ground_phase = takeoff_and_approach_rows(track, procedures)[rows]
-    position = np.asarray(track.position[rows], dtype=np.float64)
-    if terrain is None or not procedures:
-        return is_ground_phase, is_ground_phase.copy()
-    height_above_ground = position[:, 2] - terrain.height(position[:, 0], position[:, 1])
-    is_low = is_ground_phase & (height_above_ground < setup.limits.min_clearance + SINK_HEIGHT_LOSS_M)
-    min_airspeed = setup.envelope.level_speeds(float(setup.route.positions[0, 2]))[0]
-    return is_low, is_low & (track.airspeed[rows] < min_airspeed)
-
-
 def _ground_velocities(track: Track, rows: NDArray[np.intp]) -> Floats:
     """Return the ground velocities in some rows, m/s, (n, 3); missing ones are computed from positions."""
     velocity = track.velocity[rows].astype(np.float64)
@@ -222,7 +216,7 @@ def planned_starts(setup: FlightSetup, interval: float, requirements: RouteRequi
 
 
 def planned_positions(setup: FlightSetup, interval: float) -> tuple[Floats, Floats]:
-    """Return times, s, (t,), and positions, m, (t, 3), on the planned path up to the mission's return to launch.
+    """Return times, s, (t,), and positions, m, (t, 3), on the planned path up to the mission's RTL.
 
     interval: time between samples, s.
     """
@@ -296,7 +290,7 @@ def planned_end(requirements: RouteRequirements) -> ReturnStarts:
 
 
 def _ground_speeds(setup: FlightSetup) -> Floats:
-    """Return the ground speed on each leg in the mean wind, or the airspeed if the wind is too strong, m/s.
+    """Return the ground speed on each leg in the mean wind, m/s; the airspeed if the wind is too strong.
 
     With a forecast, the wind is taken in the middle of the leg, at the time when the aircraft is there.
     """

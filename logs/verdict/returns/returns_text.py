@@ -44,7 +44,7 @@ _PLURAL_TEXTS: dict[Kind, str] = {
     "energy": "use more energy than allowed",
     "unknown": "fly where the terrain is unknown",
     "power": "may use more energy than allowed, because the aircraft's power is uncertain",
-    "used": "cannot be judged by energy, because the energy used before it is unknown",
+    "used": "cannot be judged by energy, because the energy used before them is unknown",
     "unsure": "cannot be judged because the point mass and JSBSim disagree",
     "low": "descend below {limit:.0f} m above ground",
 }
@@ -298,7 +298,7 @@ def describe_landing(returns: Returns) -> list[str]:
 
 
 def range_text(return_range: ReturnRange, returns: Returns, scenario: Scenario) -> str:
-    """Describe a time range: are its returns safe, their destination, and the worst return."""
+    """Describe the returns of a time range: the judgement, the destination and the worst return."""
     worst_return = return_range.worst
     time_text = (
         f"{return_range.first:.0f} s"
@@ -321,7 +321,7 @@ def range_text(return_range: ReturnRange, returns: Returns, scenario: Scenario) 
 
 
 def _height_text(ret: SimulatedReturn, limit: float) -> str:
-    """Return the lowest height of a return above ground, near the required height with the digits that decide.
+    """Return the lowest height of a return as text, with more digits near the required height.
 
     Near the limit, the text also states the limit and its tolerance.
     """
@@ -332,18 +332,6 @@ def _height_text(ret: SimulatedReturn, limit: float) -> str:
         return f"{text} above ground"
     tolerance_text = quantity_text(CLEARANCE_TOLERANCE_M, "m")
     return f"{text} above ground (required: {quantity_text(limit, 'm')}, with a tolerance of {tolerance_text})"
-
-
-def _energy_outcome_text(ret: SimulatedReturn, returns: Returns) -> str:
-    """Describe the energy that a return leaves, compared with the required reserve."""
-    if ret.kind == "used":
-        return "the energy used before is unknown"
-    if ret.energy_left < 0.0:
-        return f"ends with an empty battery, as {quantity_text(ret.energy_used, 'Wh')} are used before it"
-    left_text = quantity_text(ret.energy_left, "Wh")
-    reserve_text = quantity_text(returns.reserve, "Wh")
-    uncertain_text = ", but the power is uncertain" if ret.kind == "power" else ""
-    return f"leaves {left_text} of the required {reserve_text}{uncertain_text}"
 
 
 def _range_outcome_text(worst_return: SimulatedReturn, returns: Returns, scenario: Scenario) -> str:
@@ -366,7 +354,18 @@ def _range_outcome_text(worst_return: SimulatedReturn, returns: Returns, scenari
             return f"does not reach its {end_text} at {worst_return.target.position[2]:.0f} m AMSL"
         case "energy" | "power" | "used":
             taken_text = quantity_text(worst_return.energy, "Wh")
-            return f"takes {taken_text} and {_energy_outcome_text(worst_return, returns)}"
+            if worst_return.kind == "used":
+                energy_outcome = "the energy used before is unknown"
+            elif worst_return.energy_left < 0.0:
+                energy_outcome = (
+                    f"ends with an empty battery, as {quantity_text(worst_return.energy_used, 'Wh')} are used before it"
+                )
+            else:
+                left_text = quantity_text(worst_return.energy_left, "Wh")
+                reserve_text = quantity_text(returns.reserve, "Wh")
+                uncertain_text = ", but the power is uncertain" if worst_return.kind == "power" else ""
+                energy_outcome = f"leaves {left_text} of the required {reserve_text}{uncertain_text}"
+            return f"takes {taken_text} and {energy_outcome}"
         case "unknown":
             return "flies where the terrain is unknown"
         case "unsure":

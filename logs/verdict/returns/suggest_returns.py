@@ -86,7 +86,7 @@ class _ReturnLimits:
 
 
 def _return_limits(world: ReturnWorld, starts: ReturnStarts, margin: float = MARGIN) -> _ReturnLimits:
-    """Return each return's required height above ground and distance from kill spheres.
+    """Return the required height above ground and distance from kill spheres for each return.
 
     If the start itself is lower or closer to a sphere, only its own value minus the height lost in the turn is
     required.
@@ -188,9 +188,10 @@ class _ReturnTrial:
 
 
 def suggest_parameters(world: ReturnWorld, starts: ReturnStarts) -> list[Remedy]:
-    """Suggest the lowest return height that clears the ground or is safe, or another change of parameters.
+    """Suggest return heights, or else other parameters, with which every return is safe.
 
-    Return [] if the returns already keep all limits with the present parameters.
+    Up to two heights are suggested: the lowest with which all returns clear the ground, and the lowest with which all
+    are safe.  Return [] if the returns already keep all limits with the present parameters.
     Heights are tried one by one, because a higher return may lead through a sphere and need not be safer.
     """
     limits = _return_limits(world, starts)
@@ -253,7 +254,7 @@ class _AltitudeSearch:
         return {name: altitude for name, present in self._present_values.items() if altitude > present}
 
     def lowest(self, min_altitude: float, criterion: Criterion, trial: _ReturnTrial) -> float | None:
-        """Return the lowest height, at least `min_altitude` (m), with which all returns pass, or None."""
+        """Return the lowest height from `min_altitude` (m) on with which all returns pass; None for none."""
         return first_that_passes(
             (altitude for altitude in self._candidates if altitude >= min_altitude),
             lambda altitude: trial.passes(self._world.with_parameters(**self.values(altitude)), criterion),
@@ -356,7 +357,7 @@ def _search_in_rounds(
 def _rally_candidates(
     world: ReturnWorld, starts: ReturnStarts, spacing: float, max_distance: float
 ) -> list[ReturnPoint]:
-    """Return candidate rally points on a grid near the path, at two altitudes 200 m apart, clear of spheres.
+    """Return candidate rally points on a grid near the path, at two altitudes, clear of kill spheres.
 
     spacing: grid spacing, m, increased if there are too many candidates.
     max_distance: maximum distance from the path, m.
@@ -379,7 +380,21 @@ def _rally_candidates(
     # PX4 ends its return at this height above a rally point, which lies on the ground.  ArduPlane ends at the point.
     end_height = world.autopilot.returns.rules.rally_height
     for grid_east, grid_north in grid.tolist():
-        min_altitude = _highest_ground(world, grid_east, grid_north) + world.limit + MARGIN
+        # Highest ground below a loiter around the point, m AMSL; NaN if any of the ground is unknown.
+        if world.scenario.terrain is None:
+            highest_ground = world.home.up
+        else:
+            # The center, and 16 points on each of three circles.
+            angles = np.arange(16) * (math.pi / 8.0)
+            radii = np.concatenate(
+                [np.zeros(1), *(np.full(16, fraction * _LOITER_RADIUS_M) for fraction in (0.33, 0.67, 1.0))]
+            )
+            directions = np.concatenate([np.zeros(1), angles, angles, angles])
+            heights = world.scenario.terrain.height(
+                grid_east + radii * np.cos(directions), grid_north + radii * np.sin(directions)
+            )
+            highest_ground = float(np.max(heights))
+        min_altitude = highest_ground + world.limit + MARGIN
         for altitude in (min_altitude, min_altitude + 200.0):
             if (
                 math.isfinite(altitude)
@@ -397,21 +412,6 @@ def _rally_candidates(
     return [place._replace(number=k) for k, place in enumerate(candidates, 1)]
 
 
-def _highest_ground(world: ReturnWorld, east: float, north: float) -> float:
-    """Return the altitude of the highest ground below a loiter around a point, m AMSL.
-
-    Without terrain it is the altitude of home.  It is NaN if any of the ground below the loiter is unknown.
-    """
-    if world.scenario.terrain is None:
-        return world.home.up
-    # The center, and 16 points on each of three circles.
-    angles = np.arange(16) * (math.pi / 8.0)
-    radii = np.concatenate([np.zeros(1), *(np.full(16, fraction * _LOITER_RADIUS_M) for fraction in (0.33, 0.67, 1.0))])
-    directions = np.concatenate([np.zeros(1), angles, angles, angles])
-    heights = world.scenario.terrain.height(east + radii * np.cos(directions), north + radii * np.sin(directions))
-    return float(np.max(heights))
-
-
 def _sphere_clearance(world: ReturnWorld, position: tuple[float, float, float]) -> float:
     """Return a position's distance outside the nearest kill sphere, m."""
     distances = np.linalg.norm(world.environment.spheres - np.array(position), axis=1) - world.environment.radii
@@ -421,7 +421,7 @@ def _sphere_clearance(world: ReturnWorld, position: tuple[float, float, float]) 
 class _RallySearch:
     """Search for rally points, based on which returns to each candidate meet the requirements.
 
-    Returns to the candidates are simulated when first needed.
+    A return is good if it keeps all limits.  Returns to the candidates are simulated when first needed.
     """
 
     def __init__(

@@ -54,7 +54,7 @@ def bounds_findings(
 
 
 def _min_distance_inside(requirements: RouteRequirements, points: Floats) -> tuple[float, str, int]:
-    """Find the point with the smallest distance inside an edge of the area.
+    """Find the point that is closest to an edge of the area, or farthest outside it.
 
     Return this distance (m, negative outside the area), the name of the edge, and the row of the point.
     points: positions (east, north, up), m, (n, 3).

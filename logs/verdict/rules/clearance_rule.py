@@ -118,9 +118,9 @@ def _geographic_text(requirements: RouteRequirements, east: float, north: float)
 
 
 def _below_home_findings(requirements: RouteRequirements) -> list[Finding]:
-    """Report a route with a waypoint clearly below home as undecided; otherwise return [].
+    """Return an undecided finding if a waypoint is clearly below home, otherwise [].
 
-    Call this without terrain data: the ground is then assumed to be at home's altitude.
+    Call this without terrain data: nothing then shows that the ground is lower than home.
     """
     home = requirements.setup.mission.home
     if home is None:
@@ -138,7 +138,7 @@ def _below_home_findings(requirements: RouteRequirements) -> list[Finding]:
 
 
 def _home_above_ground_findings(requirements: RouteRequirements, leg_findings: list[Finding]) -> list[Finding]:
-    """Report a home above the ground as undecided if a leg would be too low with home on the ground.
+    """Return an undecided finding if home is above ground, and a leg would be too low with home on it.
 
     When an autopilot is armed, it sets home to its own position on the ground.  All heights above home are then lower
     by the height of the mission's home above the ground.  Return [] if no leg would be too low, or if the height of
@@ -208,7 +208,7 @@ class _Landing(NamedTuple):
     leg: number of the final approach.
     item: number of the mission item.
     point: landing point (east, north), m.
-    is_judged_here: True if the final approach is judged by this rule, because the landing is flown and judged as such.
+    is_judged_here: True if this rule judges the final approach, because the flight continues down to the ground.
     """
 
     leg: int
@@ -240,7 +240,7 @@ def _find_landing(requirements: RouteRequirements) -> _Landing | None:
 def _fields_by_leg(
     requirements: RouteRequirements, landing: _Landing | None
 ) -> dict[int, tuple[tuple[float, float], ...]]:
-    """Return, by leg number, the home or landing positions near which the leg may be lower.
+    """Return the places near which each leg may be lower, by leg number: home or the landing point.
 
     A position is (east, north), m.  The legs of a flown or logged take-off have the position of home.  The final
     approach has the landing point.  So have earlier legs of the landing, from the last waypoint that keeps the full
@@ -303,7 +303,7 @@ def _limit_source(requirements: RouteRequirements, limit: float) -> str:
 
 
 def _terrain_error_text(clearance: float, limit: float, error: float | None) -> str:
-    """Describe the clearance that remains after the terrain's error is subtracted; "" without one.
+    """Describe the clearance less the terrain's stated error; return "" if no error is stated.
 
     clearance, limit, error: minimum height above ground, required height and vertical error of the terrain data, m.
     """
@@ -361,7 +361,7 @@ def _flown_finding(
     *,
     is_planned_short: bool,
 ) -> Finding:
-    """Judge the minimum height above ground on a flown leg; the planned height is only reported.
+    """Judge the minimum height above ground on a flown leg; `planned_height` (m) is only reported.
 
     is_planned_short: True if the planned path is lower than required.
     """

@@ -186,7 +186,7 @@ def _unjudged_finding(rule: str, place: Place, reason: str, *, is_undecided: boo
 
 
 class _Launch(NamedTuple):
-    """Launch course, with length and slope of the first leg if it lies on this course.
+    """Course on which a take-off climbs, and the first leg if it has the same course.
 
     course: rad.
     leg_length: length of the leg, m; inf if the first leg has another course.

@@ -215,19 +215,19 @@ def _missing_items_text(missing: MissingItems) -> str:
 
 
 def _ends_in_return(setup: FlightSetup, legs: FlownLegs) -> bool:
-    """Return True if a stretch ended in the return mode and the mission's next item is a return to launch."""
+    """Return True if a part of the log ended in mode RTL, and the next item is a return to launch."""
     item = int(setup.route.items[_next_waypoint(setup, legs)])
     commands = {mission_item.seq: mission_item.command for mission_item in setup.mission.items}
     return legs.stretch.next_mode == _RETURN_MODE and commands.get(item) == Command.NAV_RETURN_TO_LAUNCH
 
 
 def _next_waypoint(setup: FlightSetup, legs: FlownLegs) -> int:
-    """Return the waypoint to which a stretch was flying when it ended."""
+    """Return the waypoint to which the aircraft was flying when a part of the log ended."""
     return min(setup.route.legs, legs.last if legs.partial else legs.last + 1)
 
 
 def _next_waypoint_text(setup: FlightSetup, legs: FlownLegs) -> str:
-    """Name the waypoint to which a stretch was flying when it ended."""
+    """Name the waypoint to which the aircraft was flying when a part of the log ended."""
     waypoint = _next_waypoint(setup, legs)
     item = int(setup.route.items[waypoint])
     return f"waypoint {setup.route.stops[waypoint]}" + (f" (item {item})" if item >= 0 else "")

@@ -43,7 +43,19 @@ def _leg_finding(requirements: RouteRequirements, aligned: AlignedTrack | None, 
     elif aligned is None or not aligned.has_flown(leg):
         facts.append("the leg was not flown")
     else:
-        rows = _rows_after_takeoff(requirements, aligned, leg, limit)
+        # The leg after a take-off begins once the aircraft flies on the leg's course and within the limit of its line.
+        # Before, it may still be on the launch course, on which the take-off ends.
+        leg_rows, ground = aligned.leg_rows(leg), requirements.ground_phases
+        rows = leg_rows
+        if ground is not None and ground.procedures.take_off is not None and ground.procedures.take_off.waypoint == leg:
+            course_error = np.abs(np.sin(0.5 * (aligned.course[leg_rows] - requirements.courses[leg])))
+            lateral_offset = project_onto_leg(
+                requirements, leg, np.asarray(aligned.track.position[leg_rows], dtype=np.float64)
+            )[1]
+            has_joined = (course_error < math.sin(0.5 * RUNWAY_COURSE_TOLERANCE_RAD)) & (
+                np.abs(lateral_offset) <= limit
+            )
+            rows = slice(leg_rows.start + int(np.argmax(has_joined)), leg_rows.stop) if has_joined.any() else leg_rows
         nearby_legs = slice(max(0, leg - 1), min(requirements.legs, leg + 2) + 1)
         flown_distance, row = farthest_from_legs(aligned.track.position[rows], requirements.points[nearby_legs])
         ok = flown_distance <= limit
@@ -70,21 +82,6 @@ def _leg_finding(requirements: RouteRequirements, aligned: AlignedTrack | None, 
         unit="m",
         method="arcs of the turns" if geometric else "greatest distance of all rows from the leg and its neighbours",
     )
-
-
-def _rows_after_takeoff(requirements: RouteRequirements, aligned: AlignedTrack, leg: int, limit: float) -> slice:
-    """Return the rows of a leg; for the leg after a take-off, only the rows after the aircraft joined it.
-
-    The aircraft has joined the leg once it flies on the leg's course and within the limit (m) of the leg's line.
-    Before, it may still be on the launch course, on which a take-off ends.
-    """
-    rows, ground = aligned.leg_rows(leg), requirements.ground_phases
-    if ground is None or ground.procedures.take_off is None or ground.procedures.take_off.waypoint != leg:
-        return rows
-    course_error = np.abs(np.sin(0.5 * (aligned.course[rows] - requirements.courses[leg])))
-    lateral_offset = project_onto_leg(requirements, leg, np.asarray(aligned.track.position[rows], dtype=np.float64))[1]
-    has_joined = (course_error < math.sin(0.5 * RUNWAY_COURSE_TOLERANCE_RAD)) & (np.abs(lateral_offset) <= limit)
-    return slice(rows.start + int(np.argmax(has_joined)), rows.stop) if has_joined.any() else rows
 
 
 RULE = Rule(

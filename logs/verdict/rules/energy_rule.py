@@ -109,7 +109,8 @@ def energy_findings(
 def _energy_limit(requirements: RouteRequirements) -> tuple[float, str, str]:
     """Return the usable energy (Wh), the source of this limit, and a clause on a battery failsafe.
 
-    The clause is "" if the reserve is reached before any failsafe acts.  The failsafes of several batteries set no
+    The usable energy is the energy without the reserve, or less if a failsafe acts before the reserve is reached; the
+    clause describes this failsafe and is "" otherwise.  The failsafes of several batteries set no
     limit, because the charge drawn from each battery is unknown.
     """
     setup, volts = requirements.setup, requirements.setup.envelope.volts

@@ -101,7 +101,7 @@ def _compliance_finding(
 ) -> Finding:
     """Return the finding that no judged zone is violated, with the distance to the nearest zone.
 
-    planned_visits, flown_visits: one record for each zone; see `zone_visits`.
+    planned_visits, flown_visits: one record of `logs.verdict.measures.zone_visits.VISIT` for each zone.
     """
     airspace, corridor = requirements.airspace, requirements.setup.corridor
     count = len(airspace.zones)

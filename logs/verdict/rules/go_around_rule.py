@@ -117,7 +117,7 @@ class _GoAround(NamedTuple):
     min_climb_height: minimum height above ground in the climb beyond the landing point, m; inf without a climb.
     impact_time: time from the abort to ground impact, s; NaN without impact.
     entered_hazard: sphere or zone that the go-around enters, "" if it enters none.
-    is_lost: True if the go-around does not return to the line-up.
+    is_lost: True if the go-around does not get back to the start of an approach.
     unknown_part_text: text on the unknown part of the path, "" if all is known.
     """
 
@@ -202,7 +202,11 @@ def _find_landing(
     takeoff_waypoint, takeoff = takeoff_item(requirements.setup)
     takeoff_climb = 0.0 if takeoff is None else float(requirements.points[takeoff_waypoint, 2]) - home_altitude
     climb_height = setup.autopilot.ground.go_around_height(item.params[0], takeoff_climb)
-    destinations = _go_around_destinations(requirements, waypoint)
+    # The destinations are the landing sequences, or else the waypoint before the landing.
+    mission, origin = setup.mission, setup.scenario.origin
+    previous_item = int(setup.route.items[waypoint - 1])
+    previous_place = landing_sequence(mission, origin, terrain, previous_item)[:1] if previous_item >= 0 else ()
+    destinations = landing_starts(mission, origin, terrain) or previous_place
     ground_altitude = setup.route.landing_ground
     terrain_altitude = float(terrain.height(float(landing_point[0]), float(landing_point[1])))
     if (
@@ -233,15 +237,6 @@ def _find_landing(
         item=item,
         unknown_path_text=_unknown_path_text(requirements, item, destinations),
     )
-
-
-def _go_around_destinations(requirements: RouteRequirements, waypoint: int) -> tuple[LandingStart, ...]:
-    """Return the destinations of a go-around: landing sequences, or else the waypoint before the landing."""
-    setup = requirements.setup
-    mission, origin, terrain = setup.mission, setup.scenario.origin, setup.scenario.terrain
-    previous_item = int(setup.route.items[waypoint - 1])
-    previous_place = landing_sequence(mission, origin, terrain, previous_item)[:1] if previous_item >= 0 else ()
-    return landing_starts(mission, origin, terrain) or previous_place
 
 
 def _unknown_path_text(
@@ -484,7 +479,7 @@ def _required_heights(terrain: Terrain, destination: LandingStart, points: Float
 def _next_sufficient_height(
     requirements: RouteRequirements, terrain: Terrain, world: ReturnWorld, landing: _Landing, worst_distance: float
 ) -> float:
-    """Find the next higher climb height above home at which all go-arounds are clear, m; NaN if there is none.
+    """Find the next higher climb height above home with which all go-arounds are clear, m; NaN for none.
 
     Heights are tried in steps of `_HEIGHT_STEP_M` up to `_MAX_HEIGHT_M`.
     worst_distance: abort point to try first, as a distance before the landing point, m.

@@ -168,7 +168,7 @@ def _describe_take_off(
             climb_text = f"sinks {-altitude_gain:.1f} m in the {distance:.0f} m flown, {end_text}"
         notes.append(climb_text)
     if math.isfinite(clearance):
-        notes.append(f"at least {clearance:.0f} m above ground more than {LAUNCH_RUN_M:.0f} m from the launch")
+        notes.append(f"beyond {LAUNCH_RUN_M:.0f} m from the launch at least {clearance:.0f} m above ground")
     return notes
 
 

@@ -72,7 +72,8 @@ def judge_link(
 ) -> JudgedLink:
     """Judge a radio link along the planned path if `geometric`, otherwise along the whole flown track.
 
-    fly_again: function that flies an uncertain return again in JSBSim, as for `judge_returns`; None not to do so.
+    fly_again: function that flies an uncertain return again in JSBSim, as for `judge_returns`; None for no such
+    flights.
     """
     phases = requirements.ground_phases
     whole_requirements = requirements if phases is None else phases.whole_route
@@ -80,9 +81,15 @@ def judge_link(
     terrain = setup.scenario.terrain
     antenna = None if terrain is None else station_antenna(setup, link, terrain)
     if terrain is None or antenna is None:
-        return JudgedLink(
-            make_finding("link", FLIGHT, ok=None, reason=_unknown_station_text(whole_requirements, link), unit="s")
-        )
+        if setup.scenario.terrain is None:
+            reason = "no terrain was given"
+        else:
+            reason = (
+                "neither the station's position nor a home is known"
+                if link.station is None and setup.mission.home is None
+                else "the ground at the station is unknown"
+            )
+        return JudgedLink(make_finding("link", FLIGHT, ok=None, reason=reason, unit="s"))
     path = whole_requirements.path
     planned = link_along_path(link, terrain, antenna, path.times, path.points)
     track, judged_link = None, planned
@@ -117,22 +124,12 @@ def judge_link(
     return JudgedLink(finding, judged_link, antenna, leg, returns)
 
 
-def _unknown_station_text(requirements: RouteRequirements, link: RadioLink) -> str:
-    """Explain why the position of the station's antenna is unknown."""
-    setup = requirements.setup
-    if setup.scenario.terrain is None:
-        return "no terrain was given"
-    if link.station is None and setup.mission.home is None:
-        return "neither the station's position nor a home is known"
-    return "the ground at the station is unknown"
-
-
 # ----------------------------------------------------------------------
 # Where and when the autopilot reacts to a loss of the link.
 
 
 def _end_of_reactions(requirements: RouteRequirements, aligned: AlignedTrack | None) -> float:
-    """Return the time from which the autopilot ignores a loss of the link, s; inf without one.
+    """Return the time from which the autopilot ignores a loss of the link, s; inf if it never does.
 
     From then on, the aircraft is returning anyway, or ArduPlane is in a landing sequence
     (`Plane::failsafe_in_landing_sequence`).

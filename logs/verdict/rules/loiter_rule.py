@@ -313,13 +313,13 @@ def _flown_radii(aligned: AlignedTrack, circle: LoiterCircle) -> Floats:
 
 
 def _stated_loiter(requirements: RouteRequirements, circle: LoiterCircle) -> Loiter | None:
-    """Return the loiter that the mission's item of a circle states; None for a circle without such an item."""
+    """Return the loiter that the mission item of a circle states; None without such an item."""
     seq = int(requirements.setup.route.items[circle.first])
     return next((stated_loiter(item) for item in requirements.setup.mission.items if item.seq == seq), None)
 
 
 def _planned_laps_text(requirements: RouteRequirements, circle: LoiterCircle) -> str:
-    """Describe the planned laps of a loiter: those that its item states, and those of its path from join to exit."""
+    """Describe the laps that the item of a loiter states, and the laps of its path from join to exit."""
     drawn_text = f"{circle.laps:.2f} laps from joining to leaving"
     loiter = _stated_loiter(requirements, circle)
     if loiter is None or not loiter.turns:

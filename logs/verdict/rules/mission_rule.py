@@ -323,6 +323,12 @@ def _mission_parts(setup: FlightSetup) -> MissionParts:
             (math.hypot(*map(float, to_map(origin, point.lat_deg, point.lon_deg))) for point in mission.rally),
             default=math.inf,
         )
+    checks = setup.autopilot.checks
+    fence_at_home = ""
+    if mission.home is not None and mission.fences:
+        origin = GeoOrigin(mission.home.lat_deg, mission.home.lon_deg)
+        problem = fence_problem(mission.fences, origin, 0.0, 0.0, any_inclusion_suffices=checks.any_inclusion_suffices)
+        fence_at_home = "" if problem is None else problem[0]
     return MissionParts(
         returns=C.NAV_RETURN_TO_LAUNCH in commands or judges_return_after_last_item(setup),
         has_return_path=C.DO_RETURN_PATH_START in commands,
@@ -332,7 +338,7 @@ def _mission_parts(setup: FlightSetup) -> MissionParts:
             item.command == C.NAV_LOITER_TO_ALT and next_item.command in LANDINGS for item, next_item in pairs
         ),
         has_fence=bool(setup.mission.fences),
-        fence_at_home=_home_fence_violation(setup),
+        fence_at_home=fence_at_home,
         smallest_inclusion=min(
             (item.params[0] for item in setup.mission.fences if item.command == C.NAV_FENCE_CIRCLE_INCLUSION),
             default=math.inf,
@@ -351,16 +357,6 @@ def _mission_parts(setup: FlightSetup) -> MissionParts:
         commands=frozenset(commands),
         aircraft=aircraft,
     )
-
-
-def _home_fence_violation(setup: FlightSetup) -> str:
-    """Describe how home violates the fence, as "inside an exclusion polygon"; "" if it does not."""
-    mission, checks = setup.mission, setup.autopilot.checks
-    if mission.home is None or not mission.fences:
-        return ""
-    origin = GeoOrigin(mission.home.lat_deg, mission.home.lon_deg)
-    problem = fence_problem(mission.fences, origin, 0.0, 0.0, any_inclusion_suffices=checks.any_inclusion_suffices)
-    return "" if problem is None else problem[0]
 
 
 def _flown_items(mission: Mission) -> list[MissionItem]:
@@ -521,8 +517,9 @@ def _check_first_distance(mission: Mission, origin: GeoOrigin) -> Iterator[_Rema
         )
 
 
-def _check_gates(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
-    """Yield a remark on each condition gate that is too close to the waypoint before or after the gate."""
+def _check_distances(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
+    """Yield remarks on gates close to a waypoint, and on a distance that older PX4 releases refuse."""
+    # Condition gates that are too close to the waypoint before or after the gate.
     flown_items = [
         item
         for item in mission.items
@@ -532,11 +529,6 @@ def _check_gates(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
         has_gate = C.CONDITION_GATE in (previous.command, following.command)
         if has_gate and _distance_between(previous, following, origin) < PX4_GATE_SPACING_M:
             yield REFUSED, following.seq, "the gate and the neighbouring waypoint are too close together"
-
-
-def _check_distances(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
-    """Yield remarks on gates close to a waypoint, and on a distance that older PX4 releases refuse."""
-    yield from _check_gates(mission, origin)
     flown_items = _flown_items(mission)
     if len(flown_items) < 2:
         return

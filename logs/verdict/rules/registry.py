@@ -102,17 +102,6 @@ def blocking_item_findings(setup: FlightSetup) -> list[Finding]:
     return [finding for finding in findings if finding.ok is False or undecided_findings([finding])]
 
 
-def geometric_findings(
-    requirements: RouteRequirements, flight_findings: Sequence[Finding] | None = None
-) -> tuple[Finding, ...]:
-    """Return the findings on a route's geometry, compared with the aircraft's envelope.
-
-    flight_findings: findings on a flight of the route.  Findings of rules with `Rule.is_same_for_plan` are copied from
-        them; None to run these rules, too.
-    """
-    return run_rules(requirements, None, geometric=True, flight_findings=flight_findings)
-
-
 def run_rules(
     requirements: RouteRequirements,
     aligned: AlignedTrack | None,
@@ -130,7 +119,8 @@ def run_rules(
     log_complete: True if the log is not cut off.
     includes_whole_flight: True to include rules that judge the whole flight, and to keep only the worst findings of
         each stop; False for only the findings on legs, corners, threats and zones.
-    flight_findings: as in `geometric_findings`.
+    flight_findings: findings on a flight of a route that is judged by its geometry.  Findings of rules with
+        `Rule.is_same_for_plan` are copied from them; None to run these rules, too.
     """
     findings: list[Finding] = []
     for rule in RULES.values():
@@ -158,8 +148,9 @@ _POSITION_RULES = ("clearance", "threat", "fence")
 
 
 def _other_side_findings(requirements: RouteRequirements, findings: Sequence[Finding]) -> list[Finding]:
-    """Return undecided findings on places that fail only for one direction of a turn at a course reversal.
+    """Return an undecided finding for each place that fails on only one side of a course reversal.
 
+    At a corner of 180 degrees the autopilot may turn left or right, so the route is judged for both directions.
     A flight shows only one direction, which depends on its navigation error: of 12 ArduPlane flights through a turn of
     180 degrees, 4 turned left.  Return [] for an imported flight, and for a route without a course reversal.
     """
@@ -222,14 +213,14 @@ def with_suggestions(
 ) -> tuple[Finding, ...]:
     """Add ``suggestions`` to the failed or undecided findings that a change could fix.
 
-    On the legs of a return to launch only findings on clearance get suggestions, because the autopilot chooses the path
-    of a return, of which the mission decides the start and a parameter the altitude.
+    On the legs of a return to launch only findings on clearance get suggestions: the autopilot chooses the path of a
+    return, and the mission and a parameter decide only its start and its altitude.
     If more than `MAX_SUGGESTED_FINDINGS` findings need suggestions, no finding gets any.
     """
     return_legs = {requirements.leg(i) for i in requirements.setup.route.rtl_legs}
 
     def is_open(finding: Finding) -> bool:
-        """Return True for an undecided finding on the aircraft or on the altitude of home."""
+        """Return True for an undecided finding on the aircraft or on home's altitude, which a change decides."""
         is_on_home = finding.rule == "clearance" and finding.check == GROUND_PATH
         return finding.ok is None and (finding.check == UNKNOWN_AIRCRAFT or is_on_home)
 
@@ -250,7 +241,7 @@ def with_suggestions(
 def with_passing_suggestions(
     findings: tuple[Finding, ...], trials: Sequence[TriedSuggestions] | None
 ) -> tuple[Finding, ...]:
-    """Remove the suggestions that passed no trial from failed findings.
+    """Replace the suggestions of each failed finding by those that passed their trials.
 
     trials: suggestions that passed their trials; None to keep all suggestions.
 

@@ -79,7 +79,7 @@ def return_findings(
 def flown_return_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, end_reason: str, log_complete: bool
 ) -> list[Finding]:
-    """Judge a simulated flight's RTL, its RTL after the last item, and the scenario's requirements.
+    """Judge a flight's RTL, the RTL after its last item, and the scenario's demands on returns.
 
     end_reason: "completed" if the flight ended after its RTL loiter, otherwise the reason for its end.
     log_complete: not used, because the completion rule reports it.

@@ -145,7 +145,25 @@ def _flown_messages(
     need_text = "" if is_planned_steep else f"; the leg needs {math.degrees(planned_slope):.1f}°"
     performance_faults = [message(f"{fault.brief}{need_text if fault is faults[0] else ''}") for fault in faults]
     flown_faults = _flown_faults(requirements, leg, measure, limit, performance_faults)
-    facts = [text for name, text in _flown_facts(requirements, leg, measure) if name not in flown_faults]
+    named_facts = []
+    if measure.slope is not None:
+        named_facts.append(("slope", f"flown {math.degrees(measure.slope.value):+.2f}°"))
+    if measure.height_error is not None:
+        line = "the leg's height above ground" if follows_ground(requirements, leg) else "the leg"
+        named_facts.append(("height", f"altitude within {abs(measure.height_error):.1f} m of {line}"))
+    named_facts += [
+        (name, f"{_throttle_text(requirements, name)} for {duration:.0f} s")
+        for name, duration, _, _ in _throttle_times(measure)
+        if duration >= 1.0
+    ]
+    if measure.pitch_limit_time >= SATURATED_TIME_S:
+        limit_name = requirements.setup.autopilot.speeds.max_pitch_name
+        named_facts.append(("pitch", f"pitch at its limit {limit_name} for {measure.pitch_limit_time:.0f} s"))
+    arc = steep_arc(requirements, leg)
+    if arc is not None and _is_arc_within_tolerance(arc, measure):
+        place = place_text(requirements.waypoint(leg + 1))
+        named_facts.append(("arc", f"the arc at {place} misses its height by only {arc.missing_height:.1f} m"))
+    facts = [text for name, text in named_facts if name not in flown_faults]
     if requirements.envelope:
         return performance_faults, facts + [fault.brief for fault in flown_faults.values()]
     return [*flown_faults.values(), *performance_faults], facts
@@ -220,7 +238,7 @@ def _steep_ground(requirements: RouteRequirements, leg: int, measure: SlopeMeasu
 
 
 def _steep_ground_message(requirements: RouteRequirements, leg: int, ground: _SteepGround) -> Message:
-    """Make a message that compares ground that a leg cannot follow with the limit of the slope."""
+    """State that a leg follows ground steeper than its slope limit, and how low the aircraft would get."""
     limit_text = f"{ground.name} permits a climb of {math.degrees(ground.limit):.1f}°"
     if not ground.name:
         limit_text = _limit_text(requirements, leg, ground.limit, ground.source)
@@ -256,10 +274,10 @@ def _uncertainty_text(requirements: RouteRequirements, leg: int) -> str:
 
 
 def _limit_deviation(requirements: RouteRequirements, leg: int, limit: float, certain_limit: float) -> float:
-    """Return the standard deviation of an uncertain aircraft's slope limit, rad.
+    """Return the standard deviation of the slope limit of an aircraft with an uncertain model, rad.
 
-    The limit is a slope over the ground, and so is the deviation.  If nothing of the limit is certain, the deviation is
-    the one in still air.
+    The deviation, like the limit, is a slope over the ground.  If the aircraft can certainly fly no slope at all, it is
+    the deviation in still air.
     certain_limit: limit reduced by the uncertainty, rad.
     """
     envelope = requirements.setup.envelope
@@ -269,7 +287,7 @@ def _limit_deviation(requirements: RouteRequirements, leg: int, limit: float, ce
 
 
 def _ability_text(requirements: RouteRequirements, leg: int, limit: float, source: str, *, has_failed: bool) -> str:
-    """Explain how the aircraft's uncertainty leaves a slope undecided, or how it limits the suggestions.
+    """Explain what an uncertain aircraft model does: it leaves a slope undecided or limits suggestions.
 
     Return "" for an aircraft without uncertainty.  Return "" also for a planned slope above the limit, because its own
     message states the limit.
@@ -283,9 +301,10 @@ def _ability_text(requirements: RouteRequirements, leg: int, limit: float, sourc
 
 
 def _certain_limit_text(requirements: RouteRequirements, leg: int, limit: float, source: str) -> str:
-    """State the certain part of a slope limit; suggested slopes stay within this part.
+    """State the slope that an aircraft with an uncertain model can certainly fly, for suggestions.
 
-    Return "" if the whole limit is certain, or if the limit does not come from the aircraft.
+    Suggested slopes stay within it.  Return "" if the whole limit is certain, or if the limit does not come from the
+    aircraft.
     limit, source: limit of the slope, rad, and its source.
     """
     envelope, is_climb = requirements.setup.envelope, float(requirements.slopes[leg]) >= 0.0
@@ -338,7 +357,7 @@ def _is_in_envelope(requirements: RouteRequirements, leg: int) -> bool:
 
 
 def _steep_leg_message(requirements: RouteRequirements, leg: int, limit: float, source: str) -> Message:
-    """Make a message that compares a planned slope that is too steep with its limit (rad)."""
+    """State that the planned slope of a leg exceeds its limit (rad)."""
     planned_slope = float(requirements.slopes[leg])
     verb = "climbs" if planned_slope >= 0.0 else "descends"
     slope_text = f"{math.degrees(abs(planned_slope)):.1f}° for {_distance_text(float(requirements.runs[leg]))}"
@@ -409,7 +428,7 @@ def _distance_text(distance: float) -> str:
 
 
 def _throttle_text(requirements: RouteRequirements, name: str) -> str:
-    """Describe a throttle limit, such as "throttle at full", or by the parameter that limits it.
+    """Describe a throttle limit: "throttle at full", or "throttle at its limit" and the parameter.
 
     name: "full" or "idle".
     """
@@ -423,29 +442,6 @@ def _throttle_times(measure: SlopeMeasure) -> tuple[tuple[str, float, float, str
         ("full", measure.full_throttle_time, measure.speed_loss, "slow"),
         ("idle", measure.idle_throttle_time, measure.speed_gain, "fast"),
     )
-
-
-def _flown_facts(requirements: RouteRequirements, leg: int, measure: SlopeMeasure) -> list[tuple[str, str]]:
-    """Describe how a leg was flown, as pairs of a quantity's name and a text."""
-    facts = []
-    if measure.slope is not None:
-        facts.append(("slope", f"flown {math.degrees(measure.slope.value):+.2f}°"))
-    if measure.height_error is not None:
-        line = "the leg's height above ground" if follows_ground(requirements, leg) else "the leg"
-        facts.append(("height", f"altitude within {abs(measure.height_error):.1f} m of {line}"))
-    facts += [
-        (name, f"{_throttle_text(requirements, name)} for {duration:.0f} s")
-        for name, duration, _, _ in _throttle_times(measure)
-        if duration >= 1.0
-    ]
-    if measure.pitch_limit_time >= SATURATED_TIME_S:
-        limit_name = requirements.setup.autopilot.speeds.max_pitch_name
-        facts.append(("pitch", f"pitch at its limit {limit_name} for {measure.pitch_limit_time:.0f} s"))
-    arc = steep_arc(requirements, leg)
-    if arc is not None and _is_arc_within_tolerance(arc, measure):
-        place = place_text(requirements.waypoint(leg + 1))
-        facts.append(("arc", f"the arc at {place} misses its height by only {arc.missing_height:.1f} m"))
-    return facts
 
 
 def _measured_facts(requirements: RouteRequirements, leg: int, measure: SlopeMeasure | None) -> list[Fact]:
@@ -541,12 +537,12 @@ def _performance_faults(requirements: RouteRequirements, leg: int, measure: Slop
 
 
 def _height_error_limit(measure: SlopeMeasure) -> float:
-    """Return the largest height error of a leg that is no fault, m."""
+    """Return the largest accepted height error of a leg, m."""
     return SHORT_LEG_HEIGHT_ERROR_LIMIT_M if measure.is_short else HEIGHT_ERROR_LIMIT_M
 
 
 def _rate_limit_slope(requirements: RouteRequirements, leg: int, *, is_climb: bool) -> tuple[float, str]:
-    """Return the slope over the ground at the autopilot's climb or sink rate limit, and its name.
+    """Return the slope over the ground at the autopilot's rate limit, rad, and the limit's name.
 
     The slope is inf without a limit, and for an imported flight whose log does not contain the parameter.
     """
@@ -564,7 +560,7 @@ def _rate_limit_slope(requirements: RouteRequirements, leg: int, *, is_climb: bo
 
 
 def _rate_limit_faults(requirements: RouteRequirements, leg: int, measure: SlopeMeasure) -> list[Message]:
-    """Return a fault if the autopilot's rate limit kept a flight from the leg's height."""
+    """Return a fault if a climb or sink rate limit kept the aircraft from the altitude of the leg."""
     planned_slope = float(requirements.slopes[leg])
     sign = 1.0 if planned_slope >= 0.0 else -1.0
     slope, name = _rate_limit_slope(requirements, leg, is_climb=planned_slope >= 0.0)

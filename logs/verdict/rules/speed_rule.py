@@ -69,7 +69,7 @@ def speed_findings(
 def _speed_finding(
     requirements: RouteRequirements, aligned: AlignedTrack | None, leg: int, demanded: float, *, geometric: bool
 ) -> Finding:
-    """Judge the commanded and the flown airspeed on a leg; `demanded`: the mission's, true or equivalent, m/s."""
+    """Judge the flown airspeed and the airspeed that the mission commands on a leg (`demanded`, m/s)."""
     commanded = float(requirements.route.leg_airspeeds[leg])
     min_speed, max_speed, faults = _level_speed_range(requirements, leg, commanded)
     notes = [*_speed_range_notes(requirements, leg), _command_text(demanded, commanded, min_speed, max_speed)]
@@ -131,7 +131,7 @@ def _speed_finding(
 def _command_text(demanded: float, commanded: float, min_speed: float, max_speed: float) -> str:
     """Describe the commanded airspeed on a leg, and the range of airspeeds in level flight, m/s.
 
-    demanded: commanded equivalent airspeed, m/s.
+    demanded: airspeed as the mission states it, m/s: true airspeed, or equivalent airspeed for some autopilots.
     commanded: the commanded airspeed as true airspeed, m/s; the text states it only if it differs.
     """
     true_speed_text = "" if demanded == commanded else f" of equivalent airspeed, {commanded:.1f} m/s of true airspeed,"
@@ -161,7 +161,8 @@ def _find_held_speed(
 
     The airspeed is the mean over the second half of the leg's steady rows, because the aircraft may still change its
     speed in the first half.  Return None also for a leg that is too steep, because the slope rule reports it.  Return
-    None for an imported flight, because its airspeed sensor may have the same error.
+    None for an imported flight, because its airspeed sensor may have the same error, and for an airspeed that was
+    raised to keep a minimum ground speed.
     """
     if abs(float(requirements.slopes[leg])) > slope_limit(requirements, leg)[0] + PLAN_TOLERANCE_RAD:
         return None
@@ -191,7 +192,7 @@ def _find_held_speed(
 def _uncertainty_text(requirements: RouteRequirements, leg: int, commanded: float, max_speed: float) -> str:
     """Compare a commanded airspeed with the maximum airspeed and its standard deviation, as text.
 
-    Returns "" if the commanded airspeed is below the maximum even after a margin for this uncertainty.
+    Return "" if the commanded airspeed is below the maximum even after a margin for this uncertainty.
     """
     envelope = requirements.setup.envelope
     if not envelope.fastest_sd:
@@ -218,7 +219,7 @@ def _speed_range_notes(requirements: RouteRequirements, leg: int) -> list[str]:
 def _short_leg_notes(requirements: RouteRequirements, leg: int, commanded: float) -> list[str]:
     """Return a note if a leg is too short to reach its airspeed; otherwise [].
 
-    The acceleration is `MAX_STEADY_ACCELERATION_MPS2`.
+    The aircraft is assumed to accelerate at `MAX_STEADY_ACCELERATION_MPS2`.
     """
     previous_speed = float(requirements.route.leg_airspeeds[leg - 1]) if leg else commanded
     change, leg_length = commanded - previous_speed, float(requirements.runs[leg])
@@ -305,8 +306,9 @@ def _level_speed_range(
 def _measure_airspeed(
     requirements: RouteRequirements, aligned: AlignedTrack, leg: int
 ) -> tuple[float, float, float] | None:
-    """Return a leg's mean airspeed, its tolerance and its minimum one-second mean, m/s, or None.
+    """Return a leg's mean airspeed, its tolerance and its minimum one-second mean, m/s.
 
+    Return None if the leg was flown steadily for too short a time.
     The tolerance allows for gusts and for a change of slope at the start of the leg.
     """
     rows = steady_rows(requirements, aligned, leg)

@@ -55,17 +55,7 @@ def stall_findings(
     A route whose airspeed is below the stall speed in a planned turn also fails after a flight.  An autopilot that flew
     faster or banked less does not make the route flyable.
     """
-    planned = _planned_findings(requirements)
-    if geometric:
-        return planned
-    # Without an envelope there is no limit to compare a flight with.
-    if aligned is None or not requirements.envelope:
-        return []
-    return [finding for finding in planned if finding.ok is False] or _flown_findings(requirements, aligned)
-
-
-def _planned_findings(requirements: RouteRequirements) -> list[Finding]:
-    """Judge the planned turn with the smallest margin above the stall; return [] without a turn."""
+    # The planned turn with the smallest margin above the stall.
     worst_margin: tuple[float, int, _Margin] | None = None
     for corner in range(1, requirements.legs):
         for speed in requirements.route.leg_airspeeds[corner - 1 : corner + 1].tolist():
@@ -78,10 +68,16 @@ def _planned_findings(requirements: RouteRequirements) -> list[Finding]:
                 and (worst_margin is None or margin.above_stall < worst_margin[0])
             ):
                 worst_margin = margin.above_stall, corner, margin
-    if worst_margin is None:
+    planned = []
+    if worst_margin is not None:
+        _, corner, margin = worst_margin
+        planned = [_stall_finding(margin, f"at waypoint {requirements.waypoint(corner).number}", 0.0, geometric=True)]
+    if geometric:
+        return planned
+    # Without an envelope there is no limit to compare a flight with.
+    if aligned is None or not requirements.envelope:
         return []
-    _, corner, margin = worst_margin
-    return [_stall_finding(margin, f"at waypoint {requirements.waypoint(corner).number}", 0.0, geometric=True)]
+    return [finding for finding in planned if finding.ok is False] or _flown_findings(requirements, aligned)
 
 
 def planned_bank(requirements: RouteRequirements, waypoint: int, speed: float) -> float:

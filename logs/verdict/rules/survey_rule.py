@@ -27,6 +27,7 @@ from logs.verdict.measures.photo_lines import (
     is_covered,
     measure_line,
     measure_overlap,
+    planned_switch_radius,
 )
 from logs.verdict.measures.route_requirements import RouteRequirements, slope_limits, turn_limit
 from logs.verdict.measures.track_alignment import AlignedTrack
@@ -57,8 +58,8 @@ def survey_findings(
 ) -> list[Finding]:
     """Judge each photo line and the overlap of each survey's photos.
 
-    If ``geometric``, judge a line by the part outside the turns at its ends and outside the climb or descent before it.
-    Also report turnarounds that cannot be flown as drawn.
+    If ``geometric``, judge a line by the part outside the turns at its ends and outside the climb or descent before it,
+    and report turnarounds that cannot be flown as drawn.
     """
     findings = []
     for survey in requirements.surveys:
@@ -75,7 +76,7 @@ def survey_findings(
 
 
 def _overlap_findings(requirements: RouteRequirements, aligned: AlignedTrack | None, survey: Survey) -> list[Finding]:
-    """Judge the smallest measured front and side overlap of a survey's photos against the required overlaps.
+    """Judge the smallest front and side overlap of a survey's photos against the required overlaps.
 
     An overlap that is not measured or not required has no finding.  Return [] if the survey's camera is unknown.
     """
@@ -237,7 +238,21 @@ def _planned_finding(
     tolerance = max(MIN_PHOTO_HEIGHT_ERROR_M, PHOTO_HEIGHT_FRACTION * height)
     off_altitude = _off_altitude_length(requirements, before, line.first, line.last, tolerance)
     cut_in = max(turn_in, off_altitude)
-    cut_out = _clip_to_length(_turn_lead(requirements, line) - lead_out, length)
+    # Distance before the waypoint at the line's end at which the turn begins.
+    setup, last = requirements.setup, line.ends
+    if setup.autopilot.turns.follows_path or not 0 < last < requirements.legs:
+        turn_lead = float(requirements.length_before[last])
+    elif setup.autopilot.turns.radii_at is not None:
+        turn_lead = float(setup.autopilot.turns.radii_at(requirements.ground_speed[last - 1 : last])[0])
+    else:
+        turn = abs(float(requirements.turns[last]))
+        mission_radius = (
+            float(setup.route.points["acceptance_radius"][last]) if setup.autopilot.turns.reads_acceptance else 0.0
+        )
+        turn_lead = mission_radius or setup.autopilot.turns.distance(turn, float(requirements.points[last, 2]))
+    turn_out = _clip_to_length(turn_lead - lead_out, length)
+    camera_out = _planned_camera_cut(requirements, line, length)
+    cut_out = max(turn_out, camera_out)
     straight_fraction = max(0.0, length - cut_in - cut_out) / length
     # Fraction of the line whose height above ground is unknown.
     axis = LineAxis(requirements.points[line.first : line.last + 1])
@@ -254,6 +269,8 @@ def _planned_finding(
         cause, usable_state = ("the turns at its ends leave", "straight")
         if off_altitude > turn_in:
             cause, usable_state = ("the climb or descent before it leaves", "at its planned height above ground")
+        elif camera_out > max(cut_in, turn_out):
+            cause, usable_state = ("the camera, which is switched off before its end, leaves", "with photos")
         faults.append(
             message(
                 f"{name}: {cause} only {100.0 * straight_fraction:.0f} % of its {length:.0f} m {usable_state}",
@@ -274,18 +291,16 @@ def _unknown_ground_message(requirements: RouteRequirements, fraction: float, le
     return message(f"{name}: {100.0 * fraction:.0f} % of its {length:.0f} m lies outside {source_text}")
 
 
-def _turn_lead(requirements: RouteRequirements, line: PhotoLine) -> float:
-    """Return the distance before the waypoint at a photo line's end at which the turn begins, m."""
-    setup, last = requirements.setup, line.ends
-    if setup.autopilot.turns.follows_path or not 0 < last < requirements.legs:
-        return float(requirements.length_before[last])
-    if setup.autopilot.turns.radii_at is not None:
-        return float(setup.autopilot.turns.radii_at(requirements.ground_speed[last - 1 : last])[0])
-    turn = abs(float(requirements.turns[last]))
-    mission_radius = (
-        float(setup.route.points["acceptance_radius"][last]) if setup.autopilot.turns.reads_acceptance else 0.0
-    )
-    return mission_radius or setup.autopilot.turns.distance(turn, float(requirements.points[last, 2]))
+def _planned_camera_cut(requirements: RouteRequirements, line: PhotoLine, length: float) -> float:
+    """Return the length at the end of a planned photo line on which the camera is already switched off, m.
+
+    The autopilot switches it off where it counts the waypoint as reached.
+    """
+    off = line.camera_off_at
+    if off < 0:
+        return 0.0
+    beyond_end = float(requirements.runs[line.last : off].sum()) - float(requirements.runs[off : line.last].sum())
+    return _clip_to_length(planned_switch_radius(requirements, off) - beyond_end, length)
 
 
 def _clip_to_length(distance: float, length: float) -> float:

@@ -15,8 +15,7 @@ from logs.verdict.places import FLIGHT, Place
 from logs.verdict.rule import LogNeeds, Rule
 from logs.verdict.suggestions import suggest_wider_berth
 from logs.verdict.wording import place_text
-from world.arrays import Floats
-from world.threats import Threats, threat_label
+from world.threats import threat_label
 
 SphereKind = Literal["missile", "radar"]
 
@@ -39,7 +38,11 @@ def threat_findings(
     findings: list[Finding] = []
     nearest_distance, nearest_name = math.inf, ""
     for kind in ("missile", "radar"):
-        radii, scales = _sphere_sizes(threats, kind)
+        radii, scales = (
+            (threats.kill_radius, threats.kill_scale)
+            if kind == "missile"
+            else (threats.detection_radius, threats.detection_scale)
+        )
         planned_visits = path_spheres(
             requirements.path.points, requirements.path.times, threats.position, radii, scales
         )
@@ -76,13 +79,6 @@ def threat_findings(
             ),
         )
     return findings
-
-
-def _sphere_sizes(threats: Threats, kind: SphereKind) -> tuple[Floats, Floats]:
-    """Return radius and exposure scale of each threat's missile or radar sphere, m, (n,) each."""
-    if kind == "missile":
-        return threats.kill_radius, threats.kill_scale
-    return threats.detection_radius, threats.detection_scale
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,6 +1,6 @@
 """The touchdown rule: judge a flown landing, from the last waypoint to the stop.
 
-The rule judges the height of the final above ground, the hazards that the final enters, and the points on the
+The rule judges the height of the final approach above ground, the hazards that it enters, and the points on the
 scenario's strip where the aircraft touches down and stops.  It only reports the sink rate towards the ground, which may
 slope upwards, because the simulated ArduPlane is accurate down to the flare but less accurate in the last metres
 (`docs/measured.md`).  A sink rate beyond all measured ones therefore leaves the landing undecided, and no sink rate
@@ -48,7 +48,7 @@ class _Landing(NamedTuple):
     touchdown, stop: positions on the strip, each as distance beyond the strip's center and to the right of it, m.
     strip_left: length of strip remaining beyond the stop, m.
     sink, ground_sink: sink rate at the touchdown, vertical and relative to the sloping ground, m/s.
-    final_clearance: minimum height of the final above ground, m; inf without a final, NaN if unknown.
+    final_clearance: minimum height of the final approach above ground, m; inf without one, NaN if unknown.
     point_height: height of the landing point above the ground, m.
     """
 
@@ -87,7 +87,16 @@ def touchdown_findings(
         reason = "the terrain at the landing point is unknown"
         fault = message(f"the touchdown at {place_text(place)} is not judged: {reason}")
         return [make_finding("touchdown", place, ok=None, reason=reason, faults=[fault], unit="m", check=GROUND_PATH)]
-    touchdown_row = _touchdown_row(track, terrain)
+    # First row in which the aircraft is as low above ground as at its final standstill.
+    touchdown_row = None
+    if len(track):
+        position = np.asarray(track.position, dtype=np.float64)
+        heights = position[:, 2] - terrain.height(position[:, 0], position[:, 1])
+        speed = np.hypot(*np.asarray(track.velocity[:, :2], dtype=np.float64).T)
+        # The aircraft has landed only if it has stopped.
+        if speed[-1] < 1.0:
+            is_low = heights <= heights[-1] + CONTACT_HEIGHT_M
+            touchdown_row = int(np.argmax(is_low)) if is_low.any() else None
     if touchdown_row is None:
         fault = message("the aircraft did not touch down", f" at {_landing_point_text(approach)}")
         return [make_finding("touchdown", place, ok=False, reason=fault.text, faults=[fault], unit="m")]
@@ -115,7 +124,7 @@ def _short_strip_findings(place: Place, approach: Approach) -> list[Finding]:
 def _measure_landing(
     requirements: RouteRequirements, track: Track, terrain: Terrain, approach: Approach, touchdown_row: int
 ) -> _Landing:
-    """Measure a landing: positions of touchdown and stop, sink rates, and lowest clearance of the approach.
+    """Measure a landing: touchdown, stop, sink rates, and lowest clearance of the final approach.
 
     touchdown_row: row of the track in which the aircraft touches down.
     The result's `point_height` is not set and remains NaN.
@@ -194,23 +203,6 @@ def _landing_point_text(approach: Approach) -> str:
 def _as_floats(values: tuple[Floats, Floats]) -> tuple[float, float]:
     """Convert two arrays of one element each to floats."""
     return float(values[0]), float(values[1])
-
-
-def _touchdown_row(track: Track, terrain: Terrain) -> int | None:
-    """Return the first row in which the aircraft is as low above ground as at its final standstill.
-
-    Return None if the aircraft is still moving in the last row.
-    """
-    if not len(track):
-        return None
-    position = np.asarray(track.position, dtype=np.float64)
-    heights = position[:, 2] - terrain.height(position[:, 0], position[:, 1])
-    speed = np.hypot(*np.asarray(track.velocity[:, :2], dtype=np.float64).T)
-    # The aircraft has landed only if it has stopped.
-    if not speed[-1] < 1.0:
-        return None
-    is_low = heights <= heights[-1] + CONTACT_HEIGHT_M
-    return int(np.argmax(is_low)) if is_low.any() else None
 
 
 def _sink_rates(track: Track, terrain: Terrain, approach: Approach, row: int) -> tuple[float, float]:

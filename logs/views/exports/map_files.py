@@ -222,7 +222,19 @@ def kml_text(title: str, lines: list[MapLine], zones: Sequence[MapZone] = ()) ->
             point = _add_element(mark, "Point")
             _add_element(point, "altitudeMode", "absolute")
             _add_element(point, "coordinates", _format_coordinates(line, k))
-    _add_zones(folders, zones)
+    for zone in zones:
+        mark = _add_element(folders.shared_folder(zone.folder), "Placemark")
+        _add_element(mark, "name", zone.name)
+        _add_style(mark, zone.role)
+        geometry = _add_element(mark, "MultiGeometry")
+        for outline, *holes in zone.parts:
+            polygon = _add_element(geometry, "Polygon")
+            if zone.height is not None:
+                _add_element(polygon, "extrude", "1")
+                _add_element(polygon, "altitudeMode", "relativeToGround" if zone.above_ground else "absolute")
+            _add_ring(polygon, "outerBoundaryIs", outline, zone)
+            for hole in holes:
+                _add_ring(polygon, "innerBoundaryIs", hole, zone)
     ElementTree.indent(root)
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
 
@@ -262,23 +274,6 @@ def _add_style(mark: ElementTree.Element, role: str) -> None:
     _add_element(line, "color", f"ff{colour}")
     _add_element(line, "width", f"{max(1.0, role_style.width):g}")
     _add_element(_add_element(style, "PolyStyle"), "color", f"{round(255.0 * role_style.fill):02x}{colour}")
-
-
-def _add_zones(folders: _Folders, zones: Sequence[MapZone]) -> None:
-    """Add a placemark with its outlines for each zone."""
-    for zone in zones:
-        mark = _add_element(folders.shared_folder(zone.folder), "Placemark")
-        _add_element(mark, "name", zone.name)
-        _add_style(mark, zone.role)
-        geometry = _add_element(mark, "MultiGeometry")
-        for outline, *holes in zone.parts:
-            polygon = _add_element(geometry, "Polygon")
-            if zone.height is not None:
-                _add_element(polygon, "extrude", "1")
-                _add_element(polygon, "altitudeMode", "relativeToGround" if zone.above_ground else "absolute")
-            _add_ring(polygon, "outerBoundaryIs", outline, zone)
-            for hole in holes:
-                _add_ring(polygon, "innerBoundaryIs", hole, zone)
 
 
 def _add_ring(polygon: ElementTree.Element, kind: str, ring: Floats, zone: MapZone) -> None:

@@ -129,25 +129,20 @@ class _MovingParts:
         rotation = Affine2D().rotate(-yaw if math.isfinite(yaw) else 0.0)
         self._aircraft.set_marker(MarkerStyle(_PLANE, transform=rotation))
         self._aircraft.set_data(track.position[k : k + 1, 0], track.position[k : k + 1, 1])
-        self._text.set_text(self._write_caption(k))
+        roll, _, _ = track.attitude[k].tolist()
+        leg_numbers = self._setup.route.leg_numbers
+        parts = [
+            f"{float(track.time[k]):7.1f} s",
+            f"leg {leg_numbers[min(int(track.leg[k]), len(leg_numbers) - 1)]} of {leg_numbers[-1] + 1}",
+            f"{format_signed_number(float(track.airspeed[k]), 1)} m/s",
+            f"{format_signed_number(float(track.position[k, 2]), 0)} m AMSL",
+            f"{format_signed_number(float(self._above[k]), 0)} m above ground",
+            f"bank {format_signed_number(math.degrees(roll), 0)}°",
+        ]
+        self._text.set_text("   ".join(parts))
         for artist in (self._trail, self._aircraft):
             self._axes.draw_artist(artist)
         self._figure.draw_artist(self._text)
-
-    def _write_caption(self, row: int) -> str:
-        """Return the caption of a row: time, leg, airspeed, altitude, height above ground and bank."""
-        track = self._track
-        roll, _, _ = track.attitude[row].tolist()
-        leg_numbers = self._setup.route.leg_numbers
-        parts = [
-            f"{float(track.time[row]):7.1f} s",
-            f"leg {leg_numbers[min(int(track.leg[row]), len(leg_numbers) - 1)]} of {leg_numbers[-1] + 1}",
-            f"{format_signed_number(float(track.airspeed[row]), 1)} m/s",
-            f"{format_signed_number(float(track.position[row, 2]), 0)} m AMSL",
-            f"{format_signed_number(float(self._above[row]), 0)} m above ground",
-            f"bank {format_signed_number(math.degrees(roll), 0)}°",
-        ]
-        return "   ".join(parts)
 
 
 def format_signed_number(value: float, digits: int) -> str:

@@ -74,7 +74,17 @@ def timeline_of_legs(log: FlightLog) -> list[TimelineEntry]:
     stops = [*edges.tolist(), len(track)]
     all_parts = [_LegRows(int(track.leg[start]), start, stop - 1) for start, stop in zip(starts, stops, strict=True)]
     parts = [part for part in all_parts if 0 <= part.leg < log.setup.route.legs]
-    entries = [_make_start_entry(log)]
+    setup = log.setup
+    east, north, up = track.position[0].tolist()
+    lat, lon = to_geo(setup.scenario.origin, east, north)
+    scenario = "a mission without a scenario" if setup.scenario.external else f"scenario {setup.scenario.name}"
+    place = f"from {float(lat):.5f}, {float(lon):.5f} at {up:.0f} m AMSL"
+    if setup.imported_log is None:
+        text = f"{setup.aircraft}, {scenario}, seed {setup.seed}; {place}. {setup.started}"
+    else:
+        # A real flight has neither a seed nor a trim.
+        text = f"{setup.aircraft}, {scenario}; imported log {setup.imported_log.file}, {place}"
+    entries = [TimelineEntry(float(track.time[0]), "start", text.strip())]
     entries += _list_leg_entries(log, parts)
     entries += _list_turn_entries(log, parts)
     entries += _list_clearance_entries(log, parts)
@@ -122,21 +132,6 @@ def waypoint_name(route: Route, index: int) -> str:
     item = int(route.items[index])
     number = int(route.stops[index])
     return f"waypoint {number}" if item < 0 else f"waypoint {number} (item {item})"
-
-
-def _make_start_entry(log: FlightLog) -> TimelineEntry:
-    """Return the entry on aircraft, scenario and start of the flight."""
-    setup, track = log.setup, log.track
-    east, north, up = track.position[0].tolist()
-    lat, lon = to_geo(setup.scenario.origin, east, north)
-    scenario = "a mission without a scenario" if setup.scenario.external else f"scenario {setup.scenario.name}"
-    place = f"from {float(lat):.5f}, {float(lon):.5f} at {up:.0f} m AMSL"
-    if setup.imported_log is None:
-        text = f"{setup.aircraft}, {scenario}, seed {setup.seed}; {place}. {setup.started}"
-    else:
-        # A real flight has neither a seed nor a trim.
-        text = f"{setup.aircraft}, {scenario}; imported log {setup.imported_log.file}, {place}"
-    return TimelineEntry(float(track.time[0]), "start", text.strip())
 
 
 def _list_leg_entries(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:

@@ -117,22 +117,6 @@ def _make_flown_cells(track: Track | None, heights_above_ground: Floats | None, 
     )
 
 
-def _describe_judged_part(setup: FlightSetup) -> str:
-    """State in which phases the required height above ground applies: after take-off, before landing.
-
-    Returns "" for a flight without take-off and landing.
-
-    >>> from logs.recording.example_log import example_log
-    >>> _describe_judged_part(example_log().setup)
-    ''
-    """
-    phases = setup.ground_phases
-    parts = ["after the take-off"] if phases.take_off is not None else []
-    if phases.approach is not None:
-        parts.append(f"before the final approach on leg {setup.route.leg_numbers[phases.approach.leg]}")
-    return " " + " and ".join(parts) if parts else ""
-
-
 def flight_sentence(setup: FlightSetup, track: Track | None) -> str:
     """Return one sentence on the flight: distance, time, lowest height and energy; "" for a plan."""
     if track is None:
@@ -146,7 +130,13 @@ def flight_sentence(setup: FlightSetup, track: Track | None) -> str:
         if heights_above_ground is None
         else number(_find_min_finite(heights_above_ground[~is_ground_phase]), digits=0)
     )
-    phase_text = _describe_judged_part(setup) if is_ground_phase.any() else ""
+    phase_text = ""
+    if is_ground_phase.any():
+        phases = setup.ground_phases
+        parts = ["after the take-off"] if phases.take_off is not None else []
+        if phases.approach is not None:
+            parts.append(f"before the final approach on leg {setup.route.leg_numbers[phases.approach.leg]}")
+        phase_text = " " + " and ".join(parts) if parts else ""
     height_text = f", never less than {lowest_text} m above ground{phase_text}" if lowest_text != NOTHING else ""
     energy_used = float(track.energy[-1])
     # An imported log may contain no battery data.
@@ -258,20 +248,15 @@ def flight_facts(setup: FlightSetup, end_reason: str) -> Facts:
         if plan.algorithm == GIVEN_WAYPOINTS:
             plan_text = "given waypoints, not searched"
         has_only_unmet_margins = bool(plan.unmet_margins) and not plan.failures
-        status = (
-            "planner's margins not met" if has_only_unmet_margins else _describe_plan_status(plan.feasible, plan.safe)
-        )
+        status = "feasible, but within a missile's reach" if plan.feasible else "not feasible"
+        if has_only_unmet_margins:
+            status = "planner's margins not met"
+        elif plan.safe:
+            status = "feasible, and outside every missile's reach"
         facts.append(("Plan", f"{plan_text}; {status}"))
     if end_reason:
         facts.append(("Flight ended", end_reason))
     return facts
-
-
-def _describe_plan_status(feasible: bool, safe: bool) -> str:
-    """Return a clause on whether a plan is feasible, and whether it avoids every missile."""
-    if safe:
-        return "feasible, and outside every missile's reach"
-    return "feasible, but within a missile's reach" if feasible else "not feasible"
 
 
 def event_rows(events: Sequence["LogEvent"]) -> list[tuple[str, str, str]]:

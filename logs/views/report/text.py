@@ -119,11 +119,26 @@ def _make_finding_row(finding: Finding) -> FindingRow:
     # The margin is the distance from the shown limit.
     tolerance_in_limit = 0.0 if finding.tolerance_note else in_unit(finding.tolerance, finding.unit)[0] or 0.0
     shown_margin = None if margin is None else margin + tolerance_in_limit
-    method, digits = finding.method, _count_needed_decimals(finding)
+    # Decimals needed to distinguish the value from its limit; None if the usual number suffices.
+    judged_value, shown_limit = (in_unit(value, finding.unit)[0] for value in (finding.value, finding.shown_limit))
+    digits = None
+    if (
+        judged_value is not None
+        and shown_limit is not None
+        and judged_value != shown_limit
+        and number(judged_value) == number(shown_limit)
+    ):
+        sufficient_decimals = (
+            decimals
+            for decimals in range(_MAX_DECIMALS)
+            if number(judged_value, digits=decimals) != number(shown_limit, digits=decimals)
+        )
+        digits = next(sufficient_decimals, _MAX_DECIMALS)
+    method = finding.method
     if finding.tolerance and method and finding.limit is not None:
         limit_text, tolerance = (quantity(value, finding.unit) for value in (finding.limit, finding.tolerance))
         method = f"{method}; limit {limit_text} with a tolerance of {tolerance}"
-    limit = number(in_unit(finding.shown_limit, finding.unit)[0], digits=digits)
+    limit = number(shown_limit, digits=digits)
     return FindingRow(
         finding=finding,
         state=finding.state,
@@ -140,17 +155,6 @@ def _make_finding_row(finding: Finding) -> FindingRow:
 
 # Largest number of decimals of a value and its limit.
 _MAX_DECIMALS = 6
-
-
-def _count_needed_decimals(finding: Finding) -> int | None:
-    """Return the decimals needed to distinguish a value from its limit; None if the usual number suffices."""
-    value, limit = (in_unit(quantity_value, finding.unit)[0] for quantity_value in (finding.value, finding.shown_limit))
-    if value is None or limit is None or value == limit or number(value) != number(limit):
-        return None
-    sufficient_decimals = (
-        digits for digits in range(_MAX_DECIMALS) if number(value, digits=digits) != number(limit, digits=digits)
-    )
-    return next(sufficient_decimals, _MAX_DECIMALS)
 
 
 def missed_text(finding: Finding) -> str:

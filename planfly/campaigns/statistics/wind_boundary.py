@@ -251,22 +251,12 @@ class Direction:
             evidence = np.array([sum(mode.log_evidence for mode in modes) for modes in modes_by_link])
             weights = np.exp(evidence - evidence.max())
             weights /= weights.sum()
-            self._fits = (
-                len(self.speeds),
-                tuple(
-                    self._make_fit(modes, float(weight)) for modes, weight in zip(modes_by_link, weights, strict=True)
-                ),
-            )
+            draws, fits = self.numbers.population, []
+            for modes, weight in zip(modes_by_link, weights.tolist(), strict=True):
+                speed = boundary_speed(modes, draws, 1.0 - self.target, self.max_speed)
+                fits.append(FailureFit(modes, weight, speed, boundary_slopes(modes, draws, speed)))
+            self._fits = (len(self.speeds), tuple(fits))
         return self._fits[1]
-
-    def _make_fit(self, modes: tuple[FailureMode, ...], weight: float) -> FailureFit:
-        """Return the fit of a link with its boundary and the boundary's derivatives.
-
-        weight: probability of the link function.
-        """
-        draws = self.numbers.population
-        speed = boundary_speed(modes, draws, 1.0 - self.target, self.max_speed)
-        return FailureFit(modes, weight, speed, boundary_slopes(modes, draws, speed))
 
     def boundary(self) -> WindBoundary:
         """Return the largest wind with the target probability: estimate and interval, m/s.
@@ -344,30 +334,30 @@ def next_flights(direction: Direction, count: int) -> list[tuple[float, int]]:
     that are expected to reduce the variance of the boundary most.
     """
     if direction.all_flyable or direction.all_failed:
-        speed = _bisect_speed(direction)
+        # While all flights had the same result, the wind is half of the weakest one if all failed, and between the
+        # strongest and the maximum if all were flyable.
+        max_speed = direction.max_speed
+        if not direction.speeds:
+            speed = _round_to_grid(0.5 * max_speed, max_speed)
+        elif direction.all_failed:
+            speed = _round_to_grid(0.5 * min(direction.speeds), max_speed)
+        else:
+            max_flown = max(direction.speeds)
+            speed = (
+                _round_to_grid(0.5 * (max_flown + max_speed), max_speed)
+                if max_flown < max_speed - _LARGEST_WIND_TOLERANCE_MPS
+                else max_speed
+            )
         # In the maximum wind, the draws with extreme values come first, because they are the most likely to fail.
-        draws = _extreme_draws(direction) if speed == direction.max_speed else []
+        draws = []
+        if speed == direction.max_speed:
+            numbers = direction.numbers.first_draws(_EXTREME_DRAW_POOL)
+            extreme_draws = [
+                int(select(numbers[:, k])) for k in range(numbers.shape[1]) for select in (np.argmax, np.argmin)
+            ]
+            draws = [draw for draw in dict.fromkeys(extreme_draws) if draw not in set(direction.draws)]
         return [(speed, draw) for draw in (draws + _next_draws(direction, count, draws))[:count]]
     return _choose_most_informative(direction, count)
-
-
-def _bisect_speed(direction: Direction) -> float:
-    """Return the next wind while all flights had the same result, m/s.
-
-    It is half of the weakest wind if all flights failed.  If all were flyable, it is halfway between the strongest wind
-    and the maximum, or the maximum itself if this is close.  The first wind is half of the maximum.
-    """
-    max_speed = direction.max_speed
-    if not direction.speeds:
-        return _round_to_grid(0.5 * max_speed, max_speed)
-    if direction.all_failed:
-        return _round_to_grid(0.5 * min(direction.speeds), max_speed)
-    max_flown = max(direction.speeds)
-    return (
-        _round_to_grid(0.5 * (max_flown + max_speed), max_speed)
-        if max_flown < max_speed - _LARGEST_WIND_TOLERANCE_MPS
-        else max_speed
-    )
 
 
 def _next_draws(direction: Direction, count: int, other_draws: list[int]) -> list[int]:
@@ -380,13 +370,6 @@ def _next_draws(direction: Direction, count: int, other_draws: list[int]) -> lis
             draws.append(index)
         index += 1
     return draws
-
-
-def _extreme_draws(direction: Direction) -> list[int]:
-    """Return the indices of the draws with the largest and smallest value of each quantity, if not yet flown."""
-    numbers = direction.numbers.first_draws(_EXTREME_DRAW_POOL)
-    extreme_draws = [int(select(numbers[:, k])) for k in range(numbers.shape[1]) for select in (np.argmax, np.argmin)]
-    return [draw for draw in dict.fromkeys(extreme_draws) if draw not in set(direction.draws)]
 
 
 def _choose_most_informative(direction: Direction, count: int) -> list[tuple[float, int]]:

@@ -16,7 +16,7 @@ from logs.verdict.findings import make_finding
 from logs.verdict.judge_flight import _disagreements, judge_flight, judge_geometry
 from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.places import FLIGHT, Disagreement, Place
-from logs.verdict.rules.registry import RULES, geometric_findings
+from logs.verdict.rules.registry import RULES, run_rules
 from logs.verdict.verdict import verdict_json
 from tests.logs.verdict.judging import ROUTE, SILENT_ON_WAYPOINTS, failing, judge, leg, of, waypoint
 from tests.soak import scaled
@@ -183,9 +183,10 @@ def test_routes_inside_every_limit_are_flyable_on_both_levels(
 def test_what_a_flight_cannot_change_is_judged_once_for_flight_and_geometry(setup: FlightSetup) -> None:
     """A go-around is flown by a point mass from the planned glide: of all rules it costs the most."""
     of_flight = [make_finding(rule, FLIGHT, ok=False, reason="as flown") for rule in ("go_around", "turn")]
-    found = geometric_findings(route_requirements(setup), of_flight)
+    requirements = route_requirements(setup)
+    found = run_rules(requirements, None, geometric=True, flight_findings=of_flight)
     assert [item for item in found if item.reason == "as flown"] == of_flight[:1]
-    assert len(found) == len(geometric_findings(route_requirements(setup))) + 1
+    assert len(found) == len(run_rules(requirements, None, geometric=True)) + 1
 
 
 def test_a_landing_by_geometry_is_compared_with_the_flown_touchdown() -> None:

@@ -1,24 +1,21 @@
 """The list of commands is that of the parser, and each has its functions and its answer."""
 
-import argparse
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 import planfly.commands
-from planfly.commands.registry import COMMANDS, COMMANDS_BY_NAME, answer_schema, build_parser, call_api
+from planfly.commands.registry import COMMANDS, COMMANDS_BY_NAME, answer_schema, build_parser
 
 
 def test_each_command_is_a_parser_and_a_function_of_one_module() -> None:
     assert list(build_parser().commands) == [command.name for command in COMMANDS]
     modules = {path.stem for path in Path(planfly.commands.__path__[0]).glob("*.py")} - {"__init__", "registry"}
-    assert modules == {command.module or command.name for command in COMMANDS}
+    assert {f"planfly.commands.{module}" for module in modules} == {command.run.__module__ for command in COMMANDS}
     for command in COMMANDS:
-        function, options = command.load(), command.load("add_{}_parser")
-        assert function.__module__ == options.__module__
-        assert (function.__doc__ or "").strip()
+        assert command.run.__module__ == command.add_parser.__module__
+        assert (command.run.__doc__ or "").strip()
 
 
 def test_what_is_no_command_is_none() -> None:
@@ -41,13 +38,3 @@ def test_help_lists_each_command_below_its_section() -> None:
     for before, after in pairwise(COMMANDS):
         assert text.index(f"\n  {before.name} ") < text.index(f"\n  {after.name} ")
         assert text.index(f"\n{after.section}:\n") < text.index(f"\n  {after.name} ")
-
-
-def test_a_call_states_the_keywords_that_the_options_name() -> None:
-    def api(mission: str, *, seed: int = 1, out: str = "here", fence: tuple[str, ...] = ()) -> tuple[Any, ...]:
-        return mission, seed, out, fence
-
-    args = argparse.Namespace(mission="a.plan", seed=3, out=None, fence=[], json="-", overwrite=True)
-    assert call_api(api, args) == ("a.plan", 3, "here", [])
-    assert call_api(api, args, seed=4, out="there") == ("a.plan", 4, "there", [])
-    assert call_api(api, args, seed=None) == ("a.plan", 1, "here", [])

@@ -144,7 +144,7 @@ NETCDF: dict[str, tuple[Writer, tuple[str, ...]]] = {
         nc(lambda: winds(latitudes=np.array([45.9, 46.1, 46.0, 46.2]))),
         ("latitude: neither ascending nor descending",),
     ),
-    "latitudes of metres": (nc(lambda: winds(latitudes=LATITUDES * 1e5)), ("latitude: not numbers of degrees",)),
+    "latitudes of metres": (nc(lambda: winds(latitudes=LATITUDES * 1e5)), ("latitude: expected numbers of degrees",)),
     "latitudes missing": (nc(lambda: winds().rename(latitude="row").drop_vars("row")), ("latitude: missing for u",)),
     "a dimension that is not known": (
         nc(lambda: winds().expand_dims(soil=[0.0, 1.0])),
@@ -160,7 +160,7 @@ NETCDF: dict[str, tuple[Writer, tuple[str, ...]]] = {
                 .assign_coords(valid_time=(("time", "step"), np.stack([winds().time.values] * 2)))
             )
         ),
-        ("valid_time: several times of issue in one file: allowed one",),
+        ("valid_time: several times of issue in one file: only one is allowed",),
     ),
     "another place": (
         nc(lambda: winds(latitudes=LATITUDES + 10.0)),
@@ -188,7 +188,7 @@ NETCDF: dict[str, tuple[Writer, tuple[str, ...]]] = {
     ),
     "geopotential heights that fall": (
         nc(lambda: aloft(heights=np.array([1500.0, 780.0, 100.0])[:, np.newaxis, np.newaxis])),
-        ("gh: the height of a pressure level is not above the height of a higher pressure",),
+        ("gh: the heights of its levels do not increase from high pressure to low pressure",),
     ),
     "other times": (
         nc(lambda: winds(hours=(24.0, 25.0, 26.0, 27.0))),
@@ -220,7 +220,7 @@ NETCDF: dict[str, tuple[Writer, tuple[str, ...]]] = {
                 ]
             )
         ),
-        ("members: 2 and 3: allowed as many at all levels",),
+        ("members: 2 and 3: expected the same number of members at all levels",),
     ),
     "a wind of three dimensions and one of four": (
         nc(lambda: winds().assign(v=winds().v.isel(time=0, drop=True))),

@@ -15,7 +15,7 @@ from typing import TypeAlias
 import pytest
 
 from logs.recording.example_log import example_log
-from logs.recording.recorder import CrashSafeRecorder
+from logs.recording.recorder import Recorder
 from planfly.cli import main
 from tests.planfly.conftest import FIELD
 from tests.soak import SOAK
@@ -233,11 +233,11 @@ def test_two_runs_into_one_folder(folder: Path, capsys: pytest.CaptureFixture[st
 def test_two_flights_into_one_log(folder: Path) -> None:
     """The second does not touch the first's log."""
     path, setup = folder / "f.mcap", example_log().setup
-    with CrashSafeRecorder(path, setup) as first:
+    with Recorder(path, setup) as first:
         size = path.stat().st_size
         with pytest.raises(PlanflyError, match=r"f\.mcap: another planfly process is writing there"):
-            CrashSafeRecorder(path, setup)
+            Recorder(path, setup)
         assert path.stat().st_size == size
         del first
-    with CrashSafeRecorder(path, setup):
+    with Recorder(path, setup):
         pass

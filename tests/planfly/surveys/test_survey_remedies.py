@@ -23,6 +23,7 @@ from logs.verdict.verdict import Verdict
 from planfly.surveys import survey_remedies as remedies
 from planfly.surveys.survey_remedies import TriedRemedies
 from planfly.surveys.survey_text import near_miss_text, remedy_text
+from planfly.terminal.survey_answers import survey_remedy_entry
 from planfly.workflow.open_flight import open_flight
 from planfly.workflow.uav import uav_of_setup
 from tests.mission_lines import mission, wp
@@ -351,6 +352,32 @@ def test_gates_at_the_ends_of_lines_that_lose_their_photos_to_the_acceptance_rad
         *(2, 4, 8, 10, 14, 16)
     ]
     assert remedy_text(gated, 5000.0).startswith("gates (CONDITION_GATE, a setting of QGroundControl) instead of ")
+
+
+def test_gates_with_a_lower_airspeed_are_tried_together(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Three lines of 1 km with leads of 300 m: six gates pass, if the airspeed is at most 15.5 m/s of the x8's 18."""
+    lines = []
+    for k in range(3):
+        north = [-300.0, 0.0, 1000.0, 1300.0][:: 1 if k % 2 == 0 else -1]
+        points = [wp(100.0 * k, value, 100.0) for value in north]
+        lines += [*points[:2], "2 206 50 0 1 0 0 0 0", points[2], "2 206 0 0 1 0 0 0 0", points[3]]
+    file = tmp_path / "gated.waypoints"
+    file.write_text(mission_text(mission(*lines), "waypoints"), encoding="ascii")
+
+    def fly(setup: FlightSetup, *_: Any) -> Any:
+        gates = [item for item in setup.mission.items if item.command == Command.CONDITION_GATE]
+        speeds = [item.params[1] for item in setup.mission.items if item.command == Command.DO_CHANGE_SPEED]
+        passes = len(gates) == 6 and bool(speeds) and speeds[0] <= 15.5
+        return SimpleNamespace(setup=setup, flight_verdict=verdict_of(setup, lambda _: (passes, {})))
+
+    monkeypatch.setattr(remedies, "Trial", fly)
+    setup = open_flight(file, {"aircraft": "x8", "autopilot": "px4"})
+    found = remedies.find_survey_remedies(setup, uav_of_setup(setup), verdict_of(setup, lambda _: (False, {})))
+    [both] = found.remedies
+    # 0.85 of 18 m/s in steps of 0.5 m/s.
+    assert (both.kind, both.value, both.has_gates) == ("airspeed", 15.5, True)
+    assert "15.5 m/s instead of 18 m/s (DO_CHANGE_SPEED) and gates (CONDITION_GATE) where" in remedy_text(both, 5e3)
+    assert survey_remedy_entry(both).has_gates
 
 
 def test_gates_with_longer_turn_arounds_are_tried_together(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

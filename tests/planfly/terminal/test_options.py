@@ -1,5 +1,6 @@
 """Options that several commands take."""
 
+import argparse
 import os
 import signal
 from collections.abc import Callable
@@ -14,6 +15,7 @@ from planfly.terminal.options import (
     add_flight_options,
     add_result_options,
     add_steering_options,
+    call_api,
     watch_stop_signals,
 )
 
@@ -138,3 +140,13 @@ def test_what_is_taken() -> None:
     assert (args.prove, args.flights, args.refly) == (0.5, 10_000_000, 0)
     args = build_parser().parse_args(["winds", "x", "--directions", "72", "--most", "40"])
     assert (args.directions, args.most, args.prove) == (72, 40.0, 0.99)
+
+
+def test_a_call_states_the_keywords_that_the_options_name() -> None:
+    def api(mission: str, *, seed: int = 1, out: str = "here", fence: tuple[str, ...] = ()) -> tuple[Any, ...]:
+        return mission, seed, out, fence
+
+    args = argparse.Namespace(mission="a.plan", seed=3, out=None, fence=[], json="-", overwrite=True)
+    assert call_api(api, args) == ("a.plan", 3, "here", [])
+    assert call_api(api, args, seed=4, out="there") == ("a.plan", 4, "there", [])
+    assert call_api(api, args, seed=None) == ("a.plan", 1, "here", [])

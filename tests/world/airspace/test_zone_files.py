@@ -348,7 +348,7 @@ BAD_FILES = {
     "none.geojson": (b'{"type": "FeatureCollection", "features": []}', "contains no zone"),
     "none.kml": (b"<kml/>", "contains no zone"),
     "latin.geojson": (b'{"type": "\xe9"}', "not a text file in UTF-8 (byte 10)"),
-    "large.kml": (b" " * (MAX_BYTES + 1), "50,331,649 bytes: a file of zones has at most 50,331,648"),
+    "large.kml": (b" " * (MAX_BYTES + 1), "50,331,649 bytes: a file of zones has at most 50,331,648 bytes"),
     "pole.geojson": (
         json.dumps(LAKE).replace("46.02", "89.5").encode(),
         "feature (lake): rings_deg.0.2: latitude 89.5: allowed -89..89",
@@ -401,7 +401,10 @@ def test_no_more_zones_are_made_than_a_scenario_may_have(
     files = [f"{name}.{suffix}" for name in "ab"]
     with pytest.raises(ScenarioError) as caught:
         zone_files.read_zone_files(files, "s.toml", tmp_path)
-    assert str(caught.value) == f"s.toml: zones_file: b.{suffix}: too many zones: at most 4 in all files"
+    assert (
+        str(caught.value)
+        == f"s.toml: zones_file: b.{suffix}: too many zones: at most 4 are allowed in all files together"
+    )
     assert len(made) == 4
 
 
@@ -543,7 +546,7 @@ def test_zones_far_from_the_area_are_left_out(tmp_path: Path) -> None:
     scenario = load_scenario(str(file))
     # The edge of "wide" is 17 km from the origin, its centre 77 km.
     assert [zone.name for zone in scenario.zones] == ["near", "wide", "town"]
-    assert scenario.notes[0].endswith("3 of 6 zones lie more than 20 km from the area: ignored")
+    assert scenario.notes[0].endswith("3 of 6 zones lie more than 20 km from the area and are ignored")
     # A log of it is as large as what is near.
     assert len(scenario.to_json()["zones"]) == 3
     assert scenario_from_spec(scenario.to_json(), "a log").notes == scenario.notes

@@ -151,7 +151,7 @@ def test_a_return_after_an_unknown_use_of_energy_is_undecided(tmp_path: Path) ->
     assert {one.kind for one in found.each} == {"used"}
     assert (found.safe, found.undecided, found.point_of_no_return.kind) == (False, True, "used")
     assert headline(found) == (
-        f"all {len(starts)} returns cannot be judged by energy, because the energy used before it is unknown"
+        f"all {len(starts)} returns cannot be judged by energy, because the energy used before them is unknown"
     )
     # With a guessed battery energy is not judged at all.
     assert judge_returns(replace(world, setup=guessed(setup)), starts, 20.0).safe

@@ -398,13 +398,17 @@ def test_a_missing_line_is_a_gap() -> None:
     assert "lines 3 and 4: 400 m apart" in side.reason
 
 
-def test_a_gate_switches_the_camera_at_its_plane() -> None:
-    """PX4 counts a waypoint as reached within NAV_ACC_RAD, and a gate where it passes it: no photo is missed."""
+@pytest.mark.parametrize(("gate", "left"), [(False, 91.0), (True, 100.0)])
+def test_a_gate_switches_the_camera_at_its_plane(gate: bool, left: float) -> None:
+    """PX4 counts a waypoint as reached within NAV_ACC_RAD, and a gate where it passes it: no photo is missed.
+
+    A waypoint costs 90 m at the end of each line, in flight and by geometry, although the lead saves it from the turn.
+    """
     items = []
     for k, (east, north, _) in enumerate(lines()):
-        is_gate = k % 4 in (1, 2)
-        items.append(wp(east, north, 100.0, command=4501 if is_gate else 16))
-        if is_gate:
+        is_end = k % 4 in (1, 2)
+        items.append(wp(east, north, 100.0, command=4501 if gate and is_end else 16))
+        if is_end:
             items.append(f"2 206 {50 if k % 4 == 1 else 0} 0 1 0 0 0 0")
     setup = setup_of(*items, home="36.5 -84.2 100")
     law = Px4(Px4Parameters.defaults("1.17")).with_parameters(NAV_ACC_RAD=90.0)
@@ -412,9 +416,14 @@ def test_a_gate_switches_the_camera_at_its_plane() -> None:
         setup.mission, ORIGIN, setup.scenario.terrain, 25.0, False, setup.limits, rules=RouteRules(reads_as_px4=True)
     )
     setup = replace(setup, route=route, autopilot=law, nav="perfect")
-    first = photo_lines(judge(setup, fly_path(setup, radius=FITS)))[0]
-    assert first.flown == pytest.approx(100.0, abs=0.3)
-    assert "photo line 1 of 3 (items 2 to 4): 100 % of its 1000 m can be used" in first.reason
+    flown = photo_lines(judge(setup, fly_path(setup, radius=FITS)))
+    assert [one.flown for one in flown] == pytest.approx([left] * 3, abs=0.6)
+    assert f"photo line 1 of 3 (items 2 to 4): {left:.0f} % of its 1000 m can be used" in flown[0].reason
+    planned = photo_lines(judge_geometry(setup))
+    assert [one.planned for one in planned] == pytest.approx([left] * 3, abs=0.1)
+    assert [one.ok for one in planned] == [gate] * 3
+    camera_text = "the camera, which is switched off before its end, leaves only 91 % of its 1000 m with photos"
+    assert (camera_text in planned[0].reason) is not gate
 
 
 def test_a_gate_that_is_passed_at_an_angle_costs_no_photo() -> None:

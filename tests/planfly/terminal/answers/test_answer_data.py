@@ -1,6 +1,7 @@
 """Each command's --json: alone on standard output, as its schema has it, and true."""
 
 import json
+from dataclasses import fields
 from pathlib import Path
 
 import pytest
@@ -9,9 +10,12 @@ import planfly.planning.paper
 from aircraft.catalog import load_aircraft
 from logs.recording.example_log import write_example_log
 from logs.recording.reader import read_log
+from logs.verdict.document import VerdictDocument
 from planfly.api import predicting
 from planfly.cli import main
 from planfly.planning.paper import SeededPlan
+from planfly.terminal.answers import FlyAnswer
+from planfly.terminal.verdict_answers import CheckAnswer
 from tests.logs.importers.written_logs import dataflash
 from tests.planfly.commands.imported_log_files import example_plan
 from tests.planfly.conftest import FIELD
@@ -106,3 +110,14 @@ def test_the_scenarios(capsys: Output) -> None:
     # The lines stay where the answer goes elsewhere.
     assert capsys.readouterr().out.startswith("jacksboro ")
     assert json.loads(Path("s.json").read_text(encoding="utf-8"))["scenarios"] == found
+
+
+def test_fly_and_check_name_the_same_things_alike() -> None:
+    """As docs/file-formats.md states: `check` has the verdict's fields at the top, and the others in both."""
+    verdict, checked, flown = (
+        {field.name: field.type for field in fields(answer)} for answer in (VerdictDocument, CheckAnswer, FlyAnswer)
+    )
+    assert checked.keys() - verdict.keys() == {"exit_code", "headline", "returns"}
+    assert checked.keys() - verdict.keys() <= flown.keys()
+    assert "verdict" in flown
+    assert "verdict" not in checked
