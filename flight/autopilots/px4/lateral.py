@@ -192,8 +192,7 @@ def guide_to_path(
 ) -> None:
     """Set ``memory.lateral_acceleration`` to join and follow a track (`guideToPath`).
 
-    Far from the track the course points to it, on the track along it. The acceleration turns the aircraft to
-    this course.
+    Far from the track the commanded course points to it, on the track along it.
 
     path_east, path_north, curvature: the track's nearest point, m, and curvature there, 1/m, positive to the right.
     tangent_east, tangent_north, wind_east, wind_north: unit vector along the track there; velocity of the air, m/s.
