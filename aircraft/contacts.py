@@ -4,7 +4,7 @@ Most models have no contacts, because a flight in the air requires none. Contact
 flight with take-off or landing, so that a flight in the air loads the unchanged file. A model with contacts keeps them.
 
 Positions and stiffness scale with span and mass, from an Aerosonde (11 kg, 2.9 m) that took off and landed in JSBSim
-under ArduPlane: a belly of 3000 N/m per skid, 0.18 m below the centre of gravity at rest, friction 0.5 and 0.4.
+under ArduPlane: a belly of 3000 N/m per skid, 0.18 m below the center of gravity at rest, friction 0.5 and 0.4.
 """
 
 import math
@@ -28,7 +28,7 @@ _KILOGRAMS_PER_UNIT = {"KG": 1.0, "LBS": 0.45359237}
 # Minimum depth of the points on which a model without wheels stands, as a ratio to the deepest point.
 _MIN_SKID_DEPTH_RATIO = 0.75
 
-# Positions of belly skids relative to the centre of gravity, forward, right and down, in spans. A point to the right
+# Positions of belly skids relative to the center of gravity, forward, right and down, in spans. A point to the right
 # has a twin to the left, so belly and wheels have three points each.
 _BELLY_POINTS = {"belly front": (0.12, 0.025, 0.069), "belly rear": (-0.12, 0.0, 0.069)}
 # Positions of wheels, as for belly skids.
@@ -50,7 +50,7 @@ class Contact:
     """Point of an aircraft that may touch the ground.
 
     name: name in the model.
-    forward, right, down: position relative to the centre of gravity, m.
+    forward, right, down: position relative to the center of gravity, m.
     is_support: True if the aircraft stands and slides on the point; other points must not touch the ground at speed.
     wheel: True for a wheel.
     """
@@ -114,7 +114,7 @@ def _contact_xml(contact: Contact, aircraft: Aircraft, contacts: tuple[Contact, 
     """Return the XML of one contact.
 
     contacts: all contacts; the contacts on which the aircraft stands share its weight.
-    centre: centre of gravity, m, (3,).
+    centre: center of gravity, m, (3,).
 
     Positions in the XML, and the centre, are in meters aft, right and up from the model's reference point.
     """
@@ -161,7 +161,7 @@ def _model_contacts(model: bytes) -> tuple[Contact, ...]:
 
 
 def _center_of_gravity(model: bytes) -> Floats:
-    """Return the centre of gravity of the loaded aircraft, m aft, right and up of the reference point, (3,).
+    """Return the center of gravity of the loaded aircraft, m aft, right and up of the reference point, (3,).
 
     As in JSBSim, the loaded aircraft consists of the empty aircraft, its point masses and the initial contents of its
     tanks.

@@ -98,11 +98,11 @@ class ModelNumbers:
 
     title: title of the model.
     source: sentence on the source of the numbers.
-    inertia: Jx, Jy, Jz, Jxz about the centre of gravity, kg m^2; Jxz is the integral of x z dm.
+    inertia: Jx, Jy, Jz, Jxz about the center of gravity, kg m^2; Jxz is the integral of x z dm.
     throw: travel of elevator, aileron and rudder in either direction.
     rate: rate limit of the surfaces, rad/s.
     lag: time constants of the surfaces and of the motor, s.
-    lift_behind: distance from the centre of gravity back to the wing's forces, m.
+    lift_behind: distance from the center of gravity back to the wing's forces, m.
     factors: names of the model's factors.
     """
 

@@ -21,7 +21,7 @@ class Propulsion(Protocol):
     """Interface of a kind of propulsion for `aircraft.model_writer`.
 
     direction: direction of the thrust in body axes.
-    position: point where the thrust acts, m forward, right and below the centre of gravity.
+    position: point where the thrust acts, m forward, right and below the center of gravity.
     """
 
     @property
@@ -30,7 +30,7 @@ class Propulsion(Protocol):
 
     @property
     def position(self) -> Vector3:
-        """Point where the thrust acts, m forward, right and below the centre of gravity."""
+        """Point where the thrust acts, m forward, right and below the center of gravity."""
 
     def functions_xml(self, factors: tuple[str, ...]) -> str:
         """Return the XML of the JSBSim functions.

@@ -168,7 +168,7 @@ def update_clearances(
 
     time: time since the start, s.
     heights, to_pixel: ground heights, m, and the map from east and north to column and row.
-    spheres, radii: centres (m, 3) and radii (m,) of the kill spheres, m; a radius of 0 stands for none.
+    spheres, radii: centers (m, 3) and radii (m,) of the kill spheres, m; a radius of 0 stands for none.
     has_terrain: True if the terrain is known.
     estimated: position and velocity over the ground, a `MOTION` record.
     result: `RETURN_RESULT` record, which is updated.
