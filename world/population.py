@@ -113,7 +113,7 @@ def read_population(file: Path, unit: PopulationUnit, origin: GeoOrigin, area: B
     _check_densities(file, window, densities, is_inside, unit)
     known = is_inside & np.isfinite(densities)
     if not known.any():
-        raise PlanflyError(f"{file}: no data in the ground risk buffer; {window.cover_text()}", file=file)
+        raise PlanflyError(f"{file}: no data in the ground risk buffer; {window.coverage_text()}", file=file)
     densest = np.unravel_index(int(np.argmax(np.where(known, densities, -1.0))), densities.shape)
     lat, lon = window.cell_centre(int(densest[0]), int(densest[1]))
     east, north = to_map(origin, lat, lon)
@@ -283,7 +283,7 @@ class _Window:
         lon, lat = self.to_lon_lat(np.array([column + 0.5]), np.array([row + 0.5]))
         return float(lat[0]), float(longitude_near(float(lon[0]), 0.0))
 
-    def cover_text(self) -> str:
+    def coverage_text(self) -> str:
         """Describe the range of latitudes and longitudes that the raster covers, for a message."""
         rows, columns = self.source_shape
         x, y = _transformed(self.source_transform, np.array([0, columns, 0, columns]), np.array([0, 0, rows, rows]))

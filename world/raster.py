@@ -310,7 +310,9 @@ def read_terrain(raster: RasterFile, origin: GeoOrigin, bounds: ArrayLike, buffe
 
 def _no_data_error(raster: RasterFile) -> TerrainError:
     """Return the error for a raster without data in the area."""
-    return TerrainError(f"{raster.name}: no data in the area; the file covers {cover_text(raster)}", file=raster.name)
+    return TerrainError(
+        f"{raster.name}: no data in the area; the file covers {coverage_text(raster)}", file=raster.name
+    )
 
 
 def require_covered(raster: RasterFile, origin: GeoOrigin, bounds: ArrayLike) -> None:
@@ -322,7 +324,7 @@ def require_covered(raster: RasterFile, origin: GeoOrigin, bounds: ArrayLike) ->
     if not is_covered(raster, origin, box):
         raise TerrainError(
             f"{raster.name}: area {_box_text(box)} reaches beyond the tile{_outside_text(raster, origin, box)}"
-            f" (the tile covers {cover_text(raster)})",
+            f" (the tile covers {coverage_text(raster)})",
             file=raster.name,
             field="area",
             value=box.tolist(),
@@ -467,10 +469,10 @@ def tile_bounds(raster: RasterFile, origin: GeoOrigin) -> Floats:
     raise TerrainError(f"{raster.name}: no upright area fits inside the tile; give [area]", file=raster.name)
 
 
-def cover_text(raster: RasterFile) -> str:
+def coverage_text(raster: RasterFile) -> str:
     """Describe the range of latitudes and longitudes that a raster covers, for a message.
 
-    >>> cover_text(open_raster("jacksboro"))
+    >>> coverage_text(open_raster("jacksboro"))
     'latitude 36.160..36.446, longitude -84.413..-84.078'
     """
     lon, lat = longitude_near(raster.corners[:, 0], float(raster.corners[0, 0])), raster.corners[:, 1]

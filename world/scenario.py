@@ -797,9 +797,10 @@ def forecast_of_scenario(scenario: Scenario) -> Forecast:
 
 
 def _with_forecast_wind(scenario: Scenario) -> Scenario:
-    """Return the scenario with the wind of its forecast, if it names a forecast and states a time of flight.
+    """Return the scenario with the wind of its forecast, if it names a forecast and the date and time of the flight.
 
-    Any other scenario is returned unchanged. Raises ForecastError if the forecast cannot be used.
+    Of an ensemble, member 0 is used. Any other scenario is returned unchanged. Raises ForecastError if the forecast
+    cannot be used.
     """
     if scenario.spec.wind.forecast is None or scenario.spec.at is None:
         return scenario

@@ -12,7 +12,7 @@ from world.arrays import Floats
 from world.elevation_formats import EMBEDDED
 from world.errors import ArgumentError, TerrainError
 from world.frames import GeoOrigin, to_geo, to_map
-from world.raster import cover_text, is_covered, read_terrain, require_covered, require_no_holes, tile_bounds
+from world.raster import coverage_text, is_covered, read_terrain, require_covered, require_no_holes, tile_bounds
 from world.raster_file import RasterFile
 
 # Width of terrain on either side of the straight line, for detours, as a fraction of the line's length.
@@ -156,7 +156,7 @@ def _survey_ground(
             if not ((bounds[:, 0] + _EDGE_M <= endpoint) & (endpoint <= bounds[:, 1] - _EDGE_M)).all():
                 message = (
                     f"outside the terrain or within {_EDGE_M:g} m of its edge; {raster.name} covers"
-                    f" {cover_text(raster)}"
+                    f" {coverage_text(raster)}"
                 )
                 raise ArgumentError.of_argument(keyword, position, message, shown=_position_text(position))
         try:
@@ -171,9 +171,11 @@ def _survey_ground(
 
 
 def _enclosing_box(endpoints: Floats, margin: float) -> Floats:
-    """Return the box around two positions with a margin (m) on all sides, (2, 2) m.
+    """Return the box around two positions with a margin (m) on all sides.
 
-    endpoints: (2, 2) m.
+    Returns (2, 2) m: rows east and north, columns minimum and maximum.
+
+    endpoints: east and north of each position, (2, 2) m.
     """
     return np.stack([endpoints.min(axis=0) - margin, endpoints.max(axis=0) + margin], axis=1)
 

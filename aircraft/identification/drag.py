@@ -89,7 +89,7 @@ class ForwardForces:
     volts: Floats | float
 
     def predict(self, unknown: Floats) -> tuple[Floats, Floats]:
-        """Return the low-passed forward acceleration, m/s^2, and current, A, two arrays (n,).
+        """Predict the forward acceleration, m/s^2, and the current, A, both low-pass filtered, two arrays (n,).
 
         unknown: values of the parameters, then of the nuisance parameters.
         """

@@ -13,7 +13,7 @@ from flight.mission.placing import MAX_ALTITUDE_M, PlacedMission, place_stops, p
 from world.arrays import Floats
 from world.errors import MissionError, TerrainError
 from world.frames import GeoOrigin, to_geo, to_map
-from world.raster import cover_text, open_raster, read_terrain
+from world.raster import coverage_text, open_raster, read_terrain
 from world.raster_file import RasterFile
 from world.scenario import GROUND_BUFFER, Scenario, scenario_from_spec
 from world.scenario_tables import MAP_EXTENT, AreaTable, EndTable, FlightTable, OriginTable, ScenarioFile, TerrainTable
@@ -162,7 +162,7 @@ def _load_terrain(
     )
     raise TerrainError(
         f"{path}: no data at any position of the mission, which flies to {positions_text};"
-        f" the terrain covers {cover_text(raster)}{swap_text}",
+        f" the terrain covers {coverage_text(raster)}{swap_text}",
         file=path,
     )
 

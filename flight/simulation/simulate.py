@@ -499,7 +499,7 @@ class Release:
 
 
 def default_gear(ground_phases: GroundPhases) -> Gear:
-    """Return the kind of gear for ground contacts that an aircraft lacks: wheels for a runway, otherwise a belly."""
+    """Return the gear to assume for a model without ground contacts: wheels for a runway, otherwise a belly."""
     return (
         "wheels" if ground_phases.take_off is not None and ground_phases.take_off.launch.method == "runway" else "belly"
     )

@@ -73,7 +73,10 @@ def read_chunks(file: BinaryIO, container: Container) -> Iterator[bytes]:
 
 
 def _read_sections(file: BinaryIO, container: Container) -> Iterator[bytes]:
-    """Yield the records of each chunk, and collect attachments, until the end record or the first damage."""
+    """Yield the records of the file, chunk by chunk, up to its end record, and collect its attachments.
+
+    Records outside chunks are yielded in pieces. Raises _Damage where the file is damaged.
+    """
     crc = zlib.crc32(MAGIC)
     total = 0
     has_end = is_checked = False

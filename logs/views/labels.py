@@ -69,13 +69,13 @@ class LabelPlacer:
         optional: bool = False,
         **style: Any,
     ) -> None:
-        """Write the text next to data position (x, y), where the cost is lowest.
+        """Write a text next to data position (x, y), where it overlaps other labels, points and curves least.
 
         size: font size, points.
         gap: pixels between text and position.
         prefer: the direction tried first; (0, 0) centres the text on the position.
         optional: True to omit the label if it would cover another label.
-        style: style of the text.
+        style: matplotlib's text properties; with `bbox`, the label is framed.
 
         A framed label, and a label that had to move away, gets a line to its point.
         """

@@ -203,9 +203,11 @@ def _load_base(base: str | Path) -> Aircraft:
 
 
 def _check_stated_numbers(stated_numbers: dict[str, float], prior: Aircraft) -> None:
-    """Raise FlightError for stated numbers that do not fit a small aircraft similar to the base.
+    """Raise FlightError if a number that the user states is out of its range, or too far from the base aircraft's.
 
-    Each must be in `_RANGES`, and mass and span within a factor of `_MAX_SIZE_RATIO` of the base.
+    Each must be in `_RANGES`, and mass and span within a factor of `_MAX_SIZE_RATIO` of the base aircraft.
+
+    prior: the base aircraft.
     """
     for name, value in stated_numbers.items():
         min_value, max_value, unit = _RANGES[name]

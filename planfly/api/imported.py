@@ -75,7 +75,7 @@ def import_log(
     flight: number of the flight in the log, from 1; None for the flight with the longest time in AUTO.
     datum: datum of the log's altitudes if the log does not state it, "amsl" or "ellipsoid".
     scenario, terrain, fence, wind, turbulence, at, aircraft: see `planfly.fly`; without an aircraft, aircraft limits
-    are not judged.  The other options are refused, because the flight is judged by the speeds of its log.
+    are not judged.  Options that set speeds are refused, because the log states the speeds.
     Raises a `planfly.PlanflyError` for bad input; then nothing is written.
     """
     if target is not None:

@@ -58,7 +58,7 @@ class CampaignComparison:
 
     @property
     def answer(self) -> Literal["more likely", "less likely", "no difference shown"]:
-        """Answer by the interval: second campaign more likely flyable, less likely flyable, or neither."""
+        """Answer to "are flights of the second campaign more likely flyable?", by the interval."""
         if self.difference.interval.low > 0.0:
             return "more likely"
         return "less likely" if self.difference.interval.high < 0.0 else "no difference shown"

@@ -285,11 +285,12 @@ def _parse_quantity(quantity: Quantity, quantity_table: Any, name: str) -> Varyi
 
 
 def _check_distribution(quantity: Quantity, distribution: Any, name: str) -> None:
-    """Raise SpreadError unless scipy.stats has the named distribution.
+    """Raise SpreadError unless a quantity's distribution is the name of one in scipy.stats.
 
     A quantity of whole numbers needs a discrete distribution.
 
-    name: name of the file in messages.
+    distribution: the value in the user's file.
+    name: name of that file, for messages.
     """
     from scipy import stats
 

@@ -121,10 +121,11 @@ class Bar:
 
 
 def group_by_speed(speed: Floats, flyable: NDArray[np.bool_], confidence: float = 0.95) -> list[SpeedBin]:
-    """Group flights by wind speed; ranges of wind speeds without a flight are omitted.
+    """Count the flights and the flyable flights in each range of wind speeds; ranges without a flight are omitted.
 
     speed: wind speed of each flight, m/s, (n,).
     flyable: True for a flyable flight, (n,).
+    confidence: level of the Wilson interval of the flyable fraction.
 
     >>> [one.flights for one in group_by_speed(np.array([0.2, 0.7, 2.5]), np.array([True, False, True]))]
     [2, 1]

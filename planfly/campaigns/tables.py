@@ -80,10 +80,10 @@ def row_values(row: FlightRow) -> dict[str, Any]:
 
 
 def make_flight_row(index: int, values: Mapping[str, Any]) -> FlightRow:
-    """Make the row of a flight from a row of the table; the inverse of `row_values`.
+    """Rebuild a flight's record from the stored values of its row; the inverse of `row_values`.
 
-    index: index of the flight's draw.
-    values: value of each column, keyed by name.
+    index: number of the flight's draw.
+    values: stored value of each column, keyed by the column's name.
     """
     margins = []
     for rule in RULE_WORDS.values():

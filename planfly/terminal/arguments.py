@@ -193,7 +193,7 @@ def file_completer(*suffixes: str) -> Completer:
     """Return a completer for folders and for files with the given suffixes."""
 
     def propose(prefix: str, **_context: object) -> Iterable[str]:
-        """Return the files with the suffixes, and the folders, that start with a prefix."""
+        """Complete a file name in the shell: return the files with these suffixes, and the folders, by prefix."""
         from argcomplete.completers import FilesCompleter
 
         return FilesCompleter(suffixes)(prefix)

@@ -364,7 +364,11 @@ def _problems_with_radars(task: FrontTask) -> Iterator[ProblemArrays]:
 
 
 def _list_routes(data: ProblemArrays, frame: RotatedFrame, default: Floats) -> list[Floats]:
-    """Return routes (w, 3) past missile spheres and zones on different sides; `default` is the default path."""
+    """Return candidate routes that pass the missile spheres and zones on different sides, each (w, 3), m.
+
+    frame: frame whose axis runs from the start to the destination.
+    default: the path of the default plan, (w, 3), m; it sets the number of waypoints and the maximum length.
+    """
     count, bound = len(default), MAX_LENGTH_RATIO * float(path_length(default))
     span = (-0.5 * bound, 0.5 * bound)
     if is_limited(data.airspace):

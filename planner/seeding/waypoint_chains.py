@@ -200,7 +200,10 @@ def _extend_paths(
     lower_bounds: Floats,
     corners: Records,
 ) -> int:
-    """Extend the best partial path to candidate k of waypoint i; return the number of legs evaluated.
+    """Find the cheapest partial path to candidate k of waypoint i; return the number of legs evaluated.
+
+    The path comes from one of the open candidates of the previous waypoint. These are tried by increasing lower bound
+    of their cost, so that few legs have to be evaluated.
 
     step: 1 for paths from the start, -1 for paths from the destination. candidates: (w, k, 3) m.
     cost, link: (w, k) cost and neighbouring candidate of each partial path; updated for the candidate.

@@ -29,7 +29,7 @@ from flight.autopilots.arduplane.parameters import (
     SIDE_CANDIDATES,
     ArduPilotParameters,
 )
-from flight.autopilots.arduplane.releases import choose_release, release_note, simulated_release
+from flight.autopilots.arduplane.releases import choose_release, release_difference_note, simulated_release
 from flight.autopilots.arduplane.tracking_error import tracking_error
 from flight.autopilots.autopilot import Autopilot, Origin, StoredAutopilot, StoredParameters
 from flight.autopilots.gust_height import updraft_altitude_gain
@@ -161,7 +161,7 @@ class ArduPlane(Autopilot):
         if not program.startswith("ArduP"):
             return None
         law_parameters, notes = ArduPilotParameters.from_log(parameters, source, simulated_release(program))
-        note = release_note(program)
+        note = release_difference_note(program)
         return cls(law_parameters), (note, *notes) if note else notes
 
     @classmethod

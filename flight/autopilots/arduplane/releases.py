@@ -36,12 +36,14 @@ def simulated_release(program: str) -> ArduPlaneVersion:
     return NEWEST_ARDUPLANE if match is None else nearest_release(_VERSIONS, (int(match[1]), int(match[2])))
 
 
-def release_note(program: str) -> str:
-    """Return a note if the simulated release differs from the release of the program that flew.
+def release_difference_note(program: str) -> str:
+    """Return a note if a log's firmware is of another ArduPlane release than the simulated one.
 
-    The result is "" if the releases are the same, or if the program states no release.
+    The result is "" if the releases are the same, or if the firmware states no release.
 
-    >>> release_note("ArduPlane V4.5.7"), release_note("ArduPlane V4.7.3")
+    program: name and version of the firmware, as in the log.
+
+    >>> release_difference_note("ArduPlane V4.5.7"), release_difference_note("ArduPlane V4.7.3")
     ('flown by ArduPlane 4.5, but simulated with 4.6', '')
     """
     match = _PROGRAM_RELEASE.search(program)

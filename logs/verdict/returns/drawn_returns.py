@@ -115,9 +115,10 @@ def group_segments(elements: Sequence[Element], key: Callable[[Element], Key]) -
 def drawn_returns(
     world: ReturnWorld, starts: ReturnStarts, returns: Returns, glides: Glides = NO_GLIDES
 ) -> DrawnReturns:
-    """Compute the data for drawing judged returns: the worst paths and the lowest safe altitudes.
+    """Collect what a drawing of the returns to launch shows: the worst paths and the lowest safe altitudes.
 
-    starts: the starts of the judged returns.
+    starts: places on the route from which the returns were simulated; they are ignored if `returns` is empty.
+    glides: glides after an engine failure, if they were simulated.
     """
     min_altitudes = min_safe_altitudes(world, starts if returns.each else starts.subset(np.zeros(0, dtype=np.intp)))
     return DrawnReturns(returns, worst_returns(world, starts, returns), min_altitudes, glides)

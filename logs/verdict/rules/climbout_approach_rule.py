@@ -115,8 +115,8 @@ def climbout_findings(
 ) -> list[Finding]:
     """Judge the climb from home to the first waypoint.
 
-    Return [] if home or the terrain is missing, if that waypoint is over home, if the take-off is vertical, or if it
-    was flown.
+    Return [] if home or the terrain is missing, if the first waypoint is over home, if the take-off is vertical, or if
+    the take-off itself was simulated.
     """
     home, terrain = requirements.setup.mission.home, requirements.setup.scenario.terrain
     if not has_ground_paths(requirements) or home is None or terrain is None:

@@ -215,7 +215,7 @@ def _missing_items_text(missing: MissingItems) -> str:
 
 
 def _ends_in_return(setup: FlightSetup, legs: FlownLegs) -> bool:
-    """Return True if a part of the log ended in mode RTL, and the next item is a return to launch."""
+    """Return True if mode RTL follows a part of the log, and its next mission item is a return to launch."""
     item = int(setup.route.items[_next_waypoint(setup, legs)])
     commands = {mission_item.seq: mission_item.command for mission_item in setup.mission.items}
     return legs.stretch.next_mode == _RETURN_MODE and commands.get(item) == Command.NAV_RETURN_TO_LAUNCH

@@ -73,15 +73,15 @@ def number(value: float | None, *, signed: bool = False, digits: int | None = No
 
 def quantity(value: float | None, unit: str) -> str:
     """Return a number and its unit as text, with radians shown as degrees."""
-    shown_value, name = in_unit(value, unit)
+    shown_value, name = display_value(value, unit)
     text = number(shown_value)
     if text == NOTHING or not name:
         return text
     return f"{text}{name}" if name in ("°", "%") else f"{text}\u00a0{name}"
 
 
-def in_unit(value: float | None, unit: str) -> tuple[float | None, str]:
-    """Return a value and the name of its unit as shown, with radians as degrees; a value of None stays None."""
+def display_value(value: float | None, unit: str) -> tuple[float | None, str]:
+    """Return a value and its unit for display: radians become degrees, and a value of None stays None."""
     if unit == "rad":
         return (None if value is None else math.degrees(value)), "°"
     return value, _UNITS.get(unit, unit)
@@ -114,13 +114,15 @@ def _describe_state(state: State) -> str:
 def _make_finding_row(finding: Finding) -> FindingRow:
     """Return the row of one finding: its numbers and texts."""
     planned_value, flown_value, margin = (
-        in_unit(value, finding.unit)[0] for value in (finding.planned, finding.flown, finding.margin)
+        display_value(value, finding.unit)[0] for value in (finding.planned, finding.flown, finding.margin)
     )
     # The margin is the distance from the shown limit.
-    tolerance_in_limit = 0.0 if finding.tolerance_note else in_unit(finding.tolerance, finding.unit)[0] or 0.0
+    tolerance_in_limit = 0.0 if finding.tolerance_note else display_value(finding.tolerance, finding.unit)[0] or 0.0
     shown_margin = None if margin is None else margin + tolerance_in_limit
     # Decimals needed to distinguish the value from its limit; None if the usual number suffices.
-    judged_value, shown_limit = (in_unit(value, finding.unit)[0] for value in (finding.value, finding.shown_limit))
+    judged_value, shown_limit = (
+        display_value(value, finding.unit)[0] for value in (finding.value, finding.shown_limit)
+    )
     digits = None
     if (
         judged_value is not None
@@ -148,7 +150,7 @@ def _make_finding_row(finding: Finding) -> FindingRow:
         flown=number(flown_value, digits=digits),
         limit=limit if limit == NOTHING else f"{finding.limit_sign}\u00a0{limit}",
         margin=number(shown_margin, signed=True),
-        unit=in_unit(value=None, unit=finding.unit)[1],
+        unit=display_value(value=None, unit=finding.unit)[1],
         method=method,
     )
 
