@@ -33,7 +33,6 @@ from planfly.workflow.uav import (
     load_uav,
     max_turn_bank,
     uav_of_setup,
-    with_tracking_error,
 )
 from planner.plan import Plan, plan_json, read_plan
 from world.airfield import LandingStrip
@@ -448,5 +447,5 @@ def _limits_in_wind(uav: Uav, scenario: Scenario, *, is_drawn: bool) -> Limits:
     # The performance of a drawn aircraft is known exactly: its standard deviations are 0.
     exact_envelope = replace(uav_limits.envelope, climb_sd=0.0, descent_sd=0.0, fastest_sd=0.0, power_sd=0.0)
     envelope = exact_envelope if is_drawn else uav_limits.envelope
-    limits = make_limits(scenario, envelope, uav_limits.airspeed, max_turn_bank(scenario, uav.autopilot))
-    return with_tracking_error(limits, uav.autopilot, scenario)
+    max_bank = max_turn_bank(scenario, uav.autopilot)
+    return make_limits(scenario, envelope, uav_limits.airspeed, max_bank, uav.autopilot)

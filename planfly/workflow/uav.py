@@ -98,8 +98,8 @@ def load_uav(scenario: Scenario, parameters: Mapping[str, float] | None = None) 
         autopilot = autopilot.restore(autopilot.with_parameters(**parameters).store())
     airspeed = cruise_airspeed(scenario, aircraft, autopilot)
     envelope = load_envelope(aircraft, motor_braking=table.motor_braking)
-    limits = make_limits(scenario, envelope, airspeed, max_turn_bank(scenario, autopilot))
-    return Uav(aircraft, with_tracking_error(limits, autopilot, scenario), battery, autopilot)
+    limits = make_limits(scenario, envelope, airspeed, max_turn_bank(scenario, autopilot), autopilot)
+    return Uav(aircraft, limits, battery, autopilot)
 
 
 def uav_of_setup(setup: FlightSetup) -> Uav:
@@ -119,15 +119,6 @@ def max_turn_bank(scenario: Scenario, autopilot: Autopilot) -> float:
     """Return the bank limit in turns, rad: the lower of scenario and autopilot; inf if neither has a limit."""
     stated_bank = scenario.flight.max_bank_deg
     return min(math.inf if stated_bank is None else math.radians(stated_bank), autopilot.turns.max_bank)
-
-
-def with_tracking_error(limits: Limits, autopilot: Autopilot, scenario: Scenario) -> Limits:
-    """Add the tracking error of an autopilot, in the wind and navigation of a scenario, to limits."""
-    table = scenario.flight
-    tracking = autopilot.deviations.tracking_error(
-        limits.airspeed, table.steering.nav, fly_over=table.fly_over, turbulence=scenario.wind.turbulence
-    )
-    return replace(limits, tracking=tracking)
 
 
 def find_aircraft_and_energy(scenario: Scenario) -> tuple[Aircraft, float]:
