@@ -12,7 +12,6 @@ from collections.abc import Callable
 from importlib import import_module
 from typing import Any, NamedTuple
 
-from planfly._version import __version__
 from planfly.commands import (
     aircraft,
     battery,
@@ -108,27 +107,6 @@ COMMANDS = (
 )
 # The same by name.
 COMMANDS_BY_NAME = {command.name: command for command in COMMANDS}
-
-_FIRST_STEPS = """\
-first steps:
-  planfly run jacksboro                        plan, fly, judge and report the demo
-  planfly fly mission.waypoints --terrain DEM  fly a mission of your own over your elevation file
-  planfly help fly                             everything about one command"""
-
-
-def build_parser() -> LineParser:
-    """Return the parser for the whole command line."""
-    parser = LineParser(
-        __version__,
-        "Will this plan really fly?  Plans a fixed-wing path over terrain and threats,\n"
-        "flies it (or any mission file) in JSBSim, and gives a verdict with numbers.",
-        _FIRST_STEPS,
-    )
-    for command in COMMANDS:
-        parser.start_section(command.section)
-        command.add_parser(parser)
-    return parser
-
 
 # ----------------------------------------------------------------------
 # Make JSON schemas of the answers of commands.

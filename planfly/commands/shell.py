@@ -52,14 +52,15 @@ def add_show_help_parser(command_line: LineParser) -> None:
         lambda prefix, **_: [name for name in command_line.commands if name.startswith(prefix)],
     )
     parser.add_argument("--schema", action="store_true", help="print the JSON schema of the command's --json output")
+    parser.set_defaults(command_line=command_line)
 
 
 def show_help(args: argparse.Namespace) -> int:
     """Print the help of planfly or of one command, or a command's schema; return 2 for an unknown command."""
     # Imported here: the registry lists this module.
-    from planfly.commands.registry import build_parser, commands_with_json, schema_text
+    from planfly.commands.registry import commands_with_json, schema_text
 
-    line_parser = build_parser()
+    line_parser: LineParser = args.command_line
     if args.topic is None:
         if args.schema:
             return _report_bad_usage("--schema: name a command, as in planfly help fly --schema")

@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 
 import planfly.commands
-from planfly.commands.registry import COMMANDS, COMMANDS_BY_NAME, answer_schema, build_parser
+from planfly.cli import build_parser
+from planfly.commands.registry import COMMANDS, COMMANDS_BY_NAME, answer_schema
 
 
 def test_each_command_is_a_parser_and_a_function_of_one_module() -> None:
