@@ -8,10 +8,11 @@ import os
 import sys
 from collections.abc import Sequence
 
-from planfly.commands.registry import COMMANDS_BY_NAME, build_parser
+from planfly._version import __version__
+from planfly.commands.registry import COMMANDS, COMMANDS_BY_NAME
 from planfly.runtime.process_setup import prepare_process, with_large_stack
 from planfly.terminal.arguments import COMPLETION_VARIABLE, complete_for_shell
-from planfly.terminal.command_parser import CommandParser, UsageExit, colour_text, error_text
+from planfly.terminal.command_parser import CommandParser, LineParser, UsageExit, colour_text, error_text
 from planfly.terminal.exit_codes import BAD_INPUT, FAULT, INTERRUPTED
 from planfly.terminal.output import (
     open_standard_streams,
@@ -24,6 +25,13 @@ from planfly.terminal.output import (
 from planfly.terminal.signal_watch import end_on_signals, end_process
 from world.errors import CrashError, PlanflyError
 from world.interruption import Interrupted
+
+# First steps, at the end of the help.
+_FIRST_STEPS = """\
+first steps:
+  planfly run jacksboro                        plan, fly, judge and report the demo
+  planfly fly mission.waypoints --terrain DEM  fly a mission of your own over your elevation file
+  planfly help fly                             everything about one command"""
 
 # Errors of the machine: too many open files in the process or the system, too little memory, and disk errors.
 _MACHINE_ERRORS = (errno.EMFILE, errno.ENFILE, errno.ENOMEM, errno.EIO)
@@ -85,6 +93,20 @@ def _run_command(argv: Sequence[str] | None) -> int:
                     raise
     except _REPORTED_ERRORS as error:
         return _report_error(*_exit_code_and_text(error, command_parser))
+
+
+def build_parser() -> LineParser:
+    """Return the parser for the whole command line."""
+    parser = LineParser(
+        __version__,
+        "Will this plan really fly?  Plans a fixed-wing path over terrain and threats,\n"
+        "flies it (or any mission file) in JSBSim, and gives a verdict with numbers.",
+        _FIRST_STEPS,
+    )
+    for command in COMMANDS:
+        parser.start_section(command.section)
+        command.add_parser(parser)
+    return parser
 
 
 def _exit_code_and_text(error: BaseException, parser: CommandParser | None = None) -> tuple[int, str]:

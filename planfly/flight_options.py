@@ -401,10 +401,15 @@ def apply_options(
         # With the time of flight first, so that the file is read once, for this time.
         scenario = without_forecast(scenario)
     _check_aircraft_options(scenario, options)
-    new_scenario = with_flight(with_flight_time(scenario, options.get("at")), **flight_entries(options, program))
+    new_scenario = with_flight_time(scenario, options.get("at"))
+    entries = flight_entries(options, program)
+    if any(value is not None for value in entries.values()):
+        new_scenario = with_flight(new_scenario, **entries)
     if forecast is not None:
         new_scenario = with_forecast(new_scenario, str(forecast))
-    new_scenario = with_wind(with_file_autopilot(new_scenario, mission), speed, from_course, options.get("turbulence"))
+    new_scenario = with_file_autopilot(new_scenario, mission)
+    if wind is not None or options.get("turbulence") is not None:
+        new_scenario = with_wind(new_scenario, speed, from_course, options.get("turbulence"))
     table = new_scenario.spec.wind
     if table.forecast is not None and new_scenario.spec.at is None:
         raise ArgumentError.of_argument(

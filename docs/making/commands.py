@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import NamedTuple
 
-from planfly.commands.registry import build_parser
+from planfly.cli import build_parser
 from planfly.terminal.command_parser import CommandParser
 from planfly.terminal.exit_codes import EXIT_CODES
 

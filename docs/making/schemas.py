@@ -3,7 +3,7 @@
 import json
 from typing import Any
 
-from planfly.commands.registry import answer_objects, commands_with_json, schema_text
+from planfly.terminal.schemas import answer_objects, commands_with_json, schema_text
 
 
 def schema_tables(command: str) -> str:

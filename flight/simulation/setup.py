@@ -337,11 +337,15 @@ class FlightSetup:
         return setup
 
 
-def make_limits(scenario: Scenario, envelope: Envelope, airspeed: float, max_bank: float) -> Limits:
+def make_limits(
+    scenario: Scenario, envelope: Envelope, airspeed: float, max_bank: float, autopilot: Autopilot | None = None
+) -> Limits:
     """Return the limits of a path: the scenario's limits, or the aircraft's limits where it states none.
 
     airspeed: m/s.
     max_bank: rad; the limit of the envelope applies if it is smaller.
+    autopilot: autopilot whose tracking error in the scenario's wind and navigation is taken into account; None for an
+        autopilot that follows its path exactly.
 
     >>> from aircraft.catalog import load_aircraft
     >>> from flight.dynamics.envelope_tables import load_envelope
@@ -355,7 +359,12 @@ def make_limits(scenario: Scenario, envelope: Envelope, airspeed: float, max_ban
         """Return an angle limit in rad; None for a limit that is a word."""
         return None if isinstance(value, str) else math.radians(value)
 
-    scenario_limits = scenario.limits
+    scenario_limits, flight = scenario.limits, scenario.flight
+    tracking = None
+    if autopilot is not None:
+        tracking = autopilot.deviations.tracking_error(
+            airspeed, flight.steering.nav, fly_over=flight.fly_over, turbulence=scenario.wind.turbulence
+        )
     return Limits(
         max_turn=limit_in_rad(scenario_limits.max_turn_deg),
         max_climb=limit_in_rad(scenario_limits.max_climb_deg),
@@ -365,4 +374,5 @@ def make_limits(scenario: Scenario, envelope: Envelope, airspeed: float, max_ban
         airspeed=airspeed,
         max_bank=min(max_bank, envelope.max_bank),
         wind=scenario.wind,
+        tracking=tracking,
     )

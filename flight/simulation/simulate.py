@@ -628,8 +628,7 @@ class Flight(RunningFlight):
         if level_trim is None:
             reason = f"no level flight at {gains.reference_airspeed:.1f} m/s and {start.amsl:.0f} m AMSL"
             raise StartError(setup.aircraft, reason, field="airspeed", value=gains.reference_airspeed)
-        self._start_fdm = partial(self._start_motion, setup, start, level_trim.elevator)
-        self._start_fdm()
+        self._start_motion(setup, start, level_trim.elevator)
         memory = self.guidance_memory
         memory.trim_elevator, memory.trim_alpha = level_trim.elevator, level_trim.alpha
         memory.trim_throttle = (steady_flight(model, start.airspeed, start.amsl) or level_trim).throttle
@@ -637,7 +636,7 @@ class Flight(RunningFlight):
         memory.max_bank = setup.limits.max_bank + BANK_RESERVE_RAD
         self._law.initialise(self.guidance_memory, self._workspace.law_record)
         self._start_disturbances(setup)
-        self._compiled, self.engine = self._choose_engine(setup)
+        self._compiled, self.engine = self._choose_engine(setup, start, level_trim.elevator)
         self._fly_ticks = self._make_loop()
 
     def divert(self, setup: FlightSetup, local_map: LocalMap) -> None:
@@ -674,9 +673,10 @@ class Flight(RunningFlight):
             self._work.commands = release(self.fdm, release_state, commands)
             self._work.air.wind_north, self._work.air.wind_east = release_state.wind[:2]
 
-    def _choose_engine(self, setup: FlightSetup) -> tuple[CompiledModel | None, str]:
+    def _choose_engine(self, setup: FlightSetup, start: Start, elevator: float) -> tuple[CompiledModel | None, str]:
         """Choose between the compiled model and JSBSim, by comparing their steps.
 
+        start, elevator: as in `_start_motion`, to start JSBSim again after a comparison that found a difference.
         Returns the compiled model, or None for JSBSim, and a text that names the choice and its reason.
         """
         if self._chosen_engine == "jsbsim":
@@ -693,7 +693,7 @@ class Flight(RunningFlight):
         if differences := model.find_differences():
             # Start again, since the comparison has moved the aircraft.
             self.fdm = self._new_fdm()
-            self._start_fdm()
+            self._start_motion(setup, start, elevator)
             return None, f"JSBSim, because the compiled model differs from it in {differences[0]}"
         return model, f"compiled model, bit-identical to JSBSim {JSBSIM_VERSION} over {PROOF_STEPS} test steps"
 

@@ -2,13 +2,15 @@
 
 import functools
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import ParamSpec, TypeVar, get_args, get_type_hints
 
 from planfly.arguments import check_arguments
 from planfly.flight_options import RANGED_OPTIONS, option_defaults
-from planfly.runtime.first_start import warm_up
+from planfly.runtime.first_start import compile_and_report
 from world.argument_types import check_types
+from world.compile_events import notify_before_compiling
 from world.files import did_you_mean
 
 _Parameters = ParamSpec("_Parameters")
@@ -20,7 +22,7 @@ def api_function(*kernel_units: str) -> Callable[[Callable[_Parameters, _Result]
 
     The options of an ``Unpack[...]`` parameter are listed in its signature, with their defaults.
 
-    kernel_units: see `planfly.runtime.first_start.warm_up`.
+    kernel_units: see `warm_up`.
     The function raises the ArgumentErrors of `world.argument_types.check_types` and `check_arguments`.
 
     >>> from typing import Unpack
@@ -65,3 +67,23 @@ def api_function(*kernel_units: str) -> Callable[[Callable[_Parameters, _Result]
         return checked_function
 
     return decorate
+
+
+@contextmanager
+def warm_up(*units: str) -> Iterator[None]:
+    """Compile all kernels of the ``with`` block as soon as it calls a kernel that is not cached.
+
+    The kernels are compiled in two processes before the code continues.
+    units: units of `planfly.kernel_units` with these kernels, the unit that takes longest first.
+    """
+    has_compiled = False
+
+    def compile_all() -> None:
+        """Compile the units at the first call only."""
+        nonlocal has_compiled
+        if not has_compiled:
+            has_compiled = True
+            compile_and_report(units)
+
+    with notify_before_compiling(compile_all):
+        yield

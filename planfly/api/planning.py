@@ -20,7 +20,7 @@ from planfly.runtime.stages import stage
 from planfly.threat_tables import GivenThreats, threat_tables
 from planfly.workflow.make_plan import make_given_plan, make_plan
 from planfly.workflow.output_paths import file_target
-from planfly.workflow.uav import choose_seed, cruise_airspeed, find_aircraft_and_energy, load_uav
+from planfly.workflow.uav import choose_seed, cruise_airspeed, load_uav, scenario_aircraft
 from planner.plan import GIVEN_WAYPOINTS, Plan, plan_json, read_plan
 from planner.search.explain_failure import explain_failure, nearest_missile_text
 from planner.search.replan import check_same_mission
@@ -268,7 +268,7 @@ def stop_condition(seconds: float | None, stop: Callable[[], bool] | None) -> St
 
 def conditions_of_plan(plan: Plan) -> Conditions:
     """Return the conditions for which a plan was made: aircraft, airspeed, weather, autopilot and terrain."""
-    aircraft, _ = find_aircraft_and_energy(plan.scenario)
+    aircraft = scenario_aircraft(plan.scenario)
     autopilot = load_autopilot(plan.scenario, aircraft)
     return plan_conditions(plan.scenario, aircraft.name, cruise_airspeed(plan.scenario, aircraft, autopilot), autopilot)
 

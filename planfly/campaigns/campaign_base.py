@@ -32,7 +32,6 @@ from planfly.workflow.uav import (
     load_uav,
     max_turn_bank,
     uav_of_setup,
-    with_tracking_error,
 )
 from planner.plan import Plan, plan_json, read_plan
 from world.airfield import LandingStrip
@@ -341,8 +340,8 @@ def vary_flight(base: CampaignBase, draw: Draw, wind: GivenWind | None = None) -
     # The performance of a drawn aircraft is known exactly: its standard deviations are 0.
     exact_envelope = replace(uav_limits.envelope, climb_sd=0.0, descent_sd=0.0, fastest_sd=0.0, power_sd=0.0)
     envelope = exact_envelope if draws is not None else uav_limits.envelope
-    wind_limits = make_limits(scenario, envelope, uav_limits.airspeed, max_turn_bank(scenario, base.uav.autopilot))
-    limits = with_tracking_error(wind_limits, base.uav.autopilot, scenario)
+    max_bank = max_turn_bank(scenario, base.uav.autopilot)
+    limits = make_limits(scenario, envelope, uav_limits.airspeed, max_bank, base.uav.autopilot)
     uav = replace(base.uav, limits=limits, battery=battery)
     setup = make_setup(scenario, uav, mission, draw.seed, plan=plan, placed=placed)
     properties = () if draws is None else draws.properties(draw.seed)

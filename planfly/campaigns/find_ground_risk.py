@@ -225,14 +225,14 @@ def _return_paths(setup: FlightSetup, track: Track, interval: float, *, glide: b
     if not len(starts):
         return no_returns
     targets = [world.target(row) for row in starts.rows]
-    paths = world.fly(starts, targets, store_paths=True).tracks
+    paths = world.fly(starts.rows, targets, store_positions=True).tracks
     radius = abs(world.autopilot.returns.rules.radius)
     positions = {target.position[:2] for target in targets if not target.straight}
     glides: list[Floats] = []
     if glide and world.aircraft.glides:
         gliding_world = without_engine_world(world)
         gliding_targets = [gliding_world.target(row) for row in starts.rows]
-        gliding = gliding_world.fly(starts, gliding_targets, store_paths=True, engine_out=True)
+        gliding = gliding_world.fly(starts.rows, gliding_targets, store_positions=True, engine_out=True)
         glides = [
             glide_path
             for glide_path, result in zip(gliding.tracks, gliding.results, strict=True)

@@ -8,6 +8,7 @@ from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import BAD_INPUT, FLYABLE
 from planfly.terminal.options import add_json_and_quiet_options
 from planfly.terminal.output import write_json_if_requested
+from planfly.terminal.schemas import commands_with_json, schema_text
 from world.files import did_you_mean
 
 # Help text on how to install the completion.
@@ -52,14 +53,12 @@ def add_show_help_parser(command_line: LineParser) -> None:
         lambda prefix, **_: [name for name in command_line.commands if name.startswith(prefix)],
     )
     parser.add_argument("--schema", action="store_true", help="print the JSON schema of the command's --json output")
+    parser.set_defaults(command_line=command_line)
 
 
 def show_help(args: argparse.Namespace) -> int:
     """Print the help of planfly or of one command, or a command's schema; return 2 for an unknown command."""
-    # Imported here: the registry lists this module.
-    from planfly.commands.registry import build_parser, commands_with_json, schema_text
-
-    line_parser = build_parser()
+    line_parser: LineParser = args.command_line
     if args.topic is None:
         if args.schema:
             return _report_bad_usage("--schema: name a command, as in planfly help fly --schema")

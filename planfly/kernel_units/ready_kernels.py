@@ -20,7 +20,7 @@ from planfly.kernel_units.unit_kernels import UNIT_KERNELS
 from planfly.rtl.return_summary import return_summary, returns_line
 from planfly.workflow.open_flight import make_setup
 from planfly.workflow.pipeline import fly_and_judge
-from planfly.workflow.uav import Uav, find_aircraft_and_energy, load_uav
+from planfly.workflow.uav import Uav, load_uav, scenario_aircraft
 from planner.evaluation.problem import make_problem
 from planner.search.kernel_calls import FRONT, PARTS, SAMPLE_COUNT, call_kernels
 from planner.search.search_state import SCORE_COLUMNS, best_first
@@ -85,7 +85,7 @@ def _make_scenario_and_uav() -> tuple[Scenario, Uav]:
 def _compile_problem_kernels() -> None:
     """Compile the kernels that prepare a planning problem."""
     scenario = _make_scenario()
-    aircraft, _ = find_aircraft_and_energy(scenario)
+    aircraft = scenario_aircraft(scenario)
     limits = make_limits(scenario, load_envelope(aircraft), aircraft.airspeed, aircraft.max_bank)
     make_problem(scenario, limits)
 

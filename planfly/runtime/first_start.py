@@ -7,13 +7,11 @@ import subprocess
 import sys
 import threading
 from collections import deque
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from planfly.kernel_units.unit_kernels import list_unit_kernels
 from planfly.runtime.stages import has_receiver, report_line, stage
-from world.compile_events import notify_before_compiling
 from world.kernel_cache import CACHE_DIR_VARIABLE, can_write
 
 # ----------------------------------------------------------------------
@@ -108,7 +106,7 @@ def _feed_process(
 
 
 # ----------------------------------------------------------------------
-# Warm-up: when the first kernel has to be compiled, all kernels that the work needs are compiled in parallel.
+# When the first kernel has to be compiled, all kernels that the work needs are compiled in parallel.
 
 # Title of the stage; a command may show it more than once, because each group of kernels is compiled at its first use.
 STAGE_TITLE = "compiling numeric kernels"
@@ -120,33 +118,17 @@ _CACHE_DIR_HINT = f"set {CACHE_DIR_VARIABLE} to a folder that can be written"
 _compiled_units: set[str] = set()
 
 
-@contextmanager
-def warm_up(*units: str) -> Iterator[None]:
-    """Compile all kernels of the ``with`` block as soon as it calls a kernel that is not cached.
+def compile_and_report(all_units: Sequence[str]) -> None:
+    """Compile the units that this process has not compiled, with a progress report.
 
-    The kernels are compiled in two processes before the code continues; if the cache cannot be written, each kernel is
-    compiled when it is called.
-    units: units of `planfly.kernel_units` with these kernels, the unit that takes longest first.
+    If the cache cannot be written, only the reason is reported, and each kernel is compiled when it is called.
+
+    all_units: units of `planfly.kernel_units`, the unit that takes longest first.
     """
-    has_reported = False
-
-    def compile_all() -> None:
-        """Compile the units that this process has not compiled, at the first call only."""
-        nonlocal has_reported
-        if not has_reported:
-            has_reported = True
-            _report_and_compile([unit for unit in units if unit not in _compiled_units])
-            _compiled_units.update(units)
-
-    with notify_before_compiling(compile_all):
-        yield
-
-
-def _report_and_compile(units: list[str]) -> None:
-    """Compile units with a progress report; if the cache cannot be written, only report the reason."""
     # Imported here: code that compiles kernels has already imported it.
     from world.kernels import IS_TEMPORARY, PREFERRED_FOLDER, cache_folder
 
+    units = [unit for unit in all_units if unit not in _compiled_units]
     folder = cache_folder()
     if not can_write(folder):
         report_line(
@@ -167,3 +149,4 @@ def _report_and_compile(units: list[str]) -> None:
     with stage(title, STAGE_TITLE) as advance:
         advance(0, total, f"0 of {total}")
         compile_units(units, folder, lambda done: advance(done, total, f"{done} of {total}"))
+    _compiled_units.update(units)

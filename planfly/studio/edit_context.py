@@ -8,12 +8,12 @@ import numpy as np
 from flight.mission.implied_scenario import implied_scenario
 from flight.mission.items import Mission
 from flight.mission.route import Route, route_through_stops, with_end_courses
-from flight.simulation.setup import FlightSetup
+from flight.simulation.setup import FlightSetup, make_limits
 from planfly.flight_options import NamedFences
 from planfly.studio.settings import ChangedParameters
 from planfly.workflow.mission_context import MissionContext
 from planfly.workflow.open_flight import make_setup, with_landing_parameters
-from planfly.workflow.uav import Uav, uav_of_setup, with_tracking_error
+from planfly.workflow.uav import Uav, uav_of_setup
 from planner.plan import Plan
 from world.scenario import Scenario
 
@@ -78,8 +78,9 @@ class EditContext(MissionContext):
         # A mission states its airspeed in thousandths.
         if abs(airspeed - self.uav.airspeed) < 1e-3:
             return self.uav
-        limits = replace(self.uav.limits, airspeed=airspeed)
-        return replace(self.uav, limits=with_tracking_error(limits, self.uav.autopilot, self.scenario))
+        limits = self.uav.limits
+        new_limits = make_limits(self.scenario, limits.envelope, airspeed, limits.max_bank, self.uav.autopilot)
+        return replace(self.uav, limits=new_limits)
 
     def with_area_around_mission(self, mission: Mission) -> "EditContext":
         """Return a context whose scenario has an area that contains the mission.

@@ -19,7 +19,7 @@ from flight.autopilots.parameter_origin import UnusedParametersError
 from planfly.arguments import is_valid_wind
 from planfly.flight_options import FlightOptions, apply_options
 from planfly.studio.messages import LIMITS, Settings
-from planfly.workflow.uav import Uav, find_aircraft_and_energy, load_uav
+from planfly.workflow.uav import Uav, load_uav, scenario_aircraft
 from world.errors import PlanflyError
 from world.files import did_you_mean, temporary_folder
 from world.scenario import Scenario, scenario_from_spec, with_flight
@@ -233,7 +233,7 @@ def read_parameters(scenario: Scenario, text: str, name: str) -> ChangedParamete
 
 def _load_autopilot_parameters(scenario: Scenario) -> Parameters:
     """Return the autopilot parameters of a scenario. Raises PlanflyError if its autopilot has none."""
-    autopilot = load_autopilot(scenario, find_aircraft_and_energy(scenario)[0])
+    autopilot = load_autopilot(scenario, scenario_aircraft(scenario))
     if autopilot.parameters is None:
         raise PlanflyError(f"{autopilot.title} has no parameters: choose another autopilot", field="parameter")
     return autopilot.parameters

@@ -44,7 +44,7 @@ from planfly.flight_options import (
 )
 from planfly.workflow.make_plan import Advance
 from planfly.workflow.open_flight import check_mission_exists, mission_of_plan
-from planfly.workflow.uav import find_aircraft_and_energy, load_uav, max_turn_bank
+from planfly.workflow.uav import carried_energy, load_uav, max_turn_bank, scenario_aircraft
 from planner.plan import read_plan
 from world.errors import LogError, MissionError, StartError
 from world.frames import to_geo
@@ -240,7 +240,7 @@ def _flight_setup(
 
     placed: the mission placed on the map of the scenario.
     """
-    aircraft, battery = find_aircraft_and_energy(scenario)
+    aircraft = scenario_aircraft(scenario)
     limits = _path_limits(scenario, autopilot, flight, aircraft.airspeed)
     return FlightSetup(
         scenario=scenario,
@@ -248,7 +248,7 @@ def _flight_setup(
         route=route_through_stops(placed, limits.airspeed, scenario.flight.fly_over, limits, autopilot.route_rules),
         limits=limits,
         aircraft=aircraft.name,
-        battery=battery,
+        battery=carried_energy(scenario, aircraft),
         seed=1,
         autopilot=autopilot,
         nav=scenario.flight.steering.nav,
@@ -263,7 +263,7 @@ def _path_limits(scenario: Scenario, autopilot: Autopilot, flight: LoggedFlight,
     log, or `default_airspeed` (m/s).  The bank limit is the autopilot's parameter; without it, the lower one of the
     scenario's and the autopilot's usual limit.
     """
-    aircraft, _ = find_aircraft_and_energy(scenario)
+    aircraft = scenario_aircraft(scenario)
     envelope = load_envelope(aircraft, motor_braking=scenario.flight.motor_braking)
     airspeed = scenario.flight.airspeed_mps or default_airspeed
     stated_airspeed = autopilot.stated_value(autopilot.speeds.cruise_parameter)
@@ -518,7 +518,7 @@ def _refly_followed_legs(
         north = -wind.speed * math.cos(wind.from_course) + draw.wind[0]
         east = -wind.speed * math.sin(wind.from_course) + draw.wind[1]
         scenario = with_wind(scenario, math.hypot(north, east), math.atan2(-east, -north) % (2.0 * math.pi), turbulence)
-    model, battery = find_aircraft_and_energy(scenario)
+    model = scenario_aircraft(scenario)
     limits = setup.limits
     if model.name != setup.aircraft:
         envelope = load_envelope(model, motor_braking=scenario.flight.motor_braking)
@@ -528,7 +528,7 @@ def _refly_followed_legs(
         scenario=scenario,
         limits=limits,
         aircraft=model.name,
-        battery=battery,
+        battery=carried_energy(scenario, model),
         imported_log=None,
         nav="perfect",
     )

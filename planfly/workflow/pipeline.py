@@ -15,7 +15,7 @@ from flight.simulation.track import Track, TrackBuilder, join_tracks
 from logs.recording.reader import LogEvent
 from logs.recording.recorder import Recorder, thin_track
 from logs.verdict.judge_flight import judge_flight, judge_plan_only
-from logs.verdict.measures.energy import reason_not_to_start
+from logs.verdict.measures.energy import check_energy
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.places import ReferenceFlights
 from logs.verdict.verdict import Verdict
@@ -180,18 +180,15 @@ def fly_and_judge(
     findings_only: True for a verdict with only its findings and answer, see `logs.verdict.judge_flight.judge_flight`.
     limits: limits of the flight time and of the size of the log.
 
-    If the flight cannot start, or `logs.verdict.measures.energy.reason_not_to_start` gives a reason not to start it,
-    the result has no row and no log; its verdict covers the route and says that the flight did not start.  Raises
-    FlightError if the catalog does not contain the setup's aircraft, or if a program does not fly the mission to its
-    end; then no log is left.
+    If the flight cannot start, or `logs.verdict.measures.energy.check_energy` refuses it, the result has no row and no
+    log; its verdict covers the route and says that the flight did not start.  Raises FlightError if the catalog does
+    not contain the setup's aircraft, or if a program does not fly the mission to its end; then no log is left.
     """
     aircraft = find_logged_aircraft(setup.aircraft, setup.scenario.flight.aircraft)
     task = _FlightTask(aircraft, log, advance, every, limits, reference, returns=returns, findings_only=findings_only)
     requirements = route_requirements(setup)
-    reason = reason_not_to_start(requirements)
-    if reason:
-        return _judge_unflown(requirements, log, reason, reference)
     try:
+        check_energy(requirements)
         if autopilot is not None:
             return _fly_with_program(task, setup, find_program_class(autopilot).with_model(setup.autopilot, autopilot))
         off_nominal_flight = off_nominal or OffNominal(Variation())

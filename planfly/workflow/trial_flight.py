@@ -10,7 +10,7 @@ from flight.simulation.simulate import BLOCK_DURATION_S, Flight
 from flight.simulation.track import Track, TrackBuilder, join_tracks
 from logs.verdict.judge_flight import judge_flight
 from logs.verdict.judge_geometry import judge_geometry
-from logs.verdict.measures.energy import reason_not_to_start
+from logs.verdict.measures.energy import check_energy
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.verdict import Verdict
 from planfly.workflow.flight_limits import predicted_seconds
@@ -60,11 +60,9 @@ class Trial:
     @cached_property
     def flight(self) -> tuple[Track, str]:
         """Track of the flight and the reason for its end; a flight that cannot start has no row."""
-        reason = reason_not_to_start(self.requirements)
-        if reason:
-            return join_tracks([]), reason
         builder, end_reason = TrackBuilder(), ""
         try:
+            check_energy(self.requirements)
             flight = Flight(self.setup, self.aircraft)
             while not end_reason:
                 rows, end_reason = flight.fly_block(round(BLOCK_DURATION_S / flight.dt))

@@ -91,15 +91,15 @@ def load_uav(scenario: Scenario, parameters: Mapping[str, float] | None = None) 
     ('aerosonde', 25.0, 60.0)
     """
     table = scenario.flight
-    aircraft, battery = find_aircraft_and_energy(scenario)
+    aircraft = scenario_aircraft(scenario)
     autopilot = load_autopilot(scenario, aircraft)
     if parameters:
         # Parameters stored in a log are checked like those of a file.
         autopilot = autopilot.restore(autopilot.with_parameters(**parameters).store())
     airspeed = cruise_airspeed(scenario, aircraft, autopilot)
     envelope = load_envelope(aircraft, motor_braking=table.motor_braking)
-    limits = make_limits(scenario, envelope, airspeed, max_turn_bank(scenario, autopilot))
-    return Uav(aircraft, with_tracking_error(limits, autopilot, scenario), battery, autopilot)
+    limits = make_limits(scenario, envelope, airspeed, max_turn_bank(scenario, autopilot), autopilot)
+    return Uav(aircraft, limits, carried_energy(scenario, aircraft), autopilot)
 
 
 def uav_of_setup(setup: FlightSetup) -> Uav:
@@ -121,22 +121,11 @@ def max_turn_bank(scenario: Scenario, autopilot: Autopilot) -> float:
     return min(math.inf if stated_bank is None else math.radians(stated_bank), autopilot.turns.max_bank)
 
 
-def with_tracking_error(limits: Limits, autopilot: Autopilot, scenario: Scenario) -> Limits:
-    """Add the tracking error of an autopilot, in the wind and navigation of a scenario, to limits."""
-    table = scenario.flight
-    tracking = autopilot.deviations.tracking_error(
-        limits.airspeed, table.steering.nav, fly_over=table.fly_over, turbulence=scenario.wind.turbulence
-    )
-    return replace(limits, tracking=tracking)
-
-
-def find_aircraft_and_energy(scenario: Scenario) -> tuple[Aircraft, float]:
-    """Return the aircraft of a scenario and the energy carried (Wh).
-
-    Raises ScenarioError for an unknown aircraft.
+def scenario_aircraft(scenario: Scenario) -> Aircraft:
+    """Return the aircraft of a scenario.  Raises ScenarioError for an unknown aircraft.
 
     >>> from world.scenario import load_scenario
-    >>> find_aircraft_and_energy(load_scenario("tight"))[0].name
+    >>> scenario_aircraft(load_scenario("tight")).name
     'aerosonde'
     """
     table = scenario.flight
@@ -145,7 +134,13 @@ def find_aircraft_and_energy(scenario: Scenario) -> tuple[Aircraft, float]:
         model_hash(aircraft)
     except FlightError as error:
         raise ScenarioError.from_error(error, scenario.name, "flight.aircraft", table.aircraft) from error
-    return aircraft, aircraft.battery_energy / 3600.0 if table.battery_wh is None else table.battery_wh
+    return aircraft
+
+
+def carried_energy(scenario: Scenario, aircraft: Aircraft) -> float:
+    """Return the energy that an aircraft carries in a scenario, Wh."""
+    stated_energy = scenario.flight.battery_wh
+    return aircraft.battery_energy / 3600.0 if stated_energy is None else stated_energy
 
 
 def cruise_airspeed(scenario: Scenario, aircraft: Aircraft, autopilot: Autopilot) -> float:

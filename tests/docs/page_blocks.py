@@ -15,8 +15,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from planfly.cli import main
-from planfly.commands.registry import build_parser
+from planfly.cli import build_parser, main
 from tests.planfly.made_plans import DEFAULT_RUN, default_run
 from tests.soak import SOAK
 

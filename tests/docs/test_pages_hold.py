@@ -17,8 +17,7 @@ from logs.recording.reader import read_log
 from logs.verdict import tolerances
 from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.rules.registry import RULES
-from planfly.cli import main
-from planfly.commands.registry import build_parser
+from planfly.cli import build_parser, main
 from planfly.terminal.exit_codes import EXIT_CODES
 from tests.docs.page_blocks import PAGES, ROOT
 from tests.planfly.made_plans import default_run

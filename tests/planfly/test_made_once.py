@@ -26,8 +26,7 @@ from flight.live.flight_process import (
     serve_flights,
 )
 from logs.views import drawing
-from planfly.cli import main
-from planfly.commands.registry import build_parser
+from planfly.cli import build_parser, main
 from planfly.live.served_flights import ServedFlights, ServeOptions
 from planfly.workflow import suggestion_trials
 from tests.planfly.conftest import FIELD

@@ -9,7 +9,7 @@ from typing import Any, get_args, get_origin
 import pytest
 
 import planfly
-from planfly.commands.registry import build_parser
+from planfly.cli import build_parser
 
 # The functions that each command calls.
 FUNCTIONS = {

@@ -7,6 +7,7 @@ import numpy as np
 
 from aircraft.envelope import ground_speed
 from logs.verdict.measures.route_requirements import RouteRequirements
+from world.errors import StartError
 
 # A mission is not flown if its predicted energy exceeds this multiple of the energy carried, because the flight would
 # show nothing new.
@@ -63,21 +64,18 @@ def air_climb_angle(requirements: RouteRequirements, leg: int, speed: float, alt
     return angle
 
 
-def reason_not_to_start(requirements: RouteRequirements) -> str:
-    """Return the reason not to start a flight, or "" if it may start.
+def check_energy(requirements: RouteRequirements) -> None:
+    """Raise StartError if the predicted energy exceeds `MAX_ENERGY_RATIO` times the energy carried.
 
-    A flight is not started if its predicted energy exceeds `MAX_ENERGY_RATIO` times the energy carried.  The prediction
-    is skipped if even full power throughout the flight would not exceed this energy.
+    The prediction is skipped if even full power throughout the flight would not exceed this energy.
     """
     setup = requirements.setup
     duration = setup.path.length / float(setup.demanded_route.leg_airspeeds.min())
     full_power = setup.envelope.power_full
     full_energy = float(np.nanmax(full_power, initial=0.0)) * duration / 3600.0
     if full_energy <= MAX_ENERGY_RATIO * setup.battery:
-        return ""
+        return
     energy_ratio = predicted_energy(requirements)[0] / setup.battery
-    return (
-        f"not started: the mission needs {energy_ratio:.0f} times the energy carried"
-        if energy_ratio > MAX_ENERGY_RATIO
-        else ""
-    )
+    if energy_ratio > MAX_ENERGY_RATIO:
+        reason = f"the mission needs {energy_ratio:.0f} times the energy carried"
+        raise StartError(setup.mission.source, reason, field="energy", value=energy_ratio)

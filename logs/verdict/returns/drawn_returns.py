@@ -154,7 +154,7 @@ def worst_returns(world: ReturnWorld, starts: ReturnStarts, returns: Returns) ->
     if not drawn_ranges:
         return ()
     targets = [return_range.worst.target for return_range in drawn_ranges]
-    paths = world.fly(starts.subset(rows), targets, store_paths=True).tracks
+    paths = world.fly(starts.subset(rows).rows, targets, store_positions=True).tracks
     return tuple(
         WorstReturn(drawn_range, path, _marked_position(world, drawn_range.worst, path))
         for drawn_range, path in zip(drawn_ranges, paths, strict=True)

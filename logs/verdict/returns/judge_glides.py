@@ -338,7 +338,7 @@ def _simulate_engine_out_returns(world: ReturnWorld, starts: ReturnStarts) -> li
     if not world.is_simulated or not world.autopilot.returns.flies_without_engine:
         return [EngineOutReturn(target, "not flown", math.nan, math.nan, _NO_POSITION, math.nan) for target in targets]
     # A return that continues with a landing is simulated only up to its loiter.
-    outcomes = world.fly(starts, targets, engine_out=True).results
+    outcomes = world.fly(starts.rows, targets, engine_out=True).results
     return [_engine_out_return(world, target, row) for target, row in zip(targets, outcomes, strict=True)]
 
 

@@ -10,7 +10,8 @@ replaces the result of the point mass for that return and, if it is worse, for a
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import groupby
 from typing import Literal, NamedTuple, get_args
 
@@ -316,6 +317,8 @@ class ReturnWorld:
     stands_in: as in `Returns`.
     uses_other_autopilot: True if ArduPlane's return replaces the return of an autopilot with parameters of its own.
     landings: the mission's landing sequences.
+    fly: simulates RTLs from starts to targets, as `flight.autopilots.parts.FlyReturns` with this aircraft and
+        environment.
     """
 
     setup: FlightSetup
@@ -328,6 +331,14 @@ class ReturnWorld:
     stands_in: bool = False
     uses_other_autopilot: bool = False
     landings: tuple[LandingStart, ...] = ()
+    fly: "partial[SimulatedReturns]" = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Bind the autopilot's simulation of RTLs to aircraft and environment."""
+        fly = self.autopilot.returns.fly
+        if fly is None:
+            raise ValueError(f"{self.autopilot.title} has no RTL")
+        object.__setattr__(self, "fly", partial(fly, aircraft=self.aircraft, environment=self.environment))
 
     @property
     def scenario(self) -> Scenario:
@@ -338,34 +349,6 @@ class ReturnWorld:
     def limit(self) -> float:
         """Required minimum height above ground, m."""
         return self.setup.limits.min_clearance
-
-    def fly(
-        self,
-        starts: ReturnStarts,
-        targets: Sequence[ReturnTarget],
-        *,
-        store_paths: bool = False,
-        abort_limits: tuple[Floats, Floats] | None = None,
-        engine_out: bool = False,
-    ) -> SimulatedReturns:
-        """Simulate the autopilot's RTLs from n starts to their targets.
-
-        store_paths: True to store the paths.
-        abort_limits, engine_out: see `flight.autopilots.parts.FlyReturns`.
-        Raises ValueError for an autopilot without an RTL.
-        """
-        fly = self.autopilot.returns.fly
-        if fly is None:
-            raise ValueError(f"{self.autopilot.title} has no RTL")
-        return fly(
-            starts.rows,
-            targets,
-            self.aircraft,
-            self.environment,
-            store_positions=store_paths,
-            abort_limits=abort_limits,
-            engine_out=engine_out,
-        )
 
     @property
     def min_airspeed(self) -> float:
@@ -675,7 +658,7 @@ def simulate_judged_returns(
     abort_limits = (
         None if min_sphere_distances is None else (np.where(has_approach, -math.inf, min_heights), min_sphere_distances)
     )
-    simulation = world.fly(starts, targets, store_paths=bool(world.airspace.zones), abort_limits=abort_limits)
+    simulation = world.fly(starts.rows, targets, store_positions=bool(world.airspace.zones), abort_limits=abort_limits)
     results = simulation.results
     indices = np.flatnonzero((results["clearance"] < min_heights) & has_approach)
     if not indices.size:
@@ -685,7 +668,7 @@ def simulate_judged_returns(
         for k in indices.tolist()
         if (landing := targets[k].landing) is not None
     ]
-    short_results = world.fly(starts.subset(indices), short_targets).results
+    short_results = world.fly(starts.subset(indices).rows, short_targets).results
     results = results.copy()
     for name in ("clearance", "clearance_east", "clearance_north", "clearance_up"):
         values = results[name]

@@ -21,7 +21,7 @@ from planfly.campaigns.campaign_result import (
 from planfly.campaigns.find_winds import WindsGoal
 from planfly.campaigns.flight_row import STATION_COUNT
 from planfly.campaigns.tables import CAMPAIGN_DATABASE, read_table
-from planfly.commands.registry import build_parser
+from planfly.cli import build_parser
 from tests.planfly.campaigns.made_report import made_report
 
 FLOWN = ("aircraft", "airspeed", "wind", "turbulence", "forecast", "at", "params", "guidance", "autopilot", "nav")

@@ -11,8 +11,7 @@ import rasterio
 from rasterio.transform import Affine
 
 import planfly
-from planfly.cli import main
-from planfly.commands.registry import build_parser
+from planfly.cli import build_parser, main
 from world.scenario import load_scenario
 
 # A line of the file that is an example, and begins with a key or the name of a table.

@@ -6,7 +6,9 @@ from pathlib import Path
 import pytest
 
 import planfly.commands
-from planfly.commands.registry import COMMANDS, COMMANDS_BY_NAME, answer_schema, build_parser
+from planfly.cli import build_parser
+from planfly.commands.registry import COMMANDS, COMMANDS_BY_NAME
+from planfly.terminal.schemas import answer_schema, commands_with_json
 
 
 def test_each_command_is_a_parser_and_a_function_of_one_module() -> None:
@@ -30,7 +32,7 @@ def test_what_is_no_command_is_none() -> None:
 def test_a_command_answers_in_json_where_the_list_names_its_answer() -> None:
     line = build_parser()
     for command in COMMANDS:
-        assert ("--json" in line.commands[command.name].long_options()) == bool(command.answer)
+        assert ("--json" in line.commands[command.name].long_options()) == (command.name in commands_with_json())
 
 
 def test_help_lists_each_command_below_its_section() -> None:

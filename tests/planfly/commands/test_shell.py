@@ -9,8 +9,7 @@ from pathlib import Path
 import pytest
 
 import world
-from planfly.cli import main
-from planfly.commands.registry import build_parser
+from planfly.cli import build_parser, main
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])

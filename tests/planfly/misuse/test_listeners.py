@@ -14,8 +14,7 @@ from flight.autopilots.arduplane_sitl.physics import PhysicsPort
 from flight.autopilots.px4_sitl.physics import SimulatorPort
 from flight.autopilots.sitl.link import TcpLink, UdpLink
 from logs.recording.example_log import write_example_log
-from planfly.cli import main
-from planfly.commands.registry import build_parser
+from planfly.cli import build_parser, main
 from tests.planfly.conftest import FIELD
 from tests.soak.test_hostile_files import WPL
 

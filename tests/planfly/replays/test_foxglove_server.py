@@ -18,7 +18,7 @@ import pytest
 
 from flight.simulation.track import Track
 from logs.recording.state_channel import EPOCH_NS, state_class
-from planfly.cli import main
+from planfly.cli import build_parser, main
 from planfly.replays.foxglove_server import SUBPROTOCOL
 from tests.clients import need
 from tests.logs.made_flight import make_setup, make_track, record
@@ -159,8 +159,6 @@ def test_the_subprotocol_is_the_one_that_is_stated(gate: tuple[subprocess.Popen[
     """In what is printed and in the help; a viewer that asks for the older name alone is refused."""
     from websockets.exceptions import WebSocketException
     from websockets.sync.client import connect
-
-    from planfly.commands.registry import build_parser
 
     _, viewer = gate
     assert viewer.socket.subprotocol == SUBPROTOCOL == "foxglove.sdk.v1"

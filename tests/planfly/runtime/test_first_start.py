@@ -9,9 +9,9 @@ from pathlib import Path
 import numba
 import pytest
 
+from planfly.api.api_function import warm_up
 from planfly.kernel_units.unit_kernels import list_unit_kernels
 from planfly.runtime import first_start
-from planfly.runtime.first_start import warm_up
 from planfly.runtime.stages import send_progress_to
 from planfly.terminal.output import ON_STANDARD_ERROR, SILENT
 from tests.soak import some
@@ -20,7 +20,7 @@ from world.compile_events import announce_compilation
 ROOT = Path(__file__).parents[3]
 CODE = """
 import sys
-from planfly.runtime.first_start import warm_up
+from planfly.api.api_function import warm_up
 from world.geometry import wrap
 with warm_up():
     for _ in range(2):

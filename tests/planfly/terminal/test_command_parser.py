@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import planfly
-from planfly.commands.registry import build_parser
+from planfly.cli import build_parser
 from planfly.terminal.command_parser import CommandParser, LineParser, colour_text, wants_colour
 from world.errors import MissionError
 

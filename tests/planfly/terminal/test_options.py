@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from planfly.commands.registry import build_parser
+from planfly.cli import build_parser
 from planfly.terminal.command_parser import CommandParser
 from planfly.terminal.options import (
     add_aircraft_and_wind_options,

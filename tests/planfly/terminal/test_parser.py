@@ -6,7 +6,8 @@ import sys
 
 import pytest
 
-from planfly.commands.registry import COMMANDS, build_parser
+from planfly.cli import build_parser
+from planfly.commands.registry import COMMANDS
 
 NAMES = [command.name for command in COMMANDS]
 
@@ -94,7 +95,7 @@ def test_bad_usage_ends_with_2_and_one_line(argv: list[str], capsys: pytest.Capt
 
 def test_the_parser_loads_nothing_heavy() -> None:
     code = (
-        "import sys; from planfly.commands.registry import build_parser; build_parser(); "
+        "import sys; from planfly.cli import build_parser; build_parser(); "
         "print([name for name in ('numpy', 'numba', 'pydantic', 'matplotlib', 'jsbsim') if name in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)

@@ -12,8 +12,7 @@ from logs.verdict.conditions import judging_conditions
 from logs.verdict.findings import Finding, make_finding, message
 from logs.verdict.places import FLIGHT, Change, Place
 from logs.verdict.verdict import Verdict
-from planfly.cli import main
-from planfly.commands.registry import build_parser
+from planfly.cli import build_parser, main
 from planfly.rtl.return_summary import ReturnSummary
 from planfly.terminal.command_parser import error_text
 from planfly.terminal.results import print_warnings

@@ -9,7 +9,6 @@ import pytest
 from aircraft.catalog import load_aircraft
 from logs.recording.example_log import example_log
 from logs.verdict.measures import energy
-from logs.verdict.measures.route_requirements import route_requirements
 from planfly.workflow import trial_flight
 from planfly.workflow.trial_flight import Trial, TrialAborted, max_explaining_flights
 from tests.synthetic import make_setup
@@ -39,16 +38,22 @@ def test_a_trial_is_flown_when_it_is_asked_for_and_once(monkeypatch: pytest.Monk
 
 
 @pytest.mark.parametrize(
-    ("ratio", "reason"), [(1.99, ""), (2.01, "not started: the mission needs 2 times the energy carried")]
+    ("ratio", "end_reason"),
+    [(1.99, "not started: no trim"), (2.01, "not started: the mission needs 2 times the energy carried")],
 )
 def test_a_flight_of_more_than_twice_the_energy_carried_is_not_begun(
-    ratio: float, reason: str, monkeypatch: pytest.MonkeyPatch
+    ratio: float, end_reason: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A kilowatt all the way takes more than the battery of 0.01 Wh."""
     envelope = replace(SETUP.limits.envelope, power_full=np.array([1000.0]))
     setup = replace(SETUP, battery=0.01, limits=replace(SETUP.limits, envelope=envelope))
     monkeypatch.setattr(energy, "predicted_energy", lambda _: (ratio * 0.01, 0.0))
-    assert energy.reason_not_to_start(route_requirements(setup)) == reason
+
+    def fly(setup: object, aircraft: object) -> None:
+        raise StartError("f", "no trim")
+
+    monkeypatch.setattr(trial_flight, "Flight", fly)
+    assert Trial(setup, AIRCRAFT).flight[1] == end_reason
 
 
 def test_flights_that_explain_a_verdict_last_six_hours_in_all() -> None:

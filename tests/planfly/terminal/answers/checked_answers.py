@@ -7,7 +7,7 @@ import jsonschema
 import pytest
 
 from planfly.cli import main
-from planfly.commands.registry import answer_schema
+from planfly.terminal.schemas import answer_schema
 
 
 def validate(command: str, answer: object) -> None:

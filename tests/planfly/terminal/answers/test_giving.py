@@ -5,7 +5,8 @@ import json
 import jsonschema
 import pytest
 
-from planfly.commands.registry import answer_objects, answer_schema, build_parser, commands_with_json, schema_text
+from planfly.cli import build_parser
+from planfly.terminal.schemas import answer_objects, answer_schema, commands_with_json, schema_text
 
 
 def test_every_command_with_json_has_a_schema_and_no_other() -> None:
