@@ -385,12 +385,13 @@ def read_zone_file(path: Path, source: str, max_zones: int = MAX_ZONES) -> FileZ
             unrestricted_counts[entries] += 1
             continue
         if len(file_zones.zones) >= max_zones:
-            allowed = f"at most {MAX_ZONES:,} are allowed in all files together"
-            raise ScenarioError(f"{source}: too many zones: {allowed}", file=source, field="zones", allowed=allowed)
+            message = f"{source}: too many zones: at most {MAX_ZONES:,} are allowed in all files together"
+            raise ScenarioError(message, file=source, field="zones", allowed=f"at most {MAX_ZONES:,}")
         corner_count += sum(map(len, entries.get("rings_deg", ())))
         if corner_count > MAX_FILE_CORNERS:
-            allowed = f"at most {MAX_FILE_CORNERS:,} are allowed in one file"
-            raise ScenarioError(f"{source}: too many corners: {allowed}", file=source, allowed=allowed)
+            allowed = f"at most {MAX_FILE_CORNERS:,}"
+            message = f"{source}: too many corners: {allowed} are allowed in one file"
+            raise ScenarioError(message, file=source, allowed=allowed)
         outline_notes, crossing_count = _repair_outline(
             entries, MAX_CROSSINGS - total_crossings, f"{source}: {location}"
         )

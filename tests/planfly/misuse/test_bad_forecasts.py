@@ -134,8 +134,8 @@ NETCDF: dict[str, tuple[Writer, tuple[str, ...]]] = {
     ),
     "an infinite value": (nc(lambda: with_value(winds(), np.inf)), ("u, v: values are missing",)),
     "only missing values": (nc(lambda: winds() * np.nan), ("u: no value around the mission",)),
-    "one latitude": (nc(lambda: winds(latitudes=np.array([46.0]))), ("latitude: one node: allowed at least two",)),
-    "one longitude": (nc(lambda: winds(longitudes=np.array([8.0]))), ("longitude: one node: allowed at least two",)),
+    "one latitude": (nc(lambda: winds(latitudes=np.array([46.0]))), ("latitude: one node: expected at least two",)),
+    "one longitude": (nc(lambda: winds(longitudes=np.array([8.0]))), ("longitude: one node: expected at least two",)),
     "a node twice": (
         nc(lambda: winds(longitudes=np.array([7.9, 8.0, 8.0, 8.1]))),
         ("longitude: two nodes at the same place",),
