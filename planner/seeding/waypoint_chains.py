@@ -202,9 +202,6 @@ def _extend_paths(
 ) -> int:
     """Find the cheapest partial path to candidate k of waypoint i; return the number of legs evaluated.
 
-    The path comes from one of the open candidates of the previous waypoint. These are tried by increasing lower bound
-    of their cost, so that few legs have to be evaluated.
-
     step: 1 for paths from the start, -1 for paths from the destination. candidates: (w, k, 3) m.
     cost, link: (w, k) cost and neighbouring candidate of each partial path; updated for the candidate.
     max_cost: upper limit on the cost of a partial path. legs: costs of legs, as in `_advance_sweeps`; updated.
@@ -217,7 +214,7 @@ def _extend_paths(
         # A leg costs at least its length.
         lower_bounds[m] = cost[previous, open_ends[m]] + _distance(candidates[previous, open_ends[m]], point)
     while True:
-        # Best lower bound first: a leg without violations ends the search.
+        # Best lower bound first, so that few legs are evaluated: a leg without violations ends the search.
         m = _lowest_index(lower_bounds, open_ends.size)
         j, lower_bound = open_ends[m], lower_bounds[m]
         if not lower_bound < min(cost[i, k], max_cost):

@@ -110,7 +110,7 @@ TO_ARDUPLANE = "but PX4 is to fly; --autopilot ardupilot simulates ArduPlane ins
         ("m.waypoints --params mixed.param", "FW_R_TC is PX4's and TECS_CLMB_MAX is ArduPilot's: --autopilot names"),
         ("copter.plan", "copter.plan: mission.vehicleType: 2: a multicopter or helicopter"),
         ("vtol.plan", "vtol.plan: mission.vehicleType: 22: a VTOL aircraft"),
-        ("tracker.plan", "tracker.plan: mission.vehicleType: 5: another vehicle"),
+        ("tracker.plan", "tracker.plan: mission.vehicleType: 5: not a fixed-wing aircraft"),
         ("slugs.plan", "slugs.plan: mission.firmwareType: 1: another autopilot"),
     ],
 )
