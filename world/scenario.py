@@ -247,7 +247,7 @@ class Scenario:
             inactive_count = len(self.spec.zones or ()) - len(self.zones)
             verb = "is" if inactive_count == 1 else "are"
             notes.append(
-                f"{inactive_count:,} of {len(timed_tables):,} zones with times of activity {verb} "
+                f"{inactive_count:,} of {count_text(len(timed_tables), 'zone')} with times of activity {verb} "
                 f"not active from {span} UTC and {verb} ignored"
             )
         return tuple(notes)

@@ -409,8 +409,9 @@ def _describe_proven_closure(problem: Problem) -> list[str]:
         return [f"no path exists: the ground blocks every path below {ceiling}"]
     names = [problem.scenario.threats.names[k] for k in missiles[:MAX_NAMED_MISSILES]]
     others = f" and {len(missiles) - MAX_NAMED_MISSILES} more" if len(missiles) > MAX_NAMED_MISSILES else ""
+    verb = "block" if len(missiles) > 1 else "blocks"
     return [
-        f"no path exists: {', '.join(names)}{others} block every path between the ground, {ceiling} and the edges of"
+        f"no path exists: {', '.join(names)}{others} {verb} every path between the ground, {ceiling} and the edges of"
         " the map; without any one of these missiles a path may exist"
     ]
 

@@ -485,9 +485,11 @@ def _find_launches(site: _Site, launch: Launch, takeoff_height: float, altitude:
             required_heights = np.minimum(site.problem.certified.clearance, _CLIMB_CLEARANCE_FRACTION * heights)
             margins = (site.home[2] + heights - terrain_heights - required_heights)[distances > _LAUNCH_RUN_M]
             course_text = f"{round(math.degrees(course)) % 360}°"
-            if not (margins >= 0.0).all():
-                worst_margin = float(np.nanmin(margins)) if not np.isnan(margins).all() else -math.inf
-                worst_index = int(np.argmin(np.where(np.isnan(margins), math.inf, margins)))
+            if np.isnan(margins).any():
+                best_rejected = max(best_rejected, (-1e6, f"{course_text} (leads over unknown terrain)"))
+                break
+            if margins.min() < 0.0:
+                worst_margin, worst_index = float(margins.min()), int(np.argmin(margins))
                 distance = float(distances[distances > _LAUNCH_RUN_M][worst_index])
                 reason = f"{course_text} ({-worst_margin:.0f} m too low above the ground {distance:.0f} m from home)"
                 best_rejected = max(best_rejected, (worst_margin, reason))
@@ -502,6 +504,9 @@ def _find_launches(site: _Site, launch: Launch, takeoff_height: float, altitude:
                 break
             takeoff_end = (home[0] + takeoff_distance * east, home[1] + takeoff_distance * north)
             launches.append(_Launch(course, takeoff_end, end, _drifted_ends(site, course, takeoff_height)))
+    if not launches and not best_rejected[1]:
+        course_name = "any course" if launch.course is None else "the launch course"
+        return [], f"the aircraft cannot climb on {course_name}"
     subject = "the launch course is" if launch.course is not None else f"none of {len(courses)} launch courses is"
     negation, best_text = ("", "; the best course is ") if launch.course is None else ("not ", ": course ")
     return (
@@ -778,10 +783,8 @@ def _find_path_to_line_up(site: _Site, final: _Final) -> tuple[Floats | None, st
                 break
     route_text = f"from the destination to the final on course {round(math.degrees(final.course)) % 360}°"
     if not best_rejected.count:
-        return (
-            None,
-            f"no path {route_text} is long enough for its turns and {end_altitude - final_altitude:.0f} m of descent",
-        )
+        climb_text = f"{abs(end_altitude - final_altitude):.0f} m of {'descent' if is_descent else 'climb'}"
+        return None, f"no path {route_text} is long enough for its turns and {climb_text}"
     return (
         None,
         f"none of {best_rejected.count} paths {route_text} is clear; the best path: {best_rejected.problem}."

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from functools import reduce
 
 import numpy as np
 import shapely
@@ -26,7 +27,7 @@ def unite_inclusions(zones: Sequence[Zone]) -> tuple[Zone, ...]:
     inclusions = [zone for zone in zones if zone.kind == "inclusion"]
     if len(inclusions) < 2:
         return tuple(zones)
-    union = shapely.union_all([_zone_outline(zone.shape) for zone in inclusions])
+    union = shapely.union_all([_zone_area(zone.shape) for zone in inclusions])
     rings = [
         [(east, north) for east, north in ring.coords]
         for part in shapely.get_parts(union)
@@ -37,10 +38,11 @@ def unite_inclusions(zones: Sequence[Zone]) -> tuple[Zone, ...]:
     return (Zone(name, "inclusion", make_polygon(rings)), *exclusions)
 
 
-def _zone_outline(shape: Polygon | Cylinder) -> shapely.Polygon:
-    """Return the outline of a shape without its holes; a circle is approximated by an inscribed polygon."""
+def _zone_area(shape: Polygon | Cylinder) -> shapely.Geometry:
+    """Return the area of a shape: its parts without their holes; a circle is approximated by an inscribed polygon."""
     if isinstance(shape, Polygon):
-        return shapely.Polygon(shape.rings[0])
+        # A position is inside if it is inside an odd number of rings.
+        return reduce(shapely.symmetric_difference, map(shapely.Polygon, shape.rings))
     angles = np.linspace(0.0, 2.0 * math.pi, _CIRCLE_CORNERS, endpoint=False)
     corners = np.column_stack([shape.east + shape.radius * np.cos(angles), shape.north + shape.radius * np.sin(angles)])
     return shapely.Polygon(corners)

@@ -185,6 +185,14 @@ def ring(top: float, gap: float = math.inf) -> Ground:
     return heights
 
 
+def test_a_launch_towards_unknown_terrain_is_refused_for_that() -> None:
+    """The stated launch course leads north; the terrain is known only south of 100 m north of home."""
+    known = laid(
+        lambda east, north: np.where(north > 100.0, np.nan, BASE), launch={"method": "hand", "course_deg": 0.0}
+    )
+    assert known.certificate.problems[0].endswith(": course 0° (leads over unknown terrain)")
+
+
 def test_out_of_a_ring_the_launch_leads_through_its_gap_and_without_one_the_plan_says_so() -> None:
     through = laid(ring(200.0, gap=120.0), **CATAPULT)
     assert through.feasible, through.certificate.problems

@@ -100,8 +100,7 @@ def test_a_zone_that_is_not_active_is_left_out_and_said(tmp_path: Path) -> None:
     friday = with_flight_time(scenario, "2026-05-01T10:00Z")
     assert [zone.name for zone in friday.zones] == ["mast"]
     assert friday.notes == (
-        "1 of 1 zones with times of activity is not active from 2026-05-01 10:00 to 2026-05-01 11:00 UTC "
-        "and is ignored",
+        "1 of 1 zone with times of activity is not active from 2026-05-01 10:00 to 2026-05-01 11:00 UTC and is ignored",
     )
     # What is written down of it is the same scenario again, in which another time can be asked for.
     again = scenario_from_spec(json.loads(json.dumps(friday.to_json())), "a log")
