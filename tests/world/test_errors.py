@@ -8,7 +8,7 @@ import pytest
 
 import world.errors
 from planfly.cli import main
-from planfly.commands import shell
+from planfly.commands.registry import COMMANDS_BY_NAME
 from world.errors import (
     ArgumentError,
     CrashError,
@@ -57,7 +57,8 @@ def test_the_command_line_ends_with_exit_code_2_and_the_message(
     def fail(*_: object) -> int:
         raise kind("file.toml: limits: too many")
 
-    monkeypatch.setattr(shell, "scenarios", fail)
+    command = COMMANDS_BY_NAME["scenarios"]._replace(run=fail)
+    monkeypatch.setitem(COMMANDS_BY_NAME, "scenarios", command)
     assert main(["scenarios"]) == 2
     assert capsys.readouterr().err.splitlines() == ["planfly: file.toml: limits: too many"]
 

@@ -177,4 +177,4 @@ def test_a_program_is_named_by_its_version_its_digest_and_what_was_changed() -> 
     )
     assert replace(flown, program=replace(PROGRAM, changed={})).describe("a").endswith("changed: none")
     # No more than eight by name.
-    assert replace(flown, program=replace(PROGRAM, changed=GIVEN)).describe("a").endswith("P6 6, P7 7, +32 more")
+    assert replace(flown, program=replace(PROGRAM, changed=GIVEN)).describe("a").endswith("P6 6, P7 7 and 32 more")

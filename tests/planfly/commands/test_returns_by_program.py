@@ -88,7 +88,7 @@ def test_harm_that_a_program_does_counts_where_the_law_does_none(
 
 def test_no_program_but_arduplanes_is_flown(mound: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for program, said in (
-        (write_fake_px4(mound), "expected ArduPlane's program; returns of PX4 are not supported"),
+        (write_fake_px4(mound), "expected an ArduPlane executable; returns by a real PX4 are not supported"),
         (mound / "none", "no such file"),
     ):
         assert main(["returns", "mound.waypoints", "--sitl", str(program)]) == 2

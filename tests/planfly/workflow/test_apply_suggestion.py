@@ -121,7 +121,7 @@ def test_the_text_of_a_suggestion_that_passed_moves_the_items_as_its_trial_did()
         match = re.fullmatch(r".* \(move item (\d+) (.*)\)", text)
         if match is None:
             continue
-        step = {side: float(metres) for metres, side in re.findall(r"([\d.]+) m (\w+)", match[2])}
+        step = {side: float(metres) for side, metres in re.findall(r"(\w+) by ([\d.]+) m", match[2])}
         index = int(match[1]) - 1
         row = movable_indices(after).index(index)
         offset = (context.item_positions(after) - context.item_positions(judged.mission))[row]

@@ -148,7 +148,9 @@ def test_a_field_of_too_many_numbers_is_refused() -> None:
         velocities=np.broadcast_to(np.array([5.0, 0.0]), (1, *shape, 2)),
     )
     # 21.6 million, and the axes.
-    with pytest.raises(ForecastError, match=r"a\.nc: nodes: 21,60\d,\d+ numbers for a flight: allowed 20,000,000"):
+    with pytest.raises(
+        ForecastError, match=r"a\.nc: nodes: 21,60\d,\d+ numbers for a flight: allowed up to 20,000,000"
+    ):
         forecast_wind(TABLE, forecast, NOON.isoformat(), site(), 0)
 
 
