@@ -33,7 +33,7 @@ first steps:
   planfly fly mission.waypoints --terrain DEM  fly a mission of your own over your elevation file
   planfly help fly                             everything about one command"""
 
-# Errors of the machine: too many open files in the process or the system, too little memory, and disk errors.
+# Errors of the machine: too many open files in the process or the system, not enough memory, and disk errors.
 _MACHINE_ERRORS = (errno.EMFILE, errno.ENFILE, errno.ENOMEM, errno.EIO)
 
 
@@ -124,7 +124,7 @@ def _exit_code_and_text(error: BaseException, parser: CommandParser | None = Non
         return FAULT, f"{error.filename or 'file'}: {error.strerror or error}"
     if isinstance(error, MemoryError):
         text = str(error)
-        return FAULT, f"too little memory: {text}" if text and "bad_alloc" not in text else "too little memory"
+        return FAULT, f"not enough memory: {text}" if text and "bad_alloc" not in text else "not enough memory"
     return 128 + error.number if isinstance(error, Interrupted) else INTERRUPTED, "interrupted"
 
 

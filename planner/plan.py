@@ -393,7 +393,7 @@ def parse_plan(
 
     >>> parse_plan('{"schema": "planfly.plan/2"}', "plan.json")
     Traceback (most recent call last):
-    world.errors.MissionError: plan.json: schema: "planfly.plan/2": expected "planfly.plan/1" (and 11 more)
+    world.errors.MissionError: plan.json: schema: "planfly.plan/2": expected "planfly.plan/1" (and 11 more errors)
 
     Raises MissionError (or the scenario's own errors) with one line: file, field, value, allowed values.
     """

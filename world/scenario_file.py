@@ -12,6 +12,7 @@ from pydantic import BaseModel, ValidationError
 from world.errors import ScenarioError
 from world.files import did_you_mean, read_small_file, toml_table
 from world.scenario_tables import ScenarioFile
+from world.wording import count_text
 
 Table = TypeVar("Table", bound=BaseModel)
 
@@ -211,7 +212,7 @@ def _remaining_faults_text(errors: Sequence[Any]) -> str:
     if len({error_entry["loc"][:2] for error_entry in errors}) < 2 and errors[0]["loc"] not in _ENDS:
         return ""
     if any(error_entry["type"] != "missing" for error_entry in errors):
-        return f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
+        return f" (and {count_text(len(errors) - 1, 'more error')})" if len(errors) > 1 else ""
     others = [".".join(map(str, error_entry["loc"])) for error_entry in errors[1:]]
     text = f" (also missing: {', '.join(others)})" if others else ""
     if any(error_entry["loc"] in _ENDS for error_entry in errors):

@@ -76,7 +76,7 @@ class ReturnEnvironment:
     known: bool
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class SimulatedReturns:
     """Simulated RTLs.
 

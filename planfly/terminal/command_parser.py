@@ -211,7 +211,7 @@ class LineParser(CommandParser):
         """Parse the command line. For bad usage, print one line with a suggestion and raise SystemExit."""
         arguments = _join_negative_numbers(sys.argv[1:] if args is None else list(args))
         if arguments and not arguments[0].startswith("-") and arguments[0] not in self.commands:
-            hint = did_you_mean(arguments[0], self.commands) or f"; there are {', '.join(self.commands)}"
+            hint = did_you_mean(arguments[0], self.commands) or f"; the commands are {', '.join(self.commands)}"
             self.error(f"{arguments[0]!r}: unknown command{hint}")
         parsed, unknown_arguments = self.parse_known_args(arguments, namespace)
         parser = self.commands[parsed.command]

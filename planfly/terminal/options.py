@@ -73,7 +73,7 @@ def add_json_and_quiet_options(group: OptionGroup, command: str) -> None:
     group.add_argument(
         "--json",
         metavar="FILE",
-        help="also write the answer as JSON to FILE. The name - writes the answer to standard output, and all other "
+        help="also write the answer as JSON to FILE. With - as FILE, the answer goes to standard output, and all other "
         f"output to standard error. 'planfly help {command} --schema' prints the schema of the answer",
     )
     group.add_argument(
@@ -92,7 +92,7 @@ def add_world_options(parser: CommandParser) -> OptionGroup:
         group.add_argument(
             "--scenario",
             metavar="SCENARIO",
-            help="judge within this scenario: a TOML file, or the name of a built-in scenario",
+            help="judge against this scenario: a TOML file, or the name of a built-in scenario",
         ),
         complete_scenario,
     )
@@ -180,8 +180,8 @@ def add_turbulence_option(group: OptionGroup) -> None:
     group.add_argument(
         "--turbulence",
         choices=CHOICES["turbulence"],
-        help="turbulence of MIL-F-8785C by the standard deviation of its vertical gusts: light 0.77 m/s, moderate 1.54 "
-        "m/s (default: the scenario's, or none)",
+        help="turbulence level of MIL-F-8785C, by the standard deviation of the vertical gusts: light 0.77 m/s, "
+        "moderate 1.54 m/s (default: the scenario's, or none)",
     )
 
 

@@ -173,7 +173,7 @@ def test_too_little_memory_is_one_line(
 
     monkeypatch.setitem(COMMANDS_BY_NAME, "scenarios", SimpleNamespace(run=fail))
     assert main(["scenarios"]) == 1
-    assert capsys.readouterr().err == f"planfly: too little memory{told}\n"
+    assert capsys.readouterr().err == f"planfly: not enough memory{told}\n"
 
 
 def test_the_commands_own_code_is_the_process_exit_code(monkeypatch: pytest.MonkeyPatch) -> None:

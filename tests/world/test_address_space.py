@@ -38,7 +38,7 @@ def test_openblas_is_not_loaded_where_it_would_look_for_room_without_end() -> No
     assert done.returncode == 1
     (said,) = done.stderr.splitlines()
     assert said.startswith(
-        "planfly: too little memory: the limit of 480,000 kB of address space (ulimit -v) leaves less than "
+        "planfly: not enough memory: the limit of 480,000 kB of address space (ulimit -v) leaves less than "
     )
 
 

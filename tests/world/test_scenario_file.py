@@ -100,7 +100,7 @@ def test_missing_and_unreadable_files(tmp_path: Path, monkeypatch: pytest.Monkey
 
 def test_more_faults_are_counted() -> None:
     text = SMALL.replace("amsl_m = 400", "amsl_m = 1e9").replace("height_m = 200", "height_m = -3")
-    with pytest.raises(ScenarioError, match=r"start\.amsl_m: 1000000000\.0: allowed -500\.\.9000 \(and 1 more\)"):
+    with pytest.raises(ScenarioError, match=r"start\.amsl_m: 1000000000\.0: allowed -500\.\.9000 \(and 1 more error\)"):
         parse_scenario(text, "x")
 
 

@@ -87,7 +87,7 @@ def test_a_landing_without_a_strip_tells_its_course_wind_and_ground() -> None:
 @pytest.mark.parametrize(("east", "north", "told"), [(0.099, 0.0, False), (0.101, 0.0, True), (0.0, -0.101, True)])
 def test_ground_that_no_plan_would_land_on_is_told(east: float, north: float, told: bool) -> None:
     (said,) = landed_on(sloped(east, north), Wind(0.0, 0.0))
-    assert ("(plans land on slopes of up to 10%)" in said) is told
+    assert ("(planfly plan accepts slopes of up to 10%)" in said) is told
     # It leaves the verdict open, too.
     setup = setup_of(*WAY, home="36.5 -84.2 100")
     setup = replace(setup, scenario=replace(setup.scenario, terrain=sloped(east, north)))

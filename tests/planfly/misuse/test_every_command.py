@@ -77,7 +77,7 @@ def test_600_mb_of_address_space(name: str, inputs: Path, tmp_path: Path) -> Non
     done = give(given, folder, change=limited(resource.RLIMIT_AS, 600 * MB), limit=120.0)
     seen(given, done, "600 MB of address space")
     if done.code == 1:
-        assert done.lines[-1].startswith("planfly: too little memory: the limit of 614,400 kB of address space")
+        assert done.lines[-1].startswith("planfly: not enough memory: the limit of 614,400 kB of address space")
     whole(folder, inputs)
 
 

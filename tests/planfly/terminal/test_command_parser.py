@@ -114,7 +114,7 @@ def test_a_second_file_is_refused_with_the_way_to_judge_several(
         ("fly m.plan -- --wnd", "planfly fly: --wnd: no such argument (see planfly fly --help)"),
         ("fly --wnd -- m.plan --terain", "planfly fly: --wnd: no such option: did you mean '--wind'?"),
         ("fly m.plan -- --wnd=3 x", "planfly fly: --wnd=3: no such argument (see planfly fly --help)"),
-        ("qqqq", "planfly: 'qqqq': unknown command; there are run, plan, "),
+        ("qqqq", "planfly: 'qqqq': unknown command; the commands are run, plan, "),
     ],
 )
 def test_what_was_meant_is_named(line: str, said: str, capsys: Output) -> None:
