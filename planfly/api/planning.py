@@ -21,8 +21,8 @@ from planfly.threat_tables import GivenThreats, threat_tables
 from planfly.workflow.make_plan import make_given_plan, make_plan
 from planfly.workflow.output_paths import file_target
 from planfly.workflow.uav import choose_seed, cruise_airspeed, load_uav, scenario_aircraft
-from planner.plan import GIVEN_WAYPOINTS, Plan, plan_json, read_plan
-from planner.search.explain_failure import explain_failure, nearest_missile_text
+from planner.plan import GIVEN_WAYPOINTS, Plan, nearest_missile_text, plan_json, read_plan
+from planner.search.explain_failure import explain_failure
 from planner.search.replan import check_same_mission
 from planner.search.search_state import StopCondition
 from world.argument_types import checks_types
@@ -286,10 +286,11 @@ def what_blocks(plan: Plan) -> tuple[str, ...]:
     """
     if plan.safe:
         return ()
+    missile_texts = () if plan.certificate.kill_distance > 0.0 else (nearest_missile_text(plan),)
     if plan.feasible:
-        return (nearest_missile_text(plan),)
+        return missile_texts
     if plan.algorithm == GIVEN_WAYPOINTS and plan.certificate.problems:
-        return plan.certificate.problems
+        return (*plan.certificate.problems, *missile_texts)
     return tuple(explain_failure(plan, load_uav(plan.scenario).limits.with_margin()))
 
 
