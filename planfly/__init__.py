@@ -10,7 +10,7 @@
     planfly.report(flown, "report")
 
 plan, replan, what_blocks            make a path; plan again in flight; why there is no feasible path
-what_may_fail                        why flights of a safe plan are expected to fail
+what_may_fail                        why flights of a safe plan may fail
 plan_front                           a choice of paths: short, little exposed to radar, high above ground, low energy
 fly, plan_then_fly, run              fly a plan or a mission file; both at once; the whole chain into a folder
 fly_by_each                          fly it by several simulated autopilots

@@ -120,9 +120,7 @@ def hold(name: str, plan: Plan, flights: int, workers: int) -> Held:
         for one in result.summary.by_rule
     }
     interval = wilson(tally.flyable, tally.flown)
-    return Held(
-        name, tally.flown, tally.flyable, *interval, failed, what_may_fail(plan), time.perf_counter() - began
-    )
+    return Held(name, tally.flown, tally.flyable, *interval, failed, what_may_fail(plan), time.perf_counter() - began)
 
 
 def line(held: Held) -> str:

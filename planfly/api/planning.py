@@ -296,7 +296,7 @@ def what_blocks(plan: Plan) -> tuple[str, ...]:
 
 @checks_types
 def what_may_fail(plan: Plan) -> tuple[str, ...]:
-    """Return why more than 5 % of the flights of a safe plan are expected to fail, one line each.
+    """Return why flights of a safe plan may fail, one line each; empty if no cause is known.
 
     A safe plan keeps to the numbers in [limits], which may be looser than the limits of the aircraft or its autopilot;
     a strip may be too short; a final may be steep.  Only causes that are known without flights of the whole plan are
