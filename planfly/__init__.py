@@ -10,6 +10,7 @@
     planfly.report(flown, "report")
 
 plan, replan, what_blocks            make a path; plan again in flight; why there is no feasible path
+what_may_fail                        why flights of a safe plan may fail
 plan_front                           a choice of paths: short, little exposed to radar, high above ground, low energy
 fly, plan_then_fly, run              fly a plan or a mission file; both at once; the whole chain into a folder
 fly_by_each                          fly it by several simulated autopilots
@@ -102,6 +103,7 @@ if TYPE_CHECKING:
     from planfly.api.planning import replan as replan
     from planfly.api.planning import scenarios as scenarios
     from planfly.api.planning import what_blocks as what_blocks
+    from planfly.api.planning import what_may_fail as what_may_fail
     from planfly.api.predicting import Predicted as Predicted
     from planfly.api.predicting import predict as predict
     from planfly.api.replaying import instruments as instruments
@@ -225,6 +227,7 @@ _HOMES = {
             "replan",
             "scenarios",
             "what_blocks",
+            "what_may_fail",
         ),
         "planfly.api.predicting": (
             "Predicted",

@@ -230,12 +230,13 @@ class Plan:
     def unmet_margins(self) -> tuple[str, ...]:
         """Margins of the planner that given waypoints do not meet; empty for a plan that was searched.
 
-        A problem of a departure or an approach is not among them. A verdict on given waypoints judges the flight
-        itself, which may be flyable without these margins.
+        The distance from missiles is among them, a problem of a departure or an approach is not. A verdict on given
+        waypoints judges the flight itself, which may be flyable without these margins.
         """
         if self.algorithm != GIVEN_WAYPOINTS:
             return ()
-        return tuple(problem for problem in self._problems if not problem.startswith(GROUND_PROBLEMS))
+        margins = tuple(problem for problem in self._problems if not problem.startswith(GROUND_PROBLEMS))
+        return margins if self.certificate.kill_distance > 0.0 else (*margins, nearest_missile_text(self))
 
     @property
     def failures(self) -> tuple[str, ...]:
@@ -243,7 +244,8 @@ class Plan:
 
         They are the problems of a searched path, of the departure and of the approach.
         """
-        return tuple(problem for problem in self._problems if problem not in self.unmet_margins)
+        unmet_margins = self.unmet_margins
+        return tuple(problem for problem in self._problems if problem not in unmet_margins)
 
     @property
     def _problems(self) -> tuple[str, ...]:
@@ -268,6 +270,28 @@ class Plan:
     def _repr_html_(self) -> str:
         """Return HTML for notebooks."""
         return plan_html(self)
+
+
+def nearest_missile_text(plan: Plan) -> str:
+    """Return a line that names the missile that a plan's legs approach most closely, and the leg.
+
+    The line states two distances: of the leg from the kill radius, and of the flight, which may be inside it because it
+    deviates from its legs.
+    """
+    threats, waypoints = plan.scenario.threats, plan.waypoints
+    starts, legs = waypoints[:-1, None], np.diff(waypoints, axis=0)[:, None]
+    squared_lengths = np.maximum((legs**2).sum(axis=2), 1e-9)
+    fractions = np.clip(((threats.position - starts) * legs).sum(axis=2) / squared_lengths, 0.0, 1.0)
+    closest_points = starts + fractions[..., None] * legs
+    distances = np.sqrt(((threats.position - closest_points) ** 2).sum(axis=2)) - threats.kill_radius
+    distances[:, threats.kill_radius <= 0.0] = math.inf
+    leg, missile = np.unravel_index(int(np.argmin(distances)), distances.shape)
+    distance = float(distances[leg, missile])
+    return (
+        f"leg {leg} passes {abs(distance):.1f} m {'inside' if distance < 0.0 else 'outside'} the kill radius of"
+        f" {threats.names[missile]}; with its tracking error the flight may come"
+        f" {-plan.certificate.kill_distance:.1f} m inside it"
+    )
 
 
 class _Model(BaseModel):

@@ -19,7 +19,7 @@ import numpy as np
 
 import planfly
 from logs.verdict.wording import place_text
-from planfly.api.planning import failures_to_expect
+from planfly.api.planning import what_may_fail
 from planfly.campaigns.statistics.decision import wilson
 from planner.plan import Plan
 from tests.autopilot_plans import plan_scenario
@@ -120,9 +120,7 @@ def hold(name: str, plan: Plan, flights: int, workers: int) -> Held:
         for one in result.summary.by_rule
     }
     interval = wilson(tally.flyable, tally.flown)
-    return Held(
-        name, tally.flown, tally.flyable, *interval, failed, failures_to_expect(plan), time.perf_counter() - began
-    )
+    return Held(name, tally.flown, tally.flyable, *interval, failed, what_may_fail(plan), time.perf_counter() - began)
 
 
 def line(held: Held) -> str:

@@ -11,6 +11,7 @@ _ORDER = (
         "plan_front",
         "replan",
         "what_blocks",
+        "what_may_fail",
         "fly",
         "plan_then_fly",
         "run",

@@ -21,8 +21,8 @@ from planfly.threat_tables import GivenThreats, threat_tables
 from planfly.workflow.make_plan import make_given_plan, make_plan
 from planfly.workflow.output_paths import file_target
 from planfly.workflow.uav import choose_seed, cruise_airspeed, load_uav, scenario_aircraft
-from planner.plan import GIVEN_WAYPOINTS, Plan, plan_json, read_plan
-from planner.search.explain_failure import explain_failure, nearest_missile_text
+from planner.plan import GIVEN_WAYPOINTS, Plan, nearest_missile_text, plan_json, read_plan
+from planner.search.explain_failure import explain_failure
 from planner.search.replan import check_same_mission
 from planner.search.search_state import StopCondition
 from world.argument_types import checks_types
@@ -65,7 +65,8 @@ def plan(
     terrain to nav: the flight to plan for, see `planfly.fly`.
 
     If no feasible path is found, the returned plan says so (`Plan.feasible`, `Plan.safe`); bad input raises a
-    `planfly.PlanflyError`.
+    `planfly.PlanflyError`.  A safe plan keeps to the limits of its scenario, also where numbers in [limits] are looser
+    than the limits of the aircraft or its autopilot; `planfly.what_may_fail` names such numbers.
 
     >>> import planfly
     >>> path = planfly.plan("tight", seed=1)
@@ -273,23 +274,11 @@ def conditions_of_plan(plan: Plan) -> Conditions:
     return plan_conditions(plan.scenario, aircraft.name, cruise_airspeed(plan.scenario, aircraft, autopilot), autopilot)
 
 
-def failures_to_expect(plan: Plan) -> tuple[str, ...]:
-    """Return the known causes that are expected to make more than 5 % of dispersed flights fail.
-
-    Each cause is one line with a remedy.  The result is empty for a plan that is not safe.  For a plan with a steep
-    final approach, the landing is flown 40 times, which takes up to half a minute.
-    """
-    from planfly.campaigns.landing_trial import steep_landing_failures
-
-    if not plan.safe:
-        return ()
-    uav = load_uav(plan.scenario)
-    return (*expected_failures(plan, uav), *steep_landing_failures(plan, uav))
-
-
 @checks_types
 def what_blocks(plan: Plan) -> tuple[str, ...]:
     """Return the reasons why a plan is not safe, one line each; empty for a safe plan.
+
+    `planfly.what_may_fail` returns the reasons why flights of a safe plan may fail.
 
     >>> import planfly
     >>> planfly.what_blocks(planfly.plan("tight", seed=1))
@@ -297,11 +286,33 @@ def what_blocks(plan: Plan) -> tuple[str, ...]:
     """
     if plan.safe:
         return ()
+    missile_texts = () if plan.certificate.kill_distance > 0.0 else (nearest_missile_text(plan),)
     if plan.feasible:
-        return (nearest_missile_text(plan),)
+        return missile_texts
     if plan.algorithm == GIVEN_WAYPOINTS and plan.certificate.problems:
-        return plan.certificate.problems
+        return (*plan.certificate.problems, *missile_texts)
     return tuple(explain_failure(plan, load_uav(plan.scenario).limits.with_margin()))
+
+
+@checks_types
+def what_may_fail(plan: Plan) -> tuple[str, ...]:
+    """Return why flights of a safe plan may fail, one line each; empty if no cause is known.
+
+    A safe plan keeps to the numbers in [limits], which may be looser than the limits of the aircraft or its autopilot;
+    a strip may be too short; a final may be steep.  Only causes that are known without flights of the whole plan are
+    found.  The result is empty for a plan that is not safe.  For a plan with a steep final approach, the landing is
+    flown 40 times, which takes up to half a minute.
+
+    >>> import planfly
+    >>> planfly.what_may_fail(planfly.plan("tight", seed=1))[0][:76]
+    'flights are expected to fail: the limits of the scenario are looser than the'
+    """
+    from planfly.campaigns.landing_trial import steep_landing_failures
+
+    if not plan.safe:
+        return ()
+    uav = load_uav(plan.scenario)
+    return (*expected_failures(plan, uav), *steep_landing_failures(plan, uav))
 
 
 def scenarios() -> dict[str, str]:

@@ -121,11 +121,11 @@ def plan(args: argparse.Namespace) -> int:
             overwrite=args.overwrite or args.out is None,
             stop=should_stop,
         )
-    from planfly.api.planning import failures_to_expect
+    from planfly.api.planning import what_may_fail
 
     target = expand_path_pattern(out, new_plan.scenario.name, new_plan.seed)
     print_warnings(new_plan.scenario.notes)
-    risks = failures_to_expect(new_plan)
+    risks = what_may_fail(new_plan)
     _print_plan(new_plan, risks, is_dispersed=args.flights is not None)
     print(f"plan      {target}")
     dispersed = fly_dispersed(args, new_plan) if new_plan.feasible else None

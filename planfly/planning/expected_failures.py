@@ -1,9 +1,9 @@
 """Find out without a flight why a safe plan is expected to fail in more than one of twenty dispersed flights.
 
 A safe plan meets the limits of its scenario in the wind of the scenario and over the heights of its map.  Two causes of
-failures can be found from the plan alone: limits that are looser than the aircraft's limits, and a strip that is too
-short for the uncertainty of its altitude.  `planfly.campaigns.landing_trial` flies the landings of steep finals.  Other
-causes can only be found by flights of the whole plan (`planfly plan --flights N`).
+failures can be found from the plan alone: limits that are looser than the limits of the aircraft or its autopilot, and
+a strip that is too short for the uncertainty of its altitude.  `planfly.campaigns.landing_trial` flies the landings of
+steep finals.  Other causes can only be found by flights of the whole plan (`planfly plan --flights N`).
 """
 
 import math
@@ -45,18 +45,34 @@ def expected_failures(plan: Plan, uav: Uav) -> tuple[str, ...]:
     """
     if not plan.safe:
         return ()
-    # The first part of the plan that the scenario's limits allow but the aircraft cannot fly.
+    return tuple(text for text in (_loose_limits_text(plan, uav), _short_strip_text(plan)) if text)
+
+
+def _loose_limits_text(plan: Plan, uav: Uav) -> str:
+    """Name the first part of a plan that the numbers in [limits] allow, but not the aircraft or its autopilot.
+
+    Return "" if there is none.  The aircraft limits turns and slopes.  The autopilot limits slopes by its climb and
+    sink rates; a plan uses a part of these rates, beyond which a flight passes in some gusts and fails in others.
+    """
     limits = uav.limits
-    aircraft_limits = replace(limits, max_turn=None, max_climb=None, max_dive=None, tracking=None)
-    loose_limits_text = ""
-    if (limits.max_turn, limits.max_climb, limits.max_dive) != (None, None, None):
-        problems = certify(make_problem(plan.scenario, aircraft_limits), plan.waypoints).problems
-        if problems:
-            loose_limits_text = (
-                "flights are expected to fail: the limits of the scenario are looser than the limits of the aircraft"
-                f' ({problems[0]}). To plan within both, write "aircraft" instead of the numbers in [limits]'
+    slope_limits = replace(limits, max_climb=None, max_dive=None)
+    aircraft_limits = replace(slope_limits, max_turn=None, tracking=None)
+    if slope_limits == limits and limits.max_turn is None:
+        return ""
+    for other_limits, claim, owner in (
+        (aircraft_limits, "flights are expected to fail", "the aircraft"),
+        (slope_limits, "flights may fail", uav.autopilot.title),
+    ):
+        certificate = certify(make_problem(plan.scenario, other_limits), plan.waypoints)
+        # Turns, lengths and slopes are the certificate's first problems.  Others may arise from the autopilot's
+        # deviations, for which a plan of some algorithms keeps no margin.
+        if min(certificate.turn, certificate.available_length, certificate.slope) < 0.0:
+            return (
+                f"{claim}: the limits of the scenario are looser than the limits of {owner}"
+                f" ({certificate.problems[0]})."
+                ' To plan within both, write "aircraft" instead of the numbers in [limits]'
             )
-    return tuple(text for text in (loose_limits_text, _short_strip_text(plan)) if text)
+    return ""
 
 
 def _short_strip_text(plan: Plan) -> str:

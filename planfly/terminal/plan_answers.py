@@ -142,6 +142,8 @@ def front_lines(front: "Front", folder: Path) -> list[str]:
     from logs.verdict.conditions import autopilot_line, condition_lines
     from planfly.api.fronts import PICTURES
     from planfly.api.planning import conditions_of_plan
+    from planfly.planning.expected_failures import expected_failures
+    from planfly.workflow.uav import load_uav
 
     default_plan = front.default.plan
     if not front.plans:
@@ -166,6 +168,9 @@ def front_lines(front: "Front", folder: Path) -> list[str]:
             f"{front_plan.time:>9.1f}"
         )
         lines.append(f"  {number:>4}{values}")
+    uav = load_uav(default_plan.scenario)
+    for number, front_plan in enumerate(front.plans, 1):
+        lines += [f"  note    plan {number}: {text}" for text in expected_failures(front_plan.plan, uav)]
     if len(front.plans) < front.asked:
         lines.append(f"  note    {fewer_plans_line(front)}")
     names = f"plan-1.json ... plan-{len(front.plans)}.json" if len(front.plans) > 1 else "plan-1.json"

@@ -416,26 +416,6 @@ def _describe_proven_closure(problem: Problem) -> list[str]:
     ]
 
 
-def nearest_missile_text(plan: Plan) -> str:
-    """Return a line that names the missile that a plan's legs approach most closely, and the leg.
-
-    The line states two distances: of the leg, outside the kill radius, and of the flight, which may be inside it
-    because it deviates from its legs.
-    """
-    threats, waypoints = plan.scenario.threats, plan.waypoints
-    starts, legs = waypoints[:-1, None], np.diff(waypoints, axis=0)[:, None]
-    squared_lengths = np.maximum((legs**2).sum(axis=2), 1e-9)
-    fractions = np.clip(((threats.position - starts) * legs).sum(axis=2) / squared_lengths, 0.0, 1.0)
-    closest_points = starts + fractions[..., None] * legs
-    distances = np.sqrt(((threats.position - closest_points) ** 2).sum(axis=2)) - threats.kill_radius
-    distances[:, threats.kill_radius <= 0.0] = math.inf
-    leg, missile = np.unravel_index(int(np.argmin(distances)), distances.shape)
-    return (
-        f"leg {leg} passes {distances[leg, missile]:.1f} m outside the kill radius of {threats.names[missile]};"
-        f" with its tracking error the flight may come {-plan.certificate.kill_distance:.1f} m inside it"
-    )
-
-
 def violated_zones(scenario: Scenario, path: np.ndarray) -> list[str]:
     """Return the names of the zones that a path (w, 3) violates.
 

@@ -20,6 +20,7 @@ VERBS = {
         "plan_front",
         "replan",
         "what_blocks",
+        "what_may_fail",
         "fly",
         "fly_by_each",
         "plan_then_fly",

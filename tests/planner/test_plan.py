@@ -11,6 +11,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+import planfly
 from planner.plan import (
     GIVEN_WAYPOINTS,
     Certificate,
@@ -151,6 +152,24 @@ def test_margins_that_given_waypoints_miss_do_not_fail() -> None:
     assert made(violations=np.eye(4)[0]).failures == counted
     assert made(violations=np.eye(4)[0], algorithm=GIVEN_WAYPOINTS).unmet_margins == counted
     assert made().failures == made(algorithm=GIVEN_WAYPOINTS).unmet_margins == ()
+
+
+def test_given_waypoints_near_a_missile_miss_a_margin_too() -> None:
+    """The missile of `small_scenario` has a kill radius of 700 m; the path passes it at a distance of 712 m."""
+    certificate = replace(CERTIFICATE, kill_distance=-4.6)
+    line = "passes {} the kill radius of threat 1; with its tracking error the flight may come 4.6 m inside it"
+    threat = made().scenario.threats.position[0]
+    beside = threat + np.array([[offset, 712.0, 0.0] for offset in (-900.0, 0.0, 900.0)])
+    plan = made(waypoints=beside, certificate=certificate, algorithm=GIVEN_WAYPOINTS)
+    assert plan.unmet_margins == (f"leg 0 {line.format('12.0 m outside')}",)
+    assert plan.failures == ()
+    assert planfly.what_blocks(plan) == plan.unmet_margins
+    problem = "leg 1: climbs 5.7°; at most 4.5° are allowed"
+    steep = replace(plan, certificate=replace(certificate, problems=(problem,)))
+    assert steep.unmet_margins == (problem, *plan.unmet_margins)
+    assert planfly.what_blocks(steep) == steep.unmet_margins
+    assert replace(plan, algorithm="umda").unmet_margins == ()
+    assert replace(plan, certificate=CERTIFICATE).unmet_margins == ()
 
 
 def test_arrays_are_locked() -> None:

@@ -248,11 +248,10 @@ def flight_facts(setup: FlightSetup, end_reason: str) -> Facts:
         if plan.algorithm == GIVEN_WAYPOINTS:
             plan_text = "given waypoints, not searched"
         has_only_unmet_margins = bool(plan.unmet_margins) and not plan.failures
-        status = "feasible, but within a missile's reach" if plan.feasible else "not feasible"
-        if has_only_unmet_margins:
-            status = "planner's margins not met"
-        elif plan.safe:
-            status = "feasible, and outside every missile's reach"
+        status = "planner's margins not met" if has_only_unmet_margins else "not feasible"
+        if plan.feasible:
+            place = "and outside every" if plan.safe else "but within a"
+            status = f"feasible, {place} missile's reach"
         facts.append(("Plan", f"{plan_text}; {status}"))
     if end_reason:
         facts.append(("Flight ended", end_reason))

@@ -339,3 +339,32 @@ def test_a_data_frame_of_waypoints_is_taken_by_the_names_of_its_columns() -> Non
     np.testing.assert_array_equal(planfly.plan(scenario, waypoints=pd.DataFrame(points)).waypoints, expected)
     with pytest.raises(planfly.ArgumentError, match=r"waypoints columns x, y, z: expected columns east_m, north_m and"):
         planfly.plan(scenario, waypoints=pd.DataFrame(points, columns=["x", "y", "z"]))
+
+
+@pytest.mark.parametrize(
+    ("length", "max_turn_deg", "is_safe", "is_said"),
+    [
+        (60.0, 50.0, True, True),
+        (600.0, 50.0, True, False),
+        (60.0, "aircraft", False, False),
+    ],
+)
+def test_own_waypoints_that_only_a_number_permits_are_said(
+    length: float, max_turn_deg: Any, is_safe: bool, is_said: bool
+) -> None:
+    """At 25 m/s and 30 degrees of bank two turns of 45 degrees need 2 x 25^2 / (9.81 tan 30) x tan 22.5 = 91 m."""
+    scenario = small_scenario(
+        terrain={"kind": "flat", "amsl_m": 0.0},
+        threats=[],
+        limits={"max_turn_deg": max_turn_deg, "min_clearance_m": 60.0},
+        flight={"autopilot": "planfly", "aircraft": "aerosonde", "airspeed_mps": 25.0, "max_bank_deg": 30.0},
+    )
+    side = length / np.sqrt(2.0)
+    path = [[0.0, 0.0, 150.0], [2000.0, 0.0, 150.0], [2000.0 + side, side, 150.0], [4000.0, side, 150.0]]
+    plan = planfly.plan(scenario, waypoints=[*path, [6000.0, 0.0, 150.0]])
+    assert plan.safe is is_safe, plan.certificate
+    reasons = planfly.what_may_fail(plan)
+    assert len(reasons) == is_said
+    for reason in reasons:
+        assert reason.startswith("flights are expected to fail: the limits of the scenario are looser")
+        assert "leg 1: 60 m long, but its turns need 91 m" in reason

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from planfly.cli import main
-from planfly.terminal.plan_answers import fewer_plans_line
+from planfly.terminal.plan_answers import fewer_plans_line, front_lines
 from planfly.workflow.uav import load_uav
 from planner.plan import read_plan
 from planner.search.plan_front import plan_front
@@ -81,7 +81,7 @@ def test_what_does_not_go_with_a_front_is_refused_in_a_line(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_front_that_its_budget_ended_says_so() -> None:
+def test_a_front_that_its_budget_ended_says_so_and_that_its_limits_are_loose() -> None:
     scenario = load_scenario("tight")
     limits = load_uav(scenario).limits
     default = plan_path(scenario, limits, seed=1)
@@ -91,3 +91,5 @@ def test_a_front_that_its_budget_ended_says_so() -> None:
     assert fewer_plans_line(front).startswith(
         "1 of the 10 requested plans: the search was stopped by the time budget after 1 evaluation;"
     )
+    (note,) = [line for line in front_lines(front, Path("front")) if "expected to fail" in line]
+    assert note.startswith("  note    plan 1: flights are expected to fail: the limits of the scenario are looser")

@@ -42,6 +42,7 @@ CALLS: dict[str, tuple[Any, ...]] = {
     **dict.fromkeys(("compare", "compare_campaigns", "recover"), ("a", "b")),
     **dict.fromkeys(("guess_columns", "instruments", "read_log"), ("a",)),
     "what_blocks": (None,),
+    "what_may_fail": (None,),
     "foxglove_layout": (),
     "scenarios": (),
     "paper_tables": (),

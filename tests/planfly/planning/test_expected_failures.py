@@ -13,6 +13,8 @@ from planfly.workflow.make_plan import make_plan
 from planfly.workflow.uav import load_uav
 from planner.plan import Plan
 from planner.procedures import DepartureAndApproach, Descent
+from planner.search.plan_path import certify_waypoints
+from tests.setups import small_scenario
 from world.scenario import Scenario, load_scenario, scenario_from_spec
 
 GLIDE = 0.1
@@ -52,6 +54,48 @@ def test_limits_that_the_aircraft_keeps_are_not_said() -> None:
     plan = plan_of("hard-07")
     assert plan.scenario.limits.max_turn_deg == 45.0
     assert said_of(plan) == ()
+
+
+@pytest.mark.parametrize(
+    ("autopilot", "slope_deg", "part"),
+    [
+        # In light turbulence a plan uses 0.7 of FW_T_SINK_R_SP (2 m/s) and of FW_T_CLMB_R_SP (3 m/s), and keeps 0.5°.
+        # At 25 m/s these are asin(1.4 / 25) = 3.21° and asin(2.1 / 25) = 4.82°, at 600 m AMSL 0.1° less.
+        ("px4", -2.5, ""),
+        ("px4", -2.9, "leg 0: sinks 2.9°"),
+        ("px4", 4.1, ""),
+        ("px4", 4.5, "leg 0: climbs 4.5°"),
+        # 0.65 of the Aerosonde's TECS_CLMB_MAX (5.6 m/s): asin(3.64 / 25) = 8.37°.
+        ("ardupilot", -2.9, ""),
+        ("ardupilot", 7.4, ""),
+        ("ardupilot", 8.2, "leg 0: climbs 8.2°"),
+    ],
+)
+def test_numbers_that_are_looser_than_the_rates_of_the_autopilot_are_said(
+    autopilot: str, slope_deg: float, part: str
+) -> None:
+    height = 3000.0 * math.tan(math.radians(abs(slope_deg)))
+    low, high = {"east_m": 0.0, "north_m": 0.0, "amsl_m": 200.0}, {"east_m": 3000.0, "north_m": 0.0}
+    high["amsl_m"] = 200.0 + height
+    if slope_deg < 0.0:
+        low["amsl_m"], high["amsl_m"] = high["amsl_m"], low["amsl_m"]
+    scenario = small_scenario(
+        terrain={"kind": "flat", "amsl_m": 0.0},
+        area={"east_m": [-1000.0, 4000.0], "north_m": [-1000.0, 1000.0], "ceiling_amsl_m": 1000.0},
+        start=low,
+        destination=high,
+        limits={"max_climb_deg": 9.0, "max_dive_deg": 9.0, "max_turn_deg": 60.0, "min_clearance_m": 60.0},
+        flight={"autopilot": autopilot, "aircraft": "aerosonde", "airspeed_mps": 25.0},
+        wind={"speed_mps": 0.0, "from_deg": 0.0, "turbulence": "light"},
+    )
+    uav, path = load_uav(scenario), np.stack([scenario.start, scenario.destination])
+    plan = certify_waypoints(scenario, uav.limits.with_margin(), path, seed=1)
+    assert plan.safe, plan.certificate
+    said = expected_failures(plan, uav)
+    assert len(said) == bool(part)
+    for text in said:
+        assert text.startswith("flights may fail: the limits of the scenario are looser than the limits of ")
+        assert part in text
 
 
 def test_a_plan_that_is_not_safe_has_its_problems_alone() -> None:

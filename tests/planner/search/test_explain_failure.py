@@ -9,13 +9,12 @@ import pytest
 
 from aircraft.path_limits import Limits
 from planner.evaluation.problem import CERTIFIED_BUFFER_M, make_problem
-from planner.plan import Certificate, Plan
+from planner.plan import Certificate, Plan, nearest_missile_text
 from planner.search.explain_failure import (
     describe_closed_bands,
     explain_failure,
     find_separating_zones,
     max_altitude,
-    nearest_missile_text,
     violated_zones,
 )
 from planner.search.plan_path import plan_path
@@ -206,4 +205,12 @@ def test_the_nearest_missile_and_its_leg(small: Callable[..., Scenario]) -> None
     assert nearest_missile_text(plan) == (
         "leg 1 passes 10.0 m outside the kill radius of near;"
         " with its tracking error the flight may come 2.5 m inside it"
+    )
+    # 132.2 m further north the leg is 867.8 m from the missile: 122.2 m inside.
+    inside = replace(
+        plan, waypoints=path + np.array([0.0, 132.2, 0.0]), certificate=replace(certificate, kill_distance=-134.7)
+    )
+    assert nearest_missile_text(inside) == (
+        "leg 1 passes 122.2 m inside the kill radius of near;"
+        " with its tracking error the flight may come 134.7 m inside it"
     )
