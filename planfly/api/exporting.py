@@ -89,7 +89,7 @@ class _SourceContent:
     zones: zones on a map; empty if no target is a map.
     returns, footprint: coloured lines and shapes on a KML map.
     fence_notes: parts of the plan that a fence does not contain.
-    notes: parts of the source that a .plan does not contain.
+    notes: parts of the source that a .plan does not contain, and parts of the mission that PX4 would reject.
     log: the input, if it is a flight log.
     autopilot: the autopilot that flies the mission; None if no target needs it.
     has_own_parameters: True if the parameters are those of a log, a plan, a scenario or a parameter file.
@@ -164,17 +164,15 @@ def export(
         source_content = read_content.of_plan() if isinstance(source, Plan) else read_content
         if any(target.suffix.lower() == ".plan" for target in targets):
             source_content = _with_plan_notes(source_content, chosen_autopilot, fence)
-        missing_ends = _describe_missing_ends(read_content, targets, chosen_autopilot, params)
+        source_content = _with_missing_ends_note(source_content, targets, chosen_autopilot, params)
         contents = [_make_target_content(source_content, target) for target in targets]
     for target, (data, _) in zip(targets, contents, strict=True):
         write_atomically(target, data)
     loss = "" if source_content.log is None else loss_text(source_content.log)
-    writes_fence = any(target.suffix.lower() in _FENCE_SUFFIXES for target in targets)
     notes = (
         *source_content.mission.warnings,
-        *(source_content.fence_notes if writes_fence else ()),
+        *(source_content.fence_notes if any(target.suffix.lower() in _FENCE_SUFFIXES for target in targets) else ()),
         *source_content.notes,
-        *([missing_ends] if missing_ends else []),
         *([loss] if loss else []),
     )
     return ExportedFiles(targets, notes, tuple(description for _, description in contents), loss)
@@ -226,10 +224,10 @@ def _with_plan_notes(source: _SourceContent, autopilot: str, fence: FencePaths) 
     return replace(source, mission=mission, notes=tuple(notes))
 
 
-def _describe_missing_ends(
+def _with_missing_ends_note(
     source: _SourceContent, targets: tuple[Path, ...], autopilot: str, params: str | Path | None
-) -> str:
-    """Describe why PX4 refuses a mission without take-off or landing; "" for another autopilot and for a log.
+) -> _SourceContent:
+    """Add to a source, except a log, a note why PX4 refuses a mission without take-off or landing.
 
     autopilot: name of the autopilot that the user named, which replaces that of the source; "" if the user named none.
     params: parameter file of the named autopilot, whose requirement applies.
@@ -237,14 +235,15 @@ def _describe_missing_ends(
     source_autopilot = source.mission.autopilot if source.autopilot is None else source.autopilot.checks.dialect
     has_items = any(target.suffix.lower() in _MISSION_SUFFIXES for target in targets)
     if source.log is not None or not has_items or (autopilot or source_autopilot) != "px4":
-        return ""
+        return source
     limits = PX4_DEFAULT_LIMITS
     if params is not None:
         entry = read_parameters_for(Path(params), "px4").get("MIS_TKO_LAND_REQ")
         limits = limits if entry is None else FeasibilityLimits(requires=int(entry.value), stated=True)
     elif source.autopilot is not None and source_autopilot == "px4":
         limits = source.autopilot.checks.feasibility
-    return missing_ends_text(source.mission, limits)
+    missing_ends = missing_ends_text(source.mission, limits)
+    return replace(source, notes=(*source.notes, missing_ends)) if missing_ends else source
 
 
 def _find_source_path(
