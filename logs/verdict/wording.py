@@ -431,12 +431,20 @@ def gentle_launch_text(acceleration: float, trigger: tuple[float, str]) -> str:
 
 
 def shorten_statement(statement: str) -> str:
-    """Cut a statement to the maximum length for a headline.
+    """Cut a statement to the maximum length for a headline, at the end of a word, but not between number and unit.
 
     >>> shorten_statement("bank 80° at 3.0 s"), len(shorten_statement("m" * 200))
     ('bank 80° at 3.0 s', 80)
+    >>> shorten_statement("a climb of 3.8° at 26.0 m/s in a tailwind of 4.5 m/s and in a crosswind of 15.3 m/s")
+    'a climb of 3.8° at 26.0 m/s in a tailwind of 4.5 m/s and in a crosswind of...'
     """
-    return statement if len(statement) <= _MAX_STATEMENT_LENGTH else statement[: _MAX_STATEMENT_LENGTH - 3] + "..."
+    if len(statement) <= _MAX_STATEMENT_LENGTH:
+        return statement
+    cut_length = _MAX_STATEMENT_LENGTH - 3
+    words = statement[: cut_length + 1].split(" ")[:-1]
+    while words and words[-1].strip("(+-").replace(".", "").isdigit():
+        words.pop()
+    return (" ".join(words).rstrip(",;:") or statement[:cut_length]) + "..."
 
 
 def text_after(text: str, prefixes: Sequence[str]) -> str:

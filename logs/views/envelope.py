@@ -7,6 +7,7 @@ import numpy as np
 
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
+from logs.verdict.measures.route_requirements import true_airspeed_route
 from logs.views.charts import Chart, Layer, Panel, shorten
 from world.arrays import Floats
 from world.geometry import leg_slopes
@@ -86,8 +87,8 @@ def envelope_chart(setup: FlightSetup, track: Track | None) -> Chart:
         slopes.append(Layer("dots", "flown, moment by moment", "moment", moments.airspeed, moments.angle))
         banks.append(Layer("dots", "flown, moment by moment", "moment", moments.airspeed, moments.bank))
     leg_slopes_deg = np.degrees(leg_slopes(setup.display_waypoints))
-    commanded_speeds = np.asarray(setup.route.leg_airspeeds)
-    slopes.append(Layer("dots", "legs as planned (over the ground)", "planned-leg", commanded_speeds, leg_slopes_deg))
+    planned_speeds = true_airspeed_route(setup).leg_airspeeds
+    slopes.append(Layer("dots", "legs as planned (over the ground)", "planned-leg", planned_speeds, leg_slopes_deg))
     min_speed = float(setup.envelope.airspeed[0])
     max_speed = float(setup.envelope.airspeed[-1])
     speed_range = (min_speed - 0.5, max_speed + 0.5)

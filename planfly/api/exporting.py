@@ -7,7 +7,8 @@ from pathlib import Path
 from aircraft.catalog import load_aircraft
 from flight.autopilots.autopilot import Autopilot
 from flight.autopilots.parameter_files import parameters_text
-from flight.autopilots.parameter_origin import TITLES, read_origin
+from flight.autopilots.parameter_origin import TITLES, read_origin, read_parameters_for
+from flight.autopilots.parts import PX4_DEFAULT_LIMITS, FeasibilityLimits
 from flight.mission.fences import number_items, zone_fences
 from flight.mission.items import Command, Mission
 from flight.mission_files.formats import KINDS, mission_kind, mission_text, read_mission
@@ -57,6 +58,8 @@ LOG_SUFFIXES = (".csv", ".parquet", ".tlog", ".ulg")
 _FENCE_SUFFIXES = (".plan", ".fence")
 # Names of contents in messages, keyed by the kind of the file.
 _CONTENT_NAMES = {"fence": "fence items", "rally": "rally points"}
+# Suffixes of files that contain the items of a mission.
+_MISSION_SUFFIXES = tuple(suffix for suffix, kind in KINDS.items() if kind not in _CONTENT_NAMES)
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,8 +68,8 @@ class ExportedFiles:
 
     files: paths in the order of the request.
     contents: description of the content of each file.
-    notes: one line for each part of the source that the files do not contain, and for each part of a plan for PX4 that
-    PX4 would reject.
+    notes: one line for each part of the source that the files do not contain, and for each part of a mission for PX4
+    that PX4 would reject.
     loss: description of the part of a flight log that could not be read, also in `notes`; "" if nothing is missing.
     """
 
@@ -86,7 +89,7 @@ class _SourceContent:
     zones: zones on a map; empty if no target is a map.
     returns, footprint: coloured lines and shapes on a KML map.
     fence_notes: parts of the plan that a fence does not contain.
-    notes: parts of the plan that the autopilot would reject.
+    notes: parts of the source that a .plan does not contain, and parts of the mission that PX4 would reject.
     log: the input, if it is a flight log.
     autopilot: the autopilot that flies the mission; None if no target needs it.
     has_own_parameters: True if the parameters are those of a log, a plan, a scenario or a parameter file.
@@ -161,14 +164,14 @@ def export(
         source_content = read_content.of_plan() if isinstance(source, Plan) else read_content
         if any(target.suffix.lower() == ".plan" for target in targets):
             source_content = _with_plan_notes(source_content, chosen_autopilot, fence)
+        source_content = _with_missing_ends_note(source_content, targets, chosen_autopilot, params)
         contents = [_make_target_content(source_content, target) for target in targets]
     for target, (data, _) in zip(targets, contents, strict=True):
         write_atomically(target, data)
     loss = "" if source_content.log is None else loss_text(source_content.log)
-    writes_fence = any(target.suffix.lower() in _FENCE_SUFFIXES for target in targets)
     notes = (
         *source_content.mission.warnings,
-        *(source_content.fence_notes if writes_fence else ()),
+        *(source_content.fence_notes if any(target.suffix.lower() in _FENCE_SUFFIXES for target in targets) else ()),
         *source_content.notes,
         *([loss] if loss else []),
     )
@@ -219,6 +222,28 @@ def _with_plan_notes(source: _SourceContent, autopilot: str, fence: FencePaths) 
     ]
     mission = replace(source.mission, autopilot=autopilot or source_autopilot or DEFAULT_AUTOPILOT)
     return replace(source, mission=mission, notes=tuple(notes))
+
+
+def _with_missing_ends_note(
+    source: _SourceContent, targets: tuple[Path, ...], autopilot: str, params: str | Path | None
+) -> _SourceContent:
+    """Add to a source, except a log, a note why PX4 refuses a mission without take-off or landing.
+
+    autopilot: name of the autopilot that the user named, which replaces that of the source; "" if the user named none.
+    params: parameter file of the named autopilot, whose requirement applies.
+    """
+    source_autopilot = source.mission.autopilot if source.autopilot is None else source.autopilot.checks.dialect
+    has_items = any(target.suffix.lower() in _MISSION_SUFFIXES for target in targets)
+    if source.log is not None or not has_items or (autopilot or source_autopilot) != "px4":
+        return source
+    limits = PX4_DEFAULT_LIMITS
+    if params is not None:
+        entry = read_parameters_for(Path(params), "px4").get("MIS_TKO_LAND_REQ")
+        limits = limits if entry is None else FeasibilityLimits(requires=int(entry.value), stated=True)
+    elif source.autopilot is not None and source_autopilot == "px4":
+        limits = source.autopilot.checks.feasibility
+    missing_ends = missing_ends_text(source.mission, limits)
+    return replace(source, notes=(*source.notes, missing_ends)) if missing_ends else source
 
 
 def _find_source_path(
@@ -354,9 +379,7 @@ def _read_mission(path: Path, options: MissionOptions, *, needs_world: bool, nee
     if not is_plan:
         return _with_zones(source, setup.scenario)
     mission, notes = add_plan_fence(setup)
-    checks = setup.autopilot.checks
-    missing_ends = missing_ends_text(mission, checks.feasibility) if checks.dialect == "px4" else ""
-    return replace(source, mission=mission, fence_notes=notes, notes=(missing_ends,) if missing_ends else ())
+    return replace(source, mission=mission, fence_notes=notes)
 
 
 def _with_zones(source: _SourceContent, scenario: Scenario) -> _SourceContent:

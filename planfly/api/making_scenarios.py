@@ -13,11 +13,14 @@ from planner.search.algorithms import find_algorithm
 from world.argument_types import checks_types
 from world.errors import ArgumentError
 from world.scenario import Scenario, scenario_from_spec
+from world.scenario_tables import OWN_GUIDANCE, FlightTable
 
 # Tables of a position, which replace another position as a whole.
 _POSITIONS = ("start", "destination", "home")
 # Keys that name the source of a table; with another value of one of them, the table replaces the base's table.
 _SOURCE_KEYS = ("kind", "path")
+# Keys of [flight] that belong to one autopilot.
+_AUTOPILOT_KEYS = ("autopilot", "autopilot_from", "params", "arduplane_version", "px4_version", "guidance")
 # Tables from which the terrain is made.
 _TERRAIN_TABLES = frozenset(("terrain", "area", "origin"))
 
@@ -42,6 +45,7 @@ def make_scenario(
     tables: values of other tables, as mappings with the keys of a scenario file, whose lists may be arrays; also name
     and description.  Keys of a table that are not named keep their values.  A position, and a table of another kind or
     file, are replaced as a whole.
+    Another autopilot replaces the base's release, parameter file and guidance law.
     With another elevation file, the center of its latitudes and longitudes becomes the origin, unless an origin is
     named.
     Raises a `planfly.PlanflyError` for values that a scenario file must not have.
@@ -55,6 +59,8 @@ def make_scenario(
     _check_terrain(tables.get("terrain"))
     base_scenario = load_scenario_with_options(base, {})
     spec = base_scenario.to_json()
+    if isinstance(flight := tables.get("flight"), Mapping):
+        spec["flight"] = _without_other_autopilot(spec["flight"], base_scenario.flight, flight)
     for name, values in _convert_to_plain_values(tables).items():
         is_merged = isinstance(values, Mapping) and isinstance(spec.get(name), dict) and name not in _POSITIONS
         spec[name] = _change_table(spec[name], values) if is_merged else values
@@ -96,6 +102,19 @@ def _convert_to_plain_values(values: Any) -> Any:
     if isinstance(values, list | tuple):
         return [_convert_to_plain_values(value) for value in values]
     return values.tolist() if isinstance(values, np.ndarray | np.generic) else values
+
+
+def _without_other_autopilot(entries: dict[str, Any], base: FlightTable, changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the entries of [flight] without those of the base's autopilot, if the changes name another one.
+
+    entries: entries of the base with its defaults, such as the release of the autopilot.
+    """
+    autopilot = changes.get("autopilot") or (OWN_GUIDANCE if changes.get("guidance") else None)
+    if autopilot in (None, base.steering.autopilot):
+        return entries
+    # The default accuracy of the navigation depends on the autopilot.
+    dropped_keys = (*_AUTOPILOT_KEYS, *(("nav",) if base.nav is None else ()))
+    return {key: value for key, value in entries.items() if key not in dropped_keys}
 
 
 def _change_table(table: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:

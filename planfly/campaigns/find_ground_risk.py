@@ -26,6 +26,7 @@ from flight.mission.itinerary import Position
 from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import Flight, fly_to_end
 from flight.simulation.track import Track
+from logs.verdict.measures.route_requirements import true_airspeed_route
 from logs.verdict.returns.glide_map import glide_slopes
 from logs.verdict.returns.judge_returns import make_return_world, without_engine_world
 from logs.verdict.returns.return_starts import flown_starts
@@ -444,7 +445,7 @@ def find_ground_risk(base: CampaignBase, goal: GroundRiskGoal, workers: Workers,
     if scenario.terrain is None:
         message = f"{base.name}: the heights above ground need terrain: name an elevation file (--terrain)"
         raise ScenarioError(message, file=base.name, field="terrain")
-    commanded = float(base.nominal_setup().demanded_route.leg_airspeeds.max())
+    commanded = float(true_airspeed_route(base.nominal_setup()).leg_airspeeds.max())
     if goal.speed is not None and goal.speed < commanded:
         allowed = f"expected at least {commanded:.1f} m/s, the highest true airspeed that the mission commands"
         raise ArgumentError.of_argument("max_speed", goal.speed, allowed)

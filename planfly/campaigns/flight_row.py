@@ -8,7 +8,7 @@ import json
 import math
 import time
 from collections.abc import Callable, Iterable
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args, get_type_hints
 
@@ -37,6 +37,10 @@ from world.scenario import Scenario
 
 # Scale of the distance outside a missile's sphere, m.
 SPHERE_SCALE_M = 10.0
+
+# Scale of each rule's margin in a campaign, in the margin's unit; None if flights are not ranked by it.  Missiles rank
+# flights by the distance outside their spheres, because the time inside a sphere does not show how close a pass was.
+MARGIN_SCALES = {rule.name: rule.scale for rule in RULE_WORDS.values()} | {"threat": SPHERE_SCALE_M}
 
 # Rule, place, and margin as a fraction of the rule's scale, 0 to 1.
 MarginalPass = tuple[str, Place, float]
@@ -255,7 +259,7 @@ def scale_margin(rule: str, margin: MinimumMargin) -> float | None:
 
     Return None if the margin is unknown or the rule has no scale.
     """
-    scale = RULE_WORDS[rule].scale
+    scale = MARGIN_SCALES[rule]
     return None if margin.value is None or scale is None else margin.value / scale
 
 
@@ -345,6 +349,8 @@ def list_failed_findings(verdict: Verdict) -> tuple[tuple[str, Place], ...]:
 def find_minimum_margins(findings: tuple[Finding, ...]) -> tuple[tuple[str, MinimumMargin], ...]:
     """Return the minimum margin of each judged rule that has one, in the order of the verdict.
 
+    The margin of the rule `threat` is the distance outside the nearest missile's sphere.
+
     >>> from logs.verdict.findings import make_finding
     >>> wide, close = (make_finding("slope", Place("leg", 1), ok=True, reason="", margin=m) for m in (9.0, 4.0))
     >>> find_minimum_margins((wide, close))[0][1].value
@@ -352,8 +358,10 @@ def find_minimum_margins(findings: tuple[Finding, ...]) -> tuple[tuple[str, Mini
     """
     findings_by_rule: dict[str, list[Finding]] = {}
     for finding in findings:
-        if finding.ok is not None and RULE_WORDS[finding.rule].scale is not None:
-            findings_by_rule.setdefault(finding.rule, []).append(finding)
+        if finding.ok is not None and MARGIN_SCALES[finding.rule] is not None:
+            is_threat = finding.rule == "threat"
+            ranked = replace(finding, margin=finding.nearest, unit="m") if is_threat else finding
+            findings_by_rule.setdefault(finding.rule, []).append(ranked)
     closest_findings = [closest_to_limit(findings_of_rule) for findings_of_rule in findings_by_rule.values()]
     # A rule that fails for a reason other than its value has no margin.
     return tuple(

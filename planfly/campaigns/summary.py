@@ -23,7 +23,7 @@ from planfly.campaigns.failure_counts import (
     failure_lines,
     failures_document,
 )
-from planfly.campaigns.flight_row import FlightRow, scale_margin
+from planfly.campaigns.flight_row import MARGIN_SCALES, FlightRow, scale_margin
 from planfly.campaigns.statistics.decision import (
     MAX_DECIDING_FLIGHTS,
     MIN_FLIGHTS_FOR_INDEX,
@@ -99,7 +99,7 @@ class RankedRule:
     @property
     def is_narrow_pass(self) -> bool:
         """True if every flight passed the rule, but one of them by less than the rule's scale."""
-        scale = RULE_WORDS[self.rule].scale
+        scale = MARGIN_SCALES[self.rule]
         return not self.failed and self.lowest is not None and scale is not None and self.lowest < scale
 
 
@@ -280,7 +280,7 @@ def _margin_unit(store: Store, rule: str) -> str:
 
 def _scaled_margin(entry: RankedRule) -> float:
     """Return a rule's smallest margin as a multiple of the rule's scale; inf if the margin is unknown."""
-    scale = RULE_WORDS[entry.rule].scale
+    scale = MARGIN_SCALES[entry.rule]
     return math.inf if entry.lowest is None or scale is None else entry.lowest / scale
 
 

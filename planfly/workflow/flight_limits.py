@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from flight.simulation.setup import FlightSetup
+from logs.verdict.measures.route_requirements import true_airspeed_route
 from planfly.flight_options import MAX_HOURS, MAX_MEGABYTES
 from world.geometry import leg_runs
 
@@ -35,8 +36,7 @@ class FlightLimits:
 def predicted_seconds(setup: FlightSetup) -> float:
     """Predict the duration of a flight in still air, s.
 
-    It is the path length divided by the mean demanded airspeed.  The mean of the legs' airspeeds is weighted by the
-    time on each leg.
+    It is the path length divided by the mean of the legs' demanded true airspeeds, weighted by the time on each leg.
 
     >>> from logs.recording.example_log import example_log
     >>> flown = example_log()
@@ -44,7 +44,7 @@ def predicted_seconds(setup: FlightSetup) -> float:
     True
     """
     leg_lengths = leg_runs(setup.route.positions)
-    speed = leg_lengths.sum() / (leg_lengths / setup.demanded_route.leg_airspeeds).sum()
+    speed = leg_lengths.sum() / (leg_lengths / true_airspeed_route(setup).leg_airspeeds).sum()
     return float(setup.path.length / speed)
 
 

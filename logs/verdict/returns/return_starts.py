@@ -14,7 +14,12 @@ from flight.simulation.track import ROLL, Track
 from logs.verdict.measures.energy import leg_energies, predicted_energy
 from logs.verdict.measures.ground_paths import first_landing_leg, landing_item, takeoff_item
 from logs.verdict.measures.path_moves import path_moves
-from logs.verdict.measures.route_requirements import RouteRequirements, find_leg_winds, route_requirements
+from logs.verdict.measures.route_requirements import (
+    RouteRequirements,
+    find_leg_winds,
+    route_requirements,
+    true_airspeed_route,
+)
 from logs.verdict.measures.track_alignment import takeoff_and_approach_rows
 from logs.verdict.tolerances import GROUND_LEG_CLEARANCE_M
 from world.arrays import Flags, Floats
@@ -290,11 +295,11 @@ def planned_end(requirements: RouteRequirements) -> ReturnStarts:
 
 
 def _ground_speeds(setup: FlightSetup) -> Floats:
-    """Return the ground speed on each leg in the mean wind, m/s; the airspeed if the wind is too strong.
+    """Return the ground speed on each leg in the mean wind, m/s; the true airspeed if the wind is too strong.
 
     With a forecast, the wind is taken in the middle of the leg, at the time when the aircraft is there.
     """
-    route, speeds = setup.route, []
+    route, speeds = true_airspeed_route(setup), []
     courses, winds = leg_courses(route.positions), find_leg_winds(setup, route)
     for leg, speed in enumerate(route.leg_airspeeds.tolist()):
         wind = winds[leg] if winds else setup.scenario.wind

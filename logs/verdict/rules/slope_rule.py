@@ -416,10 +416,13 @@ def _limit_text(requirements: RouteRequirements, leg: int, limit: float, source:
 
 
 def _wind_text(tailwind: float, crosswind: float) -> str:
-    """Describe the larger of two wind components (m/s), such as "5 m/s crosswind"."""
+    """Describe the wind components (m/s) that are not calm, such as "4.5 m/s tailwind and 5.3 m/s crosswind"."""
+    along_name = "tailwind" if tailwind > 0.0 else "headwind"
+    if min(abs(tailwind), abs(crosswind)) >= CALM_WIND_MPS:
+        return f"{abs(tailwind):.1f} m/s {along_name} and {abs(crosswind):.1f} m/s crosswind"
     if abs(crosswind) > abs(tailwind):
         return f"{abs(crosswind):.0f} m/s crosswind"
-    return f"{abs(tailwind):.0f} m/s {'tailwind' if tailwind > 0.0 else 'headwind'}"
+    return f"{abs(tailwind):.0f} m/s {along_name}"
 
 
 def _distance_text(distance: float) -> str:

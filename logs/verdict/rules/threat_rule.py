@@ -27,8 +27,8 @@ def threat_findings(
 ) -> list[Finding]:
     """Judge each missile or radar sphere that the planned path or the flight touches.
 
-    If no missile sphere is touched, the first finding states this.  Without a scenario, one unjudged finding is
-    returned.
+    If the judged path enters no missile sphere, the first finding states this and the distance from the nearest one,
+    even if the planned path of a flight enters a sphere.  Without a scenario, one unjudged finding is returned.
     """
     scenario = requirements.setup.scenario
     if scenario.external:
@@ -70,7 +70,7 @@ def threat_findings(
                         place, _sphere_visit(planned_visits, number), visit, float(radii[number]), nearest_place
                     )
                 )
-    if not any(finding.place.kind == "missile" for finding in findings):
+    if all(finding.ok for finding in findings if finding.place.kind == "missile"):
         navigation_error = position_error(requirements.setup)
         findings.insert(
             0,
@@ -215,7 +215,7 @@ def _sphere_finding(
         margin=-judged_visit.time_inside,
         unit="s",
         method=_METHOD,
-        facts=[Fact("nearest", judged_visit.closest - radius, "m")] if ok is False else (),
+        facts=() if is_missing else [Fact("nearest", judged_visit.closest - radius, "m")],
     )
 
 

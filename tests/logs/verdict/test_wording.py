@@ -176,6 +176,11 @@ def test_changes_together_and_alternatives() -> None:
 def test_a_headline_takes_eighty_characters_of_a_statement() -> None:
     assert shorten_statement("m" * 80) == "m" * 80
     assert shorten_statement("m" * 81) == "m" * 77 + "..."
+    # At the end of a word, and not behind a number whose unit is cut off.
+    word = "m" * 70
+    assert shorten_statement(f"{word} whirls beyond") == f"{word} whirls..."
+    assert shorten_statement(f"{word} whirled away") == f"{word}..."
+    assert shorten_statement(f"{word}, 12.5 m/s of wind") == f"{word}..."
 
 
 STEEP = [[0, 0, 300], [0, 2000, 300], [0, 3000, 600], [0, 6000, 600]]

@@ -7,9 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from flight.autopilots.arduplane.autopilot import ArduPlane
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from logs.views.drawing import draw_chart
 from logs.views.envelope import envelope_chart
 from tests.logs.views.report.report_data import make_setup, make_track
+from tests.synthetic import make_setup as setup_along
 
 
 def labelled(axes: Any, label: str) -> Any:
@@ -31,6 +34,16 @@ def test_limits_are_the_envelopes_and_the_bank_limit_the_plans() -> None:
     wanted = np.degrees(np.arctan([40.0 / 1000.0, 40.0 / 800.0, -20.0 / 600.0]))
     np.testing.assert_allclose(legs.get_ydata(), wanted)
     assert not any("flown" in line.get_label() for line in slopes.lines)
+
+
+def test_legs_are_drawn_at_the_true_airspeed_of_an_equivalent_command() -> None:
+    """ArduPlane at 3,000 m, where the density is 0.9093 kg/m^3 by 1.2250 at sea level (ISO 2533)."""
+    made = setup_along([[0, 0, 3000], [0, 1000, 3000]], terrain={"kind": "flat", "amsl_m": 2500.0})
+    setup = replace(made, autopilot=ArduPlane(ArduPilotParameters.defaults()))
+    for one, factor in ((made, 1.0), (setup, math.sqrt(1.2250 / 0.9093))):
+        slopes, _ = draw_chart(envelope_chart(one, None)).axes
+        legs = labelled(slopes, "legs as planned (over the ground)")
+        np.testing.assert_allclose(legs.get_xdata(), 25.0 * factor, rtol=1e-3)
 
 
 def test_dots_are_the_path_through_the_air_and_the_bank_to_either_side() -> None:

@@ -9,7 +9,7 @@ import pytest
 
 import planfly
 from tests.world.made.elevation_files import MIDDLE, made_tile, write_geotiff
-from world.scenario import embedded_names, load_scenario
+from world.scenario import embedded_names, load_scenario, with_flight
 
 ROWS = [
     {"name": "a", "east_m": 900.0, "north_m": 90.0, "kill_radius_m": 60.0, "kill_scale_m": 20.0},
@@ -131,6 +131,24 @@ def test_a_plan_keeps_clear_of_threats_that_were_given() -> None:
     assert path.objectives.kill_exposure == 0.0
     assert path.safe
     assert path.certificate.kill_distance > 0.0
+
+
+def test_another_autopilot_replaces_release_guidance_law_and_default_accuracy_of_the_base() -> None:
+    for base in ("tight", planfly.make_scenario("tight", flight={"autopilot": "ardupilot"})):
+        made = planfly.make_scenario(base, flight={"autopilot": "px4"}).flight
+        assert (made.steering.autopilot, made.arduplane_version, made.steering.nav) == ("px4", None, "gnss")
+    px4 = planfly.make_scenario("tight", flight={"autopilot": "px4", "px4_version": "1.16", "nav": "perfect"})
+    # Its own release stays if the autopilot does, and a stated accuracy always.
+    assert planfly.make_scenario(px4, flight={"autopilot": "px4", "airspeed_mps": 24.0}).flight.px4_version == "1.16"
+    own = planfly.make_scenario(px4, flight={"guidance": "l1"}).flight
+    assert (own.steering.autopilot, own.steering.guidance, own.px4_version) == ("planfly", "l1", None)
+    exact = with_flight(load_scenario("tight"), guidance="l1")
+    assert exact.flight.steering.nav == "perfect"
+    other = planfly.make_scenario(exact, flight={"autopilot": "px4"}).flight.steering
+    assert (other.autopilot, other.nav) == ("px4", "gnss")
+    assert planfly.make_scenario(px4, flight={"autopilot": "ardupilot"}).flight.steering.nav == "perfect"
+    with pytest.raises(planfly.PlanflyError, match=r'arduplane_version: only a key of autopilot = "ardupilot"'):
+        planfly.make_scenario("tight", flight={"autopilot": "px4", "arduplane_version": "4.6"})
 
 
 @pytest.mark.parametrize("values", [{"foo": 1}, {"name": "mine"}, {}])

@@ -107,6 +107,22 @@ def test_a_plan_for_px4_without_a_landing_is_exported_with_a_word(path: planfly.
     said = "PX4's fixed-wing default refuses a mission without a landing: add one, or set MIS_TKO_LAND_REQ 0"
     assert said in planfly.export(for_px4, tmp_path / "a.plan").notes
     assert said not in planfly.export(path, tmp_path / "b.plan").notes
+    assert said not in planfly.export(for_px4, tmp_path / "c.plan", autopilot="ardupilot").notes
+
+
+def test_a_mission_that_becomes_one_for_px4_is_exported_with_a_word(path: planfly.Plan, tmp_path: Path) -> None:
+    said = "PX4's fixed-wing default refuses a mission without a landing: add one, or set MIS_TKO_LAND_REQ 0"
+    for name in ("a.plan", "a.waypoints"):
+        assert said in planfly.export(path, tmp_path / name, autopilot="px4").notes
+    # The requirement that a parameter file states applies, without the word default.
+    for value, found in ((0, ()), (2, ("MIS_TKO_LAND_REQ 2 requires a landing",))):
+        params = tmp_path / "px4.params"
+        params.write_text(f"# Stack: PX4 Pro\n1\t1\tMIS_TKO_LAND_REQ\t{value}\t6\n", encoding="ascii")
+        notes = planfly.export(path, tmp_path / f"b{value}.plan", params=params).notes
+        assert tuple(note.partition(", but")[0] for note in notes if "LAND_REQ" in note) == found
+    # A mission file, too; a file without its items does not say so.
+    assert said in planfly.export(tmp_path / "a.plan", tmp_path / "d.plan").notes
+    assert said not in planfly.export(tmp_path / "a.plan", tmp_path / "d.kml").notes
 
 
 def test_bad_exports_write_nothing(path: planfly.Plan, tmp_path: Path) -> None:

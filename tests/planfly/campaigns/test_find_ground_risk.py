@@ -9,6 +9,8 @@ import pytest
 import shapely
 from shapely.geometry.base import BaseGeometry
 
+from flight.autopilots.arduplane.autopilot import ArduPlane
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.autopilots.px4.autopilot import Px4
 from flight.autopilots.px4.parameters import Px4Parameters
 from planfly.campaigns.campaign_base import CampaignBase, GivenWind, open_campaign
@@ -218,6 +220,18 @@ def test_a_highest_speed_below_the_commanded_airspeed_is_refused(base: CampaignB
     goal = GroundRiskGoal(flights=1, speed=24.0)
     with pytest.raises(ArgumentError, match=r"max_speed 24.0: expected at least 25.0 m/s, the highest true airspeed"):
         find_ground_risk(base, goal, Workers(1), lambda *_: None)
+
+
+def test_a_highest_speed_below_the_true_airspeed_of_an_equivalent_command_is_refused(base: CampaignBase) -> None:
+    """ArduPlane's 25 m/s of equivalent airspeed at the highest mean altitude of a leg, by the standard atmosphere."""
+    arduplane = ArduPlane(ArduPilotParameters.defaults())
+    faster = replace(base, uav=replace(base.uav, autopilot=arduplane))
+    altitudes = base.nominal_setup().route.positions[:, 2]
+    amsl = float((0.5 * (altitudes[1:] + altitudes[:-1])).max())
+    true = 25.0 / math.sqrt((1.0 - 2.25577e-5 * amsl) ** 4.25588)
+    assert true > 25.05
+    with pytest.raises(ArgumentError, match=rf"max_speed 25.0: expected at least {true:.1f} m/s"):
+        find_ground_risk(faster, GroundRiskGoal(flights=1, speed=25.0), Workers(1), lambda *_: None)
 
 
 def test_a_mission_without_a_home_has_no_class(base: CampaignBase, tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ import pytest
 
 from flight.simulation.track import TRACK_ROW, as_track
 from logs.recording.reader import read_log
-from logs.verdict.findings import GROUND_PATH, UNKNOWN_AIRCRAFT, UNKNOWN_PATH, Finding, make_finding
+from logs.verdict.findings import GROUND_PATH, UNKNOWN_AIRCRAFT, UNKNOWN_PATH, Fact, Finding, make_finding
 from logs.verdict.places import Place
 from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.verdict import Verdict
@@ -19,6 +19,7 @@ from planfly.campaigns.dispersions import default_dispersions, parse_dispersions
 from planfly.campaigns.flight_row import (
     STATION_COUNT,
     MarginalPass,
+    MinimumMargin,
     clearance_profile,
     find_marginal_passes,
     find_minimum_margins,
@@ -26,6 +27,7 @@ from planfly.campaigns.flight_row import (
     fly_one,
     list_failed_findings,
     make_lost_row,
+    scale_margin,
     waypoint_crossings,
 )
 from planfly.campaigns.tables import is_same_flight
@@ -62,6 +64,24 @@ def test_a_missile_further_off_or_entered_is_none() -> None:
     assert passed_beside(10.1) == ()
     entered = make_finding("threat", Place("missile", 0, name="Alfa"), ok=False, reason="", margin=-3.0)
     assert passed_beside(-5.0, entered) == ()
+
+
+def threat_finding(place: Place, distance: float, time_inside: float = 0.0) -> Finding:
+    """Outside a missile's sphere by a distance, m, negative inside, where a flight stays for a time, s."""
+    facts = [Fact("nearest", distance, "m")]
+    return make_finding("threat", place, ok=distance > 0.0, reason="", margin=-time_inside, unit="s", facts=facts)
+
+
+def test_flights_are_ranked_by_the_distance_from_a_missile() -> None:
+    """A long visit to the edge of a sphere counts less than a short one that goes deeper."""
+    alfa, bravo, other = (Place("missile", k, name=name) for k, name in enumerate(("Alfa", "Bravo", "Charlie")))
+    inside = (threat_finding(alfa, -0.5, 9.0), threat_finding(bravo, -5.24, 2.0), threat_finding(other, 3.0))
+    seen = make_finding("threat", Place("radar", 0, name="Alfa"), ok=True, reason="", unit="s")
+    assert find_minimum_margins((*inside, seen)) == (("threat", MinimumMargin(-5.24, "m", bravo)),)
+    assert find_minimum_margins((threat_finding(Place("flight"), 4.0), seen))[0][1].value == 4.0
+    # Only radars, or no threats at all.
+    assert find_minimum_margins((make_finding("threat", Place("flight"), ok=True, reason="", margin=0.0), seen)) == ()
+    assert scale_margin("threat", MinimumMargin(-5.24, "m", bravo)) == pytest.approx(-0.524)
 
 
 def finding(rule: str, margin: float | None, *, ok: bool | None = True, **other: Any) -> Finding:
@@ -210,7 +230,10 @@ def test_the_distance_to_a_missile_is_that_of_the_logged_positions(
     assert row.missile_distance == pytest.approx(
         float(np.linalg.norm(position - centre, axis=1).min()) - radius, abs=0.5
     )
-    assert fly_one(base, 0).missile_distance is None
+    margin = dict(row.margins)["threat"]
+    assert (margin.value, margin.unit) == (row.missile_distance, "m")
+    without = fly_one(base, 0)
+    assert (without.missile_distance, "threat" in dict(without.margins)) == (None, False)
 
 
 def test_the_same_index_gives_the_same_flight_and_log(base: CampaignBase, tmp_path: Path) -> None:

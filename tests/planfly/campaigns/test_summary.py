@@ -145,6 +145,27 @@ def test_failed_rules_come_first_in_the_ranking_also_without_a_margin(base: Camp
     }
 
 
+def test_flights_inside_a_missile_range_are_ranked_by_how_deep_they_were(base: CampaignBase, tmp_path: Path) -> None:
+    """Flight 3 is of a table without the distance as a margin.  A tenth of the way from -5.24 to -2 m is -4.92 m."""
+    goal, deepest = Goal(None, False, 4), (-0.5, -5.24, -2.0)
+    with open_store(base, goal, tmp_path, resume=False) as store:
+        for index, distance in enumerate(deepest):
+            store.add(with_margins(base, index, ("threat", distance), ("clearance", 0.1), failed=("threat",)))
+        known = summarise_campaign(base, goal, Estimator(goal).estimate(store.tally()), store)
+        store.add(with_margins(base, 3, failed=("threat",)))
+        summary = summarise_campaign(base, goal, Estimator(goal).estimate(store.tally()), store)
+    assert [row.draw.index for row in summary.worst] == [1, 2, 0, 3]
+    assert [closest_text(row) for row in summary.worst] == [
+        "threats at leg 1: -5.2 m",
+        "threats at leg 1: -2.0 m",
+        "threats at leg 1: -0.5 m",
+        "threats failed at leg 2 by an unknown margin",
+    ]
+    ranked = summary.ranking[0]
+    assert (ranked.rule, ranked.failed, ranked.lowest, ranked.unit) == ("threat", 4, -5.24, "m")
+    assert "threats: 5 % of the flights have a margin below -4.92 m" in "\n".join(campaign_lines(known))
+
+
 def summary_of_margins(
     base: CampaignBase, folder: Path, flights: Sequence[tuple[float | None, bool]]
 ) -> CampaignSummary:

@@ -1,6 +1,7 @@
 """A flight cannot run away: its simulated time and its log have limits, and what it comes to is told before."""
 
 import dataclasses
+import math
 from pathlib import Path
 
 import pytest
@@ -16,6 +17,7 @@ from planfly.workflow.open_flight import open_flight
 from planfly.workflow.pipeline import fly_and_judge
 from tests.planfly.conftest import FIELD
 from tests.planfly.misuse.test_interruptions import LONG
+from tests.synthetic import make_setup
 
 
 @pytest.fixture
@@ -104,3 +106,11 @@ def test_a_speed_that_the_autopilot_ignores_lengthens_no_predicted_flight() -> N
     setup = dataclasses.replace(example_log().setup, autopilot=ArduPlane(ArduPilotParameters.defaults()))
     slow = setup.route.with_fields(airspeed=0.001)
     assert predicted_seconds(dataclasses.replace(setup, route=slow)) == pytest.approx(predicted_seconds(setup))
+
+
+def test_a_flight_at_an_equivalent_airspeed_is_predicted_at_the_true_one() -> None:
+    """At 3,000 m: 4 km at 25 m/s times the root of 1.2250 kg/m^3 at sea level by 0.9093 (ISO 2533)."""
+    made = make_setup([[0, 0, 3000], [0, 4000, 3000]], terrain={"kind": "flat", "amsl_m": 2500.0})
+    assert predicted_seconds(made) == pytest.approx(160.0)
+    setup = dataclasses.replace(made, autopilot=ArduPlane(ArduPilotParameters.defaults()))
+    assert predicted_seconds(setup) == pytest.approx(160.0 / math.sqrt(1.2250 / 0.9093), rel=1e-3)

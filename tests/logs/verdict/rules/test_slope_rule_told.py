@@ -164,8 +164,11 @@ def test_a_leg_not_flown_to_its_end_is_not_judged_unless_it_failed(monkeypatch: 
         (25.0, 0.0, "10 m/s headwind"),
         (-15.0, 0.0, "10 m/s headwind"),
         (16.0, 270.0, "10 m/s crosswind"),
-        (16.0, 230.0, "8 m/s crosswind"),
-        (16.0, 220.0, "8 m/s tailwind"),
+        # 10 sin 3 deg = 0.5234 and 10 sin 2 deg = 0.349 m/s of crosswind: the latter is calm air.
+        (16.0, 183.0, "10.0 m/s tailwind and 0.5 m/s crosswind"),
+        (16.0, 182.0, "10 m/s tailwind"),
+        (16.0, 230.0, "6.4 m/s tailwind and 7.7 m/s crosswind"),
+        (25.0, 50.0, "6.4 m/s headwind and 7.7 m/s crosswind"),
     ],
 )
 def test_the_wind_on_a_steep_leg_is_named_with_its_limit(slope: float, from_deg: float, blows: str) -> None:

@@ -4,11 +4,14 @@ import math
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from logs.verdict.judge_flight import judge_geometry
+from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.places import FLIGHT
-from tests.logs.verdict.judging import failing, judge, missile, of, radar
+from logs.verdict.rules.threat_rule import threat_findings
+from tests.logs.verdict.judging import bare, failing, judge, missile, of, radar
 from tests.synthetic import (
     bump,
     fly_path,
@@ -87,6 +90,25 @@ def test_a_sphere_missed_by_less_than_navigation_may_be_off_is_luck(nav: Any, aw
         assert (f"or {away - 4.5:.1f} m after the navigation error of 4.5 m is subtracted" in item.reason) is (
             nav == "gnss"
         )
+
+
+@pytest.mark.parametrize("planned", [0.48, -0.44])
+def test_a_narrow_miss_is_warned_of_whether_the_plan_enters_the_sphere_or_not(planned: float) -> None:
+    """The flight is displaced from the planned line by a constant distance, to 0.53 m outside."""
+    made = make_setup([[0, 0, 300], [0, 2000, 300]], threats=[MISSILE | {"east_m": 500.0 + planned}])
+    setup, away = replace(made, nav="gnss"), 0.53
+    verdict = judge(setup, fly_path(setup, across=lambda along: np.full_like(along, planned - away)))
+    assert verdict.flyable
+    assert "passes 0.5 m outside a missile's range, less than the navigation error" in verdict.headline
+    found = [item.nearest for item in verdict.findings if item.rule == "threat" and item.place.kind != "radar"]
+    # The sphere itself has a finding if the plan enters it.
+    assert found == pytest.approx([away] * (1 if planned > 0.0 else 2), abs=1e-3)
+
+
+def test_a_plan_inside_a_sphere_that_was_not_flown_is_not_judged() -> None:
+    setup = make_setup([[0, 0, 300], [0, 2000, 300]], threats=[MISSILE])
+    items = [item for item in threat_findings(route_requirements(setup), None) if item.place.kind != "radar"]
+    assert [(bare(item.place), item.ok, item.nearest) for item in items] == [(missile("Alfa"), None, None)]
 
 
 @pytest.mark.parametrize(("aside", "ok"), [(499.9, False), (500.1, True)])
