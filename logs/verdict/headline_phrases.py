@@ -91,21 +91,24 @@ def small_circle_phrase(noun: str, finding: Finding) -> str:
 def zone_phrase(noun: str, finding: Finding) -> str:
     """Return a phrase such as "town (exclusion) violated (12.0 m inside)".
 
-    Return `excess_phrase` for a place without a name.
+    Return `excess_phrase` for a place without a name.  The depth is the flown one, or the planned one without a flight.
     """
     if not finding.place.name:
         return excess_phrase(noun, finding)
-    depth = max(finding.flown or 0.0, finding.planned or 0.0)
+    depth = _flown_or_planned(finding)
     side = "outside" if finding.place.kind == "inclusion" else "inside"
     return f"{place_text(finding.place)} violated ({depth:.1f} m {side})"
 
 
 def missile_phrase(_noun: str, finding: Finding) -> str:
     """Return a phrase such as "missile Alfa (13.3 s inside its range)"."""
-    return (
-        f"missile {threat_text(finding.place)} ({max(finding.flown or 0.0, finding.planned or 0.0):.1f} s"
-        " inside its range)"
-    )
+    return f"missile {threat_text(finding.place)} ({_flown_or_planned(finding):.1f} s inside its range)"
+
+
+def _flown_or_planned(finding: Finding) -> float:
+    """Return a finding's flown value; its planned value if nothing was flown, and 0 without any."""
+    value = finding.planned if finding.flown is None else finding.flown
+    return value or 0.0
 
 
 def photo_line_phrase(noun: str, finding: Finding) -> str:

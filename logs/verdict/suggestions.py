@@ -19,6 +19,7 @@ from flight.mission.placing import HOME_ALTITUDE_TOLERANCE_M
 from flight.mission_files.wpl import HOME_LINE_MISSING_TEXT
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import UNKNOWN_AIRCRAFT, Finding
+from logs.verdict.measures.acceptance import position_error
 from logs.verdict.measures.path_moves import flown_moves, planned_moves
 from logs.verdict.measures.path_sweeps import path_clearance, path_spheres
 from logs.verdict.measures.route_requirements import (
@@ -82,7 +83,8 @@ def suggest_passing_zone(
     finding: the finding on the violated zone.
 
     If the planned path violates the zone, its violating legs are shifted.  The shift also covers a greater depth of the
-    flight.  If only the flight violates the zone, the shift is measured on the flown legs.
+    flight.  If only the flight violates the zone, the shift is measured on the flown legs.  The path then keeps the
+    navigation error as its distance.
     """
     zone_index, facts = finding.place.index, {fact.what: fact.value for fact in finding.facts}
     if zone_index is None or "entry leg" not in facts:
@@ -90,6 +92,7 @@ def suggest_passing_zone(
     first_leg, last_leg = int(facts["entry leg"]), int(facts["exit leg"])
     record, terrain = zone_records([requirements.airspace.zones[zone_index]]), requirements.setup.scenario.terrain
     planned_depth, flown_depth = finding.planned or 0.0, finding.flown or 0.0
+    margin = position_error(requirements.setup) + SUGGESTION_LENGTH_MARGIN_M
     if aligned is not None and planned_depth <= ROUNDING_M:
         moves, extra_depth = flown_moves(aligned, first_leg, last_leg), 0.0
     else:
@@ -110,7 +113,7 @@ def suggest_passing_zone(
                         direction,
                         finding.place,
                         current=None,
-                        wanted=float(math.ceil(shift + extra_depth + SUGGESTION_LENGTH_MARGIN_M)),
+                        wanted=float(math.ceil(shift + extra_depth + margin)),
                         unit="m",
                     ),
                 )

@@ -33,6 +33,8 @@ from world.wording import count_text, is_one_edit
 _MAX_NAMED_FINDINGS = 4
 # Largest number of letters of a part of a parameter's name that counts as short.
 _LONGEST_SHORT_PART = 2
+# Words for what a path passed too closely, by rule.
+_NEAR_MISS_PLACES = {"threat": "outside a missile's range", "fence": "from a zone's limit"}
 # Introductions of the lines on the other levels.
 _LEVEL_TITLES = {
     "geometry": "By geometry only",
@@ -219,12 +221,13 @@ def _unjudged_text(findings: Sequence[Finding], rule: RuleWords) -> str:
 
 
 def _near_miss_notes(findings: Sequence[Finding]) -> list[str]:
-    """Return a note for each missile range that the path missed by less than the navigation error."""
+    """Return a note on a missile's range and on a zone's limit that the path missed by less than navigation may err."""
     notes = []
     for finding in findings:
-        facts = {fact.what: fact.value for fact in finding.facts if finding.rule == "threat" and finding.ok}
+        place = _NEAR_MISS_PLACES.get(finding.rule)
+        facts = {fact.what: fact.value for fact in finding.facts if place and finding.ok}
         if facts.get("nearest", math.inf) < facts.get("navigation error", 0.0):
-            notes.append(f"passes {facts['nearest']:.1f} m outside a missile's range, less than the navigation error")
+            notes.append(f"passes {max(0.0, facts['nearest']):.1f} m {place}, less than the navigation error")
     return notes
 
 
@@ -342,18 +345,31 @@ def summary_lines(
 
 
 def unjudged_parts(findings: Sequence[Finding], setup: FlightSetup) -> list[tuple[str, str]]:
-    """Return each rule with unjudged findings, with a text on their places and the first reason."""
+    """Return each rule with unjudged findings, with a text on their places and the reasons.
+
+    Findings with the same reason are described together, in the order of the first of each.
+    """
     parts = []
     for rule in RULE_WORDS.values():
         rule_findings = [finding for finding in findings if finding.rule == rule.name and rule.explains_unjudged]
         unjudged = [finding for finding in rule_findings if finding.ok is None]
         if not unjudged:
             continue
-        places = [place_text(finding.place) for finding in unjudged if finding.place.kind in ("leg", "waypoint")]
-        more_text = f" and {len(places) - _MAX_NAMED_FINDINGS} more" if len(places) > _MAX_NAMED_FINDINGS else ""
-        is_part = len(places) == len(unjudged) < len(rule_findings)
-        place = f" on {'; '.join(places[:_MAX_NAMED_FINDINGS])}{more_text}" if is_part else ""
-        parts.append((rule.name, f"{rule.title}{place} ({unjudged[0].reason})"))
+        is_placed = all(finding.place.kind in ("leg", "waypoint") for finding in unjudged)
+        if not is_placed or len(unjudged) == len(rule_findings):
+            parts.append((rule.name, f"{rule.title} ({unjudged[0].reason})"))
+            continue
+        places_by_reason: dict[str, list[str]] = {}
+        for finding in unjudged:
+            places_by_reason.setdefault(finding.reason, []).append(place_text(finding.place))
+        texts = []
+        for reason, places in list(places_by_reason.items())[:_MAX_NAMED_FINDINGS]:
+            more_text = f" and {len(places) - _MAX_NAMED_FINDINGS} more" if len(places) > _MAX_NAMED_FINDINGS else ""
+            texts.append(f"on {'; '.join(places[:_MAX_NAMED_FINDINGS])}{more_text} ({reason})")
+        more_text = ""
+        if len(places_by_reason) > _MAX_NAMED_FINDINGS:
+            more_text = f"; {count_text(len(places_by_reason) - _MAX_NAMED_FINDINGS, 'more reason')}"
+        parts.append((rule.name, f"{rule.title} {'; '.join(texts)}{more_text}"))
     if reason := unjudged_return_text(setup):
         parts.append(("return", f"{RULE_WORDS['return'].title} ({reason})"))
     return parts

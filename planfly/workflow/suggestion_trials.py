@@ -420,13 +420,16 @@ class SuggestionTrials:
 
 
 def _has_margin(finding: Finding, suggestion: Suggestion, verdict: Verdict) -> bool:
-    """Return True if a suggested parameter passes a finding's stop with `ALTITUDE_ERROR_M` to spare.
+    """Return True if a suggestion makes a finding pass with a margin for simulation and navigation errors.
 
-    The result is True for a suggestion without a parameter.
+    A parameter passes the finding's stop with `ALTITUDE_ERROR_M` to spare.  A move away from a zone keeps the
+    navigation error as its distance from this zone.
 
     verdict: verdict on the mission with the suggestion applied.
     """
     place = finding.place
+    if finding.rule == "fence":
+        return _zone_shortfall(finding, verdict) == 0.0
     margins = [
         other.margin
         for other in verdict.findings
@@ -435,6 +438,15 @@ def _has_margin(finding: Finding, suggestion: Suggestion, verdict: Verdict) -> b
     return not suggested_parameters(suggestion) or all(
         margin is None or margin >= ALTITUDE_ERROR_M for margin in margins
     )
+
+
+def _zone_shortfall(finding: Finding, verdict: Verdict) -> float:
+    """Return by how much a path passes the zone of a finding closer than the navigation error, m; 0 if it does not."""
+    for other in verdict.findings:
+        facts = {fact.what: fact.value for fact in other.facts if other.rule == "fence"}
+        if "nearest zone" in facts and facts["nearest zone"] == finding.place.index:
+            return facts["navigation error"] - facts["nearest"]
+    return 0.0
 
 
 def suggested_parameters(suggestion: Suggestion) -> dict[str, float]:
@@ -474,6 +486,10 @@ def _larger_suggestion(finding: Finding, suggestion: Suggestion, verdict: Verdic
     larger_suggestion = None
     for open_finding in same_finding or same_rule_legs:
         larger_suggestion = _add_needed_change(larger_suggestion or suggestion, open_finding) or larger_suggestion
+    shortfall = 0.0 if same_finding or finding.rule != "fence" else _zone_shortfall(finding, verdict)
+    if shortfall > 0.0:
+        further_step = math.ceil(_GROWTH_FACTOR * shortfall + _GROWTH_M)
+        return tuple(replace(change, wanted=change.wanted + further_step) for change in suggestion)
     if not (same_finding or same_rule_legs) and suggested_parameters(suggestion):
         # The finding passes without the margin of a parameter.
         return tuple(

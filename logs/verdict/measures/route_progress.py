@@ -13,8 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flight.guidance.equivalent_airspeed import eas_to_tas_ratio
+from flight.mission.itinerary import ENDLESS_LOITER_TIME_S
 from flight.mission.route import Route
-from flight.simulation.tick import RTL_ARRIVAL_LOITER_RADII, RTL_ARRIVAL_RADIUS_M
+from flight.simulation.tick import (
+    END_LOITER_ANGLE_RAD,
+    RTL_ARRIVAL_ALTITUDE_TOLERANCE_M,
+    RTL_ARRIVAL_LOITER_RADII,
+    RTL_ARRIVAL_RADIUS_M,
+)
+from flight.simulation.track import Track
 from logs.verdict.tolerances import CAPTURE_RADIUS_M
 from world.arrays import Floats
 from world.kernels import compiled, read_only
@@ -36,6 +43,9 @@ _SKIP_DISTANCE_M = 15.0
 _LATE_START_M = 1.0
 # Largest distance of a flown loiter from its drawn circle, m; the number of laps does not matter here.
 _LOITER_MARGIN_M = 60.0
+# Angle by which a logged loiter may fall short of a full lap, rad.  The rows may miss 1 s of the loiter, in which an
+# aircraft at 26 m/s turns by this angle on a radius of 260 m.
+_LAP_TOLERANCE_RAD = 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,6 +204,32 @@ def rtl_arrival_circle(route: Route) -> tuple[Floats, float] | None:
     # True radii grow with altitude as the square of true airspeed.
     radius = abs(loiter.radius) * eas_to_tas_ratio(loiter.up) ** 2
     return np.array(loiter[:2]), max(RTL_ARRIVAL_RADIUS_M, RTL_ARRIVAL_LOITER_RADII * radius)
+
+
+def return_loiter_reach(route: Route, track: Track) -> float | None:
+    """Return the largest distance from the center of a completed RTL loiter, m; None if it is not completed.
+
+    The loiter is complete after `ENDLESS_LOITER_TIME_S` and one lap.  Both begin when the aircraft is near the center
+    and at the loiter's altitude, as in a simulated flight (`flight.simulation.tick.update_rtl_loiter`).  An aircraft
+    whose bank limit or wind does not allow the loiter's radius flies wider than the arrival radius, or flies circles
+    beside the center.  There the course counts instead of the bearing, with a quarter turn onto the circle.
+    """
+    loiter, arrival_circle = route.rtl_loiter, rtl_arrival_circle(route)
+    if loiter is None or arrival_circle is None:
+        return None
+    east, north, up = (track.position - (loiter.east, loiter.north, loiter.up)).T
+    distances = np.hypot(east, north)
+    is_at_loiter = (distances < arrival_circle[1]) & (np.abs(up) < RTL_ARRIVAL_ALTITUDE_TOLERANCE_M)
+    first = int(np.argmax(is_at_loiter))
+    if not is_at_loiter.any() or float(track.time[-1] - track.time[first]) < ENDLESS_LOITER_TIME_S:
+        return None
+    bearings = np.unwrap(np.arctan2(east[first:], north[first:]))
+    courses = np.unwrap(np.arctan2(*track.velocity[first:, :2].T.astype(np.float64)))
+    has_circled = (
+        abs(float(bearings[-1] - bearings[0])) >= 2.0 * math.pi - _LAP_TOLERANCE_RAD
+        or abs(float(courses[-1] - courses[0])) >= END_LOITER_ANGLE_RAD
+    )
+    return float(distances[first:].max()) if has_circled else None
 
 
 @compiled

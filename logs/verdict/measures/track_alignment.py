@@ -19,7 +19,13 @@ from flight.simulation.tick import RTL_ARRIVAL_RADIUS_M
 from flight.simulation.track import Track
 from logs.verdict.measures.acceptance import acceptance_condition
 from logs.verdict.measures.path_sweeps import path_clearance
-from logs.verdict.measures.route_progress import RouteProgress, route_progress, rtl_arrival_circle, rtl_waypoints
+from logs.verdict.measures.route_progress import (
+    RouteProgress,
+    return_loiter_reach,
+    route_progress,
+    rtl_arrival_circle,
+    rtl_waypoints,
+)
 from logs.verdict.measures.route_requirements import FlownGround, RouteRequirements, route_requirements
 from logs.verdict.tolerances import (
     CAPTURE_RADIUS_M,
@@ -136,6 +142,11 @@ def align_track(requirements: RouteRequirements, track: Track) -> AlignedTrack |
         requirements.setup.route, usable_track.position, anywhere=requirements.setup.imported_log is not None
     )
     centers, arrival_radius = _arrival_circles(requirements)
+    route = requirements.setup.route
+    ends_at_loiter = requirements.setup.imported_log is None and route.rtl_end > requirements.legs
+    if ends_at_loiter and (reach := return_loiter_reach(route, usable_track)):
+        # A completed loiter counts as flown, however wide the bank limit and the wind made it.
+        arrival_radius[rtl_waypoints(route)] = np.maximum(arrival_radius[rtl_waypoints(route)], reach)
     progress = _advance_target_to_arrival(usable_track, progress, centers, arrival_radius)
     rows, distance = _find_passage_rows(usable_track, apexes, progress)
     distances = np.hypot(*(usable_track.position[rows, :2] - centers).T)

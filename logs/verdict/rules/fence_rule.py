@@ -11,6 +11,7 @@ import numpy as np
 
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Fact, Finding, finding_reason, make_finding, message
+from logs.verdict.measures.acceptance import position_error
 from logs.verdict.measures.path_moves import flown_moves, planned_moves
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.measures.track_alignment import AlignedTrack
@@ -118,6 +119,13 @@ def _compliance_finding(
         )
         if margin < corridor:
             reason += f", within the corridor of {corridor:.0f} m about the legs"
+        navigation_error = position_error(requirements.setup)
+        if margin < navigation_error:
+            facts += [
+                Fact("navigation error", navigation_error, "m"),
+                Fact("nearest zone", float(nearest_zone), "1"),
+            ]
+            reason += f"; that is less than the navigation error of {navigation_error:.1f} m"
     return make_finding(
         "fence",
         FLIGHT,

@@ -13,16 +13,14 @@ from typing import NamedTuple
 import numpy as np
 
 from flight.mission.items import Command
-from flight.mission.itinerary import ENDLESS_LOITER_TIME_S
 from flight.mission.return_path import RTL_NOT_CONTINUED_TEXT
-from flight.simulation.tick import RTL_ARRIVAL_ALTITUDE_TOLERANCE_M
 from logs.verdict.findings import NO_HOME, UNKNOWN_RETURN, Finding, Message, make_finding, message
 from logs.verdict.measures.mission_ends import (
     judged_return_text,
     judges_return_after_last_item,
     missing_home_text,
 )
-from logs.verdict.measures.route_progress import rtl_arrival_circle
+from logs.verdict.measures.route_progress import return_loiter_reach
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT, Change, Suggestion
@@ -44,9 +42,6 @@ from world.scenario_tables import ReturnDemand
 
 # Maximum number of simulated returns if all have to be safe: one for each second of flight, 2 ms each.
 _MAX_RETURNS = 3000
-# Angle by which a logged loiter may fall short of a full lap, rad.  The rows may miss 1 s of the loiter, in which an
-# aircraft at 26 m/s turns by this angle on a radius of 260 m.
-_LAP_TOLERANCE_RAD = 0.1
 # Rules that judge how well a flight follows its legs.
 _LEG_RULES = frozenset({"turn", "waypoint", "corridor", "slope", "loiter"})
 
@@ -72,7 +67,10 @@ def return_findings(
     return _flown_rtl_findings(
         requirements,
         has_passed_end
-        and (continues_to_landing or (aligned is not None and has_completed_return_loiter(requirements, aligned))),
+        and (
+            continues_to_landing
+            or (aligned is not None and return_loiter_reach(requirements.setup.route, aligned.track) is not None)
+        ),
     )
 
 
@@ -234,26 +232,6 @@ _JUDGES: dict[ReturnDemand, Callable[[ReturnWorld, ReturnStarts, float], _Requir
     "rtl": _judge_rtl,
     "glide": _judge_glides,
 }
-
-
-def has_completed_return_loiter(requirements: RouteRequirements, aligned: AlignedTrack) -> bool:
-    """Return True if a track contains at least one lap of the RTL loiter and the loiter's full duration.
-
-    The duration starts when the aircraft is near the center and at the loiter's altitude, as in a simulated flight
-    (`flight.simulation.tick.update_rtl_loiter`).
-    """
-    loiter, arrival_circle = requirements.setup.route.rtl_loiter, rtl_arrival_circle(requirements.setup.route)
-    if loiter is None or arrival_circle is None:
-        return False
-    track = aligned.track
-    east, north, up = (track.position - (loiter.east, loiter.north, loiter.up)).T
-    is_at_loiter = (np.hypot(east, north) < arrival_circle[1]) & (np.abs(up) < RTL_ARRIVAL_ALTITUDE_TOLERANCE_M)
-    if not is_at_loiter.any():
-        return False
-    first = int(np.argmax(is_at_loiter))
-    bearing = np.unwrap(np.arctan2(east[first:], north[first:]))
-    has_circled = abs(float(bearing[-1] - bearing[0])) >= 2.0 * math.pi - _LAP_TOLERANCE_RAD
-    return has_circled and float(track.time[-1] - track.time[first]) >= ENDLESS_LOITER_TIME_S
 
 
 def _flown_rtl_findings(requirements: RouteRequirements, has_arrived: bool, reason: str = "") -> list[Finding]:

@@ -120,6 +120,14 @@ def test_the_nearest_side_and_the_nearest_height() -> None:
     )
 
 
+def test_a_zone_is_passed_by_more_than_navigation_may_be_off() -> None:
+    """40 m of the zone are west of the line; three standard deviations of 1.5 m are kept."""
+    setup = replace(with_zone(Zone("town", "exclusion", TOWN)), nav="gnss")
+    (west,) = of(judge_geometry(setup), "fence").suggestions[0]
+    assert (west.what, west.wanted) == ("west", pytest.approx(40.0 + 4.5 + SUGGESTION_LENGTH_MARGIN_M, abs=1.1))
+    assert west.wanted >= 44.5
+
+
 @pytest.mark.parametrize(
     ("zone", "steps"),
     [

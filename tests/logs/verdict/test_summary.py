@@ -13,7 +13,7 @@ from logs.verdict.conditions import judging_conditions
 from logs.verdict.findings import Finding, make_finding, message
 from logs.verdict.places import FLIGHT, Change, LevelAnswer, Place
 from logs.verdict.rules.registry import RULES
-from logs.verdict.summary import headline, summary_lines
+from logs.verdict.summary import headline, summary_lines, unjudged_parts
 from logs.verdict.verdict import Verdict
 from tests.logs.verdict.judging import leg, missile, waypoint
 from tests.synthetic import make_setup
@@ -59,6 +59,18 @@ def test_a_threat_is_named_once() -> None:
     assert headline(items, False) == (
         "not flyable: missile Alfa (3.0 s inside its range), missile threat 2 (3.0 s inside its range),"
         " missile threatening hill (3.0 s inside its range)"
+    )
+
+
+def test_each_unjudged_leg_has_its_own_reason() -> None:
+    setup = make_setup([[0, 0, 300], [0, 2000, 300]])
+    reasons = ("", "dips to 84 m below ground", "not flown", "not flown")
+    found = [
+        make_finding("clearance", leg(k), ok=None if reason else True, reason=reason)
+        for k, reason in enumerate(reasons)
+    ]
+    assert dict(unjudged_parts(found, setup))["clearance"] == (
+        "clearance on leg 1 (dips to 84 m below ground); on leg 2; leg 3 (not flown)"
     )
 
 

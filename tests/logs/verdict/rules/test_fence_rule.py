@@ -50,6 +50,27 @@ def test_a_zone_beside_the_path_is_kept_to() -> None:
     assert item.reason.endswith(", within the corridor of 30 m about the legs")
 
 
+@pytest.mark.parametrize(("nav", "away", "luck"), [("gnss", 4.4, True), ("gnss", 4.6, False), ("perfect", 0.4, False)])
+def test_a_zone_passed_by_less_than_navigation_may_be_off_is_luck(nav: Any, away: float, luck: bool) -> None:
+    """Three standard deviations of 1.5 m."""
+    aside = make_polygon([[(away, 500.0), (400.0, 500.0), (400.0, 1000.0), (away, 1000.0)]])
+    setup = replace(within_zones(Zone("yard", "exclusion", aside)), nav=nav)
+    for verdict in (judge_geometry(setup), judge(setup, fly_path(setup))):
+        assert verdict.flyable
+        note = f"passes {away:.1f} m from a zone's limit, less than the navigation error"
+        assert (note in verdict.headline) is luck
+        reason = of(verdict, "fence", FLIGHT).reason
+        assert reason.endswith("; that is less than the navigation error of 4.5 m") is luck
+
+
+def test_the_headline_of_a_flight_states_the_flown_depth() -> None:
+    """The planned path is 10 m inside; the flight is 4 m to the west, so 6 m inside."""
+    setup = within_zones(Zone("yard", "exclusion", OVER))
+    assert "yard (exclusion) violated (10.0 m inside)" in judge_geometry(setup).headline
+    flown = judge(setup, fly_path(setup, across=lambda along: -4.0 + 0.0 * along))
+    assert "yard (exclusion) violated (6.0 m inside)" in flown.headline
+
+
 def test_a_planned_path_through_a_zone() -> None:
     far = Zone("far", "exclusion", Cylinder(9000.0, 0.0, 50.0))
     (item,) = findings(within_zones(far, Zone("yard", "exclusion", OVER)))

@@ -15,19 +15,22 @@ from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.mission.route import make_route
 from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import Flight, fly_to_end
+from flight.simulation.tick import RTL_ARRIVAL_RADIUS_M
 from logs.recording.reader import read_log
 from logs.recording.recorder import Recorder
 from logs.verdict.findings import make_finding
 from logs.verdict.judge_flight import judge_flight, judge_geometry
+from logs.verdict.measures.route_progress import return_loiter_reach
 from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.measures.track_alignment import align_track
-from logs.verdict.rules.return_rule import has_completed_return_loiter, without_path_following_findings
+from logs.verdict.rules.return_rule import without_path_following_findings
 from logs.verdict.verdict import Verdict
 from logs.views.replay.timeline import timeline
 from tests.logs.verdict.judging import of
 from tests.mission_lines import setup_of, wp
 from tests.soak import some
 from world.terrain import Peak, make_peaks_terrain
+from world.wind import Wind
 
 HOME = "36.5 -84.2 100"
 RTL = "0 20 0 0 0 0 0 0 0"
@@ -200,6 +203,23 @@ def test_a_return_to_a_wide_circle_comes_to_its_end() -> None:
     assert verdict.complete, verdict.lines
 
 
+def test_a_return_whose_circle_is_wider_than_the_arrival_radius_comes_to_its_end() -> None:
+    """At 12 degrees of bank and 25 m/s the radius is 25² / (9.81 tan 12°) = 300 m, and the wind carries it along."""
+    setup = setup_of(*WAY, home=HOME)
+    setup = replace(setup, limits=replace(setup.limits, max_bank=math.radians(12.0)))
+    setup = by_arduplane(setup, ROLL_LIMIT_DEG=12.0)
+    wind = Wind(4.0, math.radians(270.0))
+    setup = setup.in_scenario(replace(setup.scenario, wind=wind))
+    done = fly_to_end(Flight(setup, load_aircraft("aerosonde")))
+    assert done.ended == "completed"
+    loiter = setup.route.rtl_loiter
+    assert loiter is not None
+    assert math.dist(done.track.position[-1, :2], loiter[:2]) > RTL_ARRIVAL_RADIUS_M
+    verdict = judge_flight(setup, done.track, done.ended)
+    assert of(verdict, "return").ok
+    assert verdict.complete, verdict.lines
+
+
 @pytest.mark.parametrize(
     ("seconds", "radius", "arrived"), [(0.0, 0.0, True), (-30.0, 0.0, False), (-70.0, 500.0, False)]
 )
@@ -211,7 +231,7 @@ def test_an_imported_return_has_circled_at_its_height(seconds: float, radius: fl
     requirements = route_requirements(setup)
     aligned = align_track(requirements, rows)
     assert aligned is not None
-    assert has_completed_return_loiter(requirements, aligned) is arrived
+    assert (return_loiter_reach(setup.route, aligned.track) is not None) is arrived
 
 
 BEHIND_THE_HILL = (wp(0, 500, 600), wp(4500, 500, 600))
