@@ -174,13 +174,11 @@ class SpeedRules:
         """Return the airspeed that the autopilot flies on each leg, m/s, (l,).
 
         commanded: airspeed commanded for each leg, true or equivalent like the result, m/s, (l,).
-        cruise: airspeed before the first command and in a return, m/s.  It is no command, so the autopilot limits it.
+        cruise: airspeed until the autopilot accepts the first command, m/s.
 
         >>> ignoring = SpeedRules(SpeedLimits(9.0, 22.0, "MIN", "MAX"))
         >>> ignoring.flown_airspeeds(np.array([8.0, 15.0, 30.0, 10.0]), 12.0).tolist()
         [12.0, 15.0, 15.0, 10.0]
-        >>> ignoring.flown_airspeeds(np.array([25.0, 15.0, 25.0]), 25.0).tolist()
-        [22.0, 15.0, 22.0]
         >>> clipping = SpeedRules(SpeedLimits(9.0, 22.0, "MIN", "MAX", nearest=True))
         >>> clipping.flown_airspeeds(np.array([8.0, 15.0, 30.0, 10.0]), 12.0).tolist()
         [9.0, 15.0, 22.0, 10.0]
@@ -191,12 +189,9 @@ class SpeedRules:
         if limits.nearest:
             return np.clip(commanded, limits.min, limits.max)
         flown_speeds = []
-        current = limited_cruise = min(limits.max, max(limits.min, cruise))
+        current = cruise
         for command in commanded.tolist():
-            if command == cruise:
-                current = limited_cruise
-            elif limits.min <= command <= limits.max:
-                current = command
+            current = command if limits.min <= command <= limits.max else current
             flown_speeds.append(current)
         return np.array(flown_speeds)
 

@@ -206,21 +206,12 @@ def _uncertainty_text(requirements: RouteRequirements, leg: int, commanded: floa
 
 
 def _speed_range_notes(requirements: RouteRequirements, leg: int) -> list[str]:
-    """Return a note if the autopilot does not fly a leg's airspeed as set or commanded; otherwise []."""
+    """Return a note if the autopilot does not accept a leg's commanded speed; otherwise []."""
     setup, autopilot = requirements.setup, requirements.setup.autopilot
     command, limits = float(setup.route.leg_airspeeds[leg]), autopilot.speeds.limits
     if limits is None or limits.min <= command <= limits.max:
         return []
     range_text = f"{limits.min_name} {limits.min:g} to {limits.max_name} {limits.max:g} m/s"
-    if command == setup.airspeed:
-        # No command of the mission, but the airspeed of the aircraft, of an option or of a scenario.
-        name, limit = (limits.min_name, limits.min) if command < limits.min else (limits.max_name, limits.max)
-        source = "as the aircraft's cruise"
-        if setup.scenario.flight.airspeed_mps is not None:
-            source = "by the scenario or an option (--airspeed, Settings)"
-        elif autopilot.stated_value(autopilot.speeds.cruise_parameter) is not None:
-            source = f"by {autopilot.speeds.cruise_parameter}"
-        return [f"an airspeed of {command:g} m/s is set {source}; {autopilot.title} limits it to {name} {limit:g} m/s"]
     behaviour = "flies the nearest one instead" if limits.nearest else "ignores the command"
     return [f"the mission commands {command:g} m/s; {autopilot.title} accepts {range_text}, and {behaviour}"]
 

@@ -165,12 +165,6 @@ def test_speeds_within_the_limits_are_taken(airspeed: float, taken: bool) -> Non
     ]
 
 
-@pytest.mark.parametrize(("cruise", "limit"), [(40.0, 31.0), (15.0, 18.0)])
-def test_a_cruise_airspeed_is_limited_also_after_a_change(cruise: float, limit: float) -> None:
-    commanded = np.array([cruise, 20.0, cruise])
-    assert ArduPlane(PARAMETERS).speeds.flown_airspeeds(commanded, cruise).tolist() == [limit, 20.0, limit]
-
-
 def test_a_speed_that_is_not_taken_leaves_the_one_before() -> None:
     commanded = np.array([17.0, 17.0, 20.0, 35.0, 31.0])
     assert ArduPlane(PARAMETERS).speeds.flown_airspeeds(commanded, 25.0).tolist() == [25.0, 25.0, 20.0, 20.0, 31.0]

@@ -92,7 +92,7 @@ def test_arduplane_takes_a_command_for_equivalent_airspeed() -> None:
     for up, ok in ((0.0, True), (1000.0, False)):
         points = [[e, n, up] for e, n, _ in STRAIGHT]
         made = make_setup(points, airspeed=31.0, terrain={"kind": "flat", "amsl_m": -400.0})
-        setup = replace(made, autopilot=ArduPlane(ArduPilotParameters.defaults().changed(AIRSPEED_MAX=31.0)))
+        setup = replace(made, autopilot=ArduPlane(ArduPilotParameters.defaults()))
         item = of(judge_geometry(setup), "speed", leg(0))
         true = 31.0 * math.sqrt(1.225 / (1.225 if up == 0.0 else 1.112))
         assert (item.ok, item.planned) == (ok, pytest.approx(true, rel=1e-3))
@@ -165,25 +165,6 @@ def test_a_held_airspeed_is_compared_with_the_one_that_arduplane_accepts(max_air
     setup = replace(made, autopilot=ArduPlane(parameters))
     at_25 = fly_path(made, airspeed=lambda s: np.where(s > 3000.0, -5.0, 0.0))
     assert of(judge(setup, at_25), "speed", leg(1)).ok is held
-
-
-@pytest.mark.parametrize(
-    ("option", "source"),
-    [(30.0, "by the scenario or an option (--airspeed, Settings)"), (None, "as the aircraft's cruise")],
-)
-def test_a_set_airspeed_is_limited_and_named_as_no_command(option: float | None, source: str) -> None:
-    """After a DO_CHANGE_SPEED to 20 m/s, which is accepted, nothing is said about 30 m/s."""
-    made = make_setup(STRAIGHT, airspeed=30.0, speeds=[30.0, 20.0], terrain={"kind": "flat", "amsl_m": -400.0})
-    flight = made.scenario.flight.model_copy(update={"airspeed_mps": option})
-    law = ArduPlane(ArduPilotParameters.defaults().changed(AIRSPEED_MIN=18.0, AIRSPEED_MAX=24.0))
-    setup = replace(made, scenario=replace(made.scenario, flight=flight), autopilot=law)
-    verdict = judge_geometry(setup)
-    first, second = (of(verdict, "speed", leg(k)) for k in (0, 1))
-    text = f"an airspeed of 30 m/s is set {source}; ArduPlane limits it to AIRSPEED_MAX 24 m/s"
-    assert first.reason.startswith(text)
-    assert "30 m/s" not in second.reason
-    altitude = float(setup.route.positions[:2, 2].mean())
-    assert first.planned == pytest.approx(24.0 * law.speeds.true_airspeed_factor(altitude), rel=1e-4)
 
 
 def test_a_speed_that_is_taken_up_late_is_held() -> None:
