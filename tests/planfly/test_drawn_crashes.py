@@ -136,7 +136,7 @@ def test_an_event_is_named_by_its_leg_item_and_place(k: int, tmp_path: Path) -> 
     geo = [to_geo(WORLD.origin, *place) for place in drawn.places]
     places = np.array([to_map(origin, float(lat), float(lon)) for lat, lon in geo])
     a, b, item = places[drawn.leg], places[drawn.leg + 1], drawn.leg + 2
-    name, position = f"leg {drawn.leg}, to item {item}", flown.track.position
+    name, position = f"leg {drawn.leg} (to item {item})", flown.track.position
     assert not flown.verdict.flyable
     if drawn.zone is not None:
         middle = np.array(to_map(origin, *(float(value) for value in to_geo(WORLD.origin, *drawn.zone))))
