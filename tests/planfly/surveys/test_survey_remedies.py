@@ -321,17 +321,23 @@ def test_the_surveys_of_a_setup_are_searched_once(monkeypatch: pytest.MonkeyPatc
     assert len(searches) == 2
 
 
+def survey_file(folder: Path, lead: float) -> Path:
+    """Write a survey of three lines of 1 km, 100 m apart, with leads of a length (m) and photos every 50 m."""
+    lines = []
+    for k in range(3):
+        north = [-lead, 0.0, 1000.0, 1000.0 + lead][:: 1 if k % 2 == 0 else -1]
+        points = [wp(100.0 * k, value, 100.0) for value in north]
+        lines += [*points[:2], "2 206 50 0 1 0 0 0 0", points[2], "2 206 0 0 1 0 0 0 0", points[3]]
+    file = folder / "gated.waypoints"
+    file.write_text(mission_text(mission(*lines), "waypoints"), encoding="ascii")
+    return file
+
+
 def test_gates_at_the_ends_of_lines_that_lose_their_photos_to_the_acceptance_radius(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     """Three lines of 1 km with leads of 300 m: PX4 flies past gates, and ArduPlane knows none."""
-    lines = []
-    for k in range(3):
-        north = [-300.0, 0.0, 1000.0, 1300.0][:: 1 if k % 2 == 0 else -1]
-        points = [wp(100.0 * k, value, 100.0) for value in north]
-        lines += [*points[:2], "2 206 50 0 1 0 0 0 0", points[2], "2 206 0 0 1 0 0 0 0", points[3]]
-    file = tmp_path / "gated.waypoints"
-    file.write_text(mission_text(mission(*lines), "waypoints"), encoding="ascii")
+    file = survey_file(tmp_path, lead=300.0)
     flown: list[Mission] = []
 
     def fly(setup: FlightSetup, *_: Any) -> Any:
@@ -356,13 +362,7 @@ def test_gates_at_the_ends_of_lines_that_lose_their_photos_to_the_acceptance_rad
 
 def test_gates_with_a_lower_airspeed_are_tried_together(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Three lines of 1 km with leads of 300 m: six gates pass, if the airspeed is at most 15.5 m/s of the x8's 18."""
-    lines = []
-    for k in range(3):
-        north = [-300.0, 0.0, 1000.0, 1300.0][:: 1 if k % 2 == 0 else -1]
-        points = [wp(100.0 * k, value, 100.0) for value in north]
-        lines += [*points[:2], "2 206 50 0 1 0 0 0 0", points[2], "2 206 0 0 1 0 0 0 0", points[3]]
-    file = tmp_path / "gated.waypoints"
-    file.write_text(mission_text(mission(*lines), "waypoints"), encoding="ascii")
+    file = survey_file(tmp_path, lead=300.0)
 
     def fly(setup: FlightSetup, *_: Any) -> Any:
         gates = [item for item in setup.mission.items if item.command == Command.CONDITION_GATE]
@@ -382,13 +382,7 @@ def test_gates_with_a_lower_airspeed_are_tried_together(monkeypatch: pytest.Monk
 
 def test_gates_with_longer_turn_arounds_are_tried_together(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Three lines of 1 km with leads of 60 m: six gates pass, if the turn-arounds are at least 110 m."""
-    lines = []
-    for k in range(3):
-        north = [-60.0, 0.0, 1000.0, 1060.0][:: 1 if k % 2 == 0 else -1]
-        points = [wp(100.0 * k, value, 100.0) for value in north]
-        lines += [*points[:2], "2 206 50 0 1 0 0 0 0", points[2], "2 206 0 0 1 0 0 0 0", points[3]]
-    file = tmp_path / "gated.waypoints"
-    file.write_text(mission_text(mission(*lines), "waypoints"), encoding="ascii")
+    file = survey_file(tmp_path, lead=60.0)
 
     def fly(setup: FlightSetup, *_: Any) -> Any:
         gates = [item for item in setup.mission.items if item.command == Command.CONDITION_GATE]
