@@ -102,7 +102,7 @@ class _Probe:
         self._pressure_force = read("aero/qbar-psf")() * 47.88025898033584 * self._area
 
     def base_model(self, motor: Motor, *, has_torque_reaction: bool) -> BaseModel:
-        """Return the values of the model, with `motor` as its motor.
+        """Measure the numbers of the JSBSim model, and return them with `motor`.
 
         has_torque_reaction: True if the propeller's torque rolls the aircraft.
         """
@@ -231,7 +231,10 @@ class _Probe:
 
 
 def is_flying_wing(aircraft: Aircraft) -> bool:
-    """Return True if a model has elevons, which it mixes from elevator and aileron."""
+    """Return True if a model has elevons, which it mixes from elevator and aileron.
+
+    Returns False for a model that cannot be parsed.
+    """
     root = _parse_model(aircraft)
     return root is not None and any(actuator.get("name") == "elevon/left-rad" for actuator in root.iter("actuator"))
 

@@ -49,10 +49,11 @@ def expected_failures(plan: Plan, uav: Uav) -> tuple[str, ...]:
 
 
 def _loose_limits_text(plan: Plan, uav: Uav) -> str:
-    """Name the first part of a plan that the numbers in [limits] allow, but not the aircraft or its autopilot.
+    """Warn if the numbers in [limits] allow a turn or slope that the aircraft or its autopilot cannot fly.
 
-    Return "" if there is none.  The aircraft limits turns and slopes.  The autopilot limits slopes by its climb and
-    sink rates; a plan uses a part of these rates, beyond which a flight passes in some gusts and fails in others.
+    Returns "" if the plan stays within the limits of both.  The aircraft limits turns and slopes.  The autopilot limits
+    slopes by its climb and sink rates, of which a plan uses only a part: a steeper flight passes in some gusts and
+    fails in others.  The text names the first part of the plan that exceeds a limit.
     """
     limits = uav.limits
     slope_limits = replace(limits, max_climb=None, max_dive=None)

@@ -240,7 +240,12 @@ def limits_in_gusts(plan: Plan, uav: Uav, unused_fraction: float = _UNUSED_CLIMB
 
 
 def limits_for_alternatives(plan: Plan, uav: Uav) -> Limits:
-    """Return search limits for alternatives to a safe plan: the tightest limits that this plan meets."""
+    """Return search limits for alternatives to a safe plan, as strict as this plan allows.
+
+    The limits with a margin for gusts at the ground, missiles and zones are tried first, then those with a margin at
+    the ground only.  If the plan meets none of them, or gusts do not displace the aircraft, the limits have no such
+    margin.
+    """
     limits = uav.limits.with_margin()
     if not _gusts_displace_aircraft(plan, uav):
         return limits
@@ -257,6 +262,8 @@ def limits_for_alternatives(plan: Plan, uav: Uav) -> Limits:
 
 class _Parts(NamedTuple):
     """Path whose legs are cut into short parts near its ends, with the altitude margin that gusts need.
+
+    A point has two margins, because the leg before a waypoint may need more than the leg after it.
 
     gust: the kind of gusts.
     points: ends of the parts, (p, 3) m.
@@ -355,7 +362,8 @@ def _heights_at_ends(problem: Problem, parts: _Parts) -> list[tuple[str, float, 
 def _clearance_shortfall(problem: Problem, parts: _Parts) -> Shortfall | None:
     """Return the deepest displacement by a downdraft into the required clearance.
 
-    The depth is 0 m if no displacement reaches into the clearance.
+    A shortfall at the start or the destination is returned first, because no other path avoids it.  The depth is 0 m if
+    no displacement reaches into the clearance.
     """
     data = problem.certified
     hazard_text = f"into the clearance of {data.clearance:g} m"
@@ -380,9 +388,8 @@ def _clearance_shortfall(problem: Problem, parts: _Parts) -> Shortfall | None:
 def _max_height_shortfall(problem: Problem, parts: _Parts) -> Shortfall | None:
     """Return the place where an updraft lifts the aircraft highest above ground.
 
-    Returns None without a maximum height.
-
-    The depth is the height above the maximum height, negative if the aircraft stays below.
+    A place at the start or the destination is returned first, because no other path avoids it.  The depth is the height
+    above the maximum height, negative if the aircraft stays below.  Returns None without a maximum height.
     """
     data, max_height = problem.certified, problem.certified.airspace.max_height
     if max_height == math.inf:

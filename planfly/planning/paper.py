@@ -49,7 +49,7 @@ class SeededPlan:
 
     threats: number of threats in the problem.
     waypoints: world coordinates, m, (w, 3).
-    violations, objectives: counts and values on the paper's points.
+    violations, objectives: counts and values at the points where the paper evaluates a path, six per leg.
     certified: True if the continuous check passes and no missile reaches the path.
     kill_probability, detection_probability: values of `exposure_probability`.
     history: length ratio, kill exposure and violations of the best path after each generation, (g, 3).

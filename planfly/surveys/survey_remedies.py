@@ -309,9 +309,10 @@ class _Trials:
     # The remedies, one change each.
 
     def try_photo_spacing(self) -> SurveyRemedy | None:
-        """Try the longest whole distance between photos with the required front overlap at the lowest planned place.
+        """Try photos at shorter distances along the lines, so that the front overlap is as required.
 
-        Returns None if the front overlap does not fail, or if the flight does not pass.
+        The distance is the longest one, in whole m, with the required overlap where the route is lowest above the
+        ground.  Returns None if the front overlap does not fail, or if the flight does not pass.
         """
         if not any(finding.check == FRONT_OVERLAP for finding in self._verdict.failed):
             return None
@@ -385,7 +386,9 @@ class _Trials:
         return SurveyRemedy("gates", "", 0.0, 1.0, "", *flight) if self._is_remedy(flight) else None
 
     def find_stride(self, max_turn_around: float) -> SurveyRemedy | None:
-        """Find the smallest interleave stride that passes, with turn-around distances below `max_turn_around`.
+        """Find the smallest interleave stride n that passes: every n-th line is flown first, then the others.
+
+        Only turn-around distances below `max_turn_around` are tried.
 
         max_turn_around: turn-around distance that passes without interleaving, which is also the lead-in to the first
         line, m; infinity if no distance passes.
@@ -658,9 +661,9 @@ class _Trials:
 
 
 def missing_height(measure: OverlapMeasure) -> float:
-    """Return the height that the lowest photos need for the required overlaps, m; 0 if nothing is missing.
+    """Return how much higher a flight must be so that its lowest photos have the required overlaps, m.
 
-    The distances between photos and between lines stay as flown.
+    The distances between photos and between lines stay as flown.  Returns 0 if the overlaps are large enough.
     """
     camera, missing = measure.camera, 0.0
     for overlap, required, distance, width, height in (

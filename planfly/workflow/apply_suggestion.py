@@ -36,7 +36,7 @@ _SPHERE_MARGIN_M = 15.0
 # Tried shares of a change of a leg's rise that are made at the leg's end, in this order.  None: the share depends on
 # the leg's position in the route.
 _END_FRACTIONS = (None, 1.0, 0.0, 0.5, 0.05, 0.1, 0.2, 0.8, 0.9, 0.95)
-# Smallest assumed share of the waypoints' move by which the nearest point of their legs moves.
+# Smallest share of the waypoints' move that the nearest point of their legs is assumed to follow; it limits the move.
 _MIN_MOVE_SHARE = 0.2
 
 
@@ -106,7 +106,7 @@ def apply_suggestion(
 
 
 def _open_places(verdict: Verdict) -> dict[tuple[str, Place], bool]:
-    """Return a mapping from rule and place of each failed or undecided finding to True if it failed."""
+    """Return the rule and place of each failed or undecided finding, mapped to True if the finding failed."""
     open_findings = (*undecided_findings(verdict.findings), *verdict.failed)
     return {(finding.rule, finding.place): finding.ok is False for finding in open_findings}
 
@@ -155,7 +155,7 @@ class _Choice:
     max_moves: greatest number of waypoints to move away from a missile; None for all.
     radially: True if each of these waypoints moves in its own direction from the missile.
     end_fraction: share of a change of a leg's rise that is made at the leg's end; the rest is made at its start.  None
-        for a half, and for all of it at the end of the leg that does not end the route.
+    makes half of the change at each end, but on the first or last leg of the route all of it at the inner waypoint.
     """
 
     max_moves: int | None = None
@@ -264,7 +264,7 @@ def _lengthen_leg(edited: _EditedMission, change: Change, _finding: Finding) -> 
 
 
 def _reduce_rise(edited: _EditedMission, change: Change, _finding: Finding) -> None:
-    """Reduce the climb or descent of a leg by moving one or both of its ends."""
+    """Reduce the climb or descent of a leg to the wanted rise, by moving one or both of its ends."""
     leg = _changed_leg(change, edited.route)
     excess = float(edited.current_position(leg + 1)[2] - edited.current_position(leg)[2]) - change.wanted
     is_first, is_last = leg == 0, leg + 1 == edited.route.legs
@@ -276,7 +276,10 @@ def _reduce_rise(edited: _EditedMission, change: Change, _finding: Finding) -> N
 
 
 def _change_airspeed(edited: _EditedMission, change: Change, _finding: Finding) -> None:
-    """Change the airspeed on a leg, on both legs of a waypoint, or on the whole route."""
+    """Change the airspeed on a leg, on both legs of a waypoint, or on the whole route.
+
+    If the suggestion allows a range of airspeeds, the middle of the range is set.
+    """
     place, route = change.place, edited.route
     airspeed = change.wanted if change.most is None else 0.5 * (change.wanted + change.most)
     legs = range(route.legs)
@@ -292,7 +295,10 @@ def _change_airspeed(edited: _EditedMission, change: Change, _finding: Finding) 
 
 
 def _make_turn_gentler(edited: _EditedMission, change: Change, _finding: Finding) -> None:
-    """Make a turn gentler by moving the waypoint towards the line between its neighbours."""
+    """Make a turn gentler by moving the waypoint towards the line between its neighbours.
+
+    The waypoint is not moved if it is an end of the route, or if no move makes the turn gentle enough.
+    """
     points, index = edited.waypoint_positions(), change.place.index
     if index is None or not 0 < index < edited.route.legs:
         return

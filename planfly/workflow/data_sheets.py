@@ -365,7 +365,8 @@ def _make_uncertainty(sized: SizedAircraft, aircraft: Aircraft) -> tuple[Uncerta
 def climb_deviation(sized: SizedAircraft) -> float:
     """Return the standard deviation of the climb at full throttle, rad.
 
-    A climb that is stated at less throttle is less certain at full throttle, but not less than a guess.
+    It is small for a climb that the sheet states at full throttle, and large for a guessed climb.  A climb that is
+    stated at less throttle is extrapolated to full throttle; this increases the deviation, at most to that of a guess.
     """
     if "climb" in sized.guessed:
         return GUESSED_CLIMB_SD_RAD
@@ -823,7 +824,11 @@ def _trim_throttle_lines(file_parameters: Mapping[str, float], performance: Perf
 
 
 def _climb_names(stated: AircraftParameters) -> list[str]:
-    """Return the file's names of the climb rate and its throttle if that is not full throttle; otherwise []."""
+    """Return the names of the climb rate and its throttle in a file, if the rate is not at full throttle.
+
+    They are the names that the file uses for TECS_CLMB_MAX and THR_MAX.  Returns [] unless both differ from their
+    defaults; the default of THR_MAX is full throttle.
+    """
     names = ("TECS_CLMB_MAX", "THR_MAX")
     return [stated.texts[name].split()[0] for name in names] if stated.values.keys() >= set(names) else []
 

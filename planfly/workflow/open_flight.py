@@ -37,7 +37,8 @@ from world.scenario import Scenario, embedded_names, with_ground_at
 
 # Name of a plan without a file, in messages about its mission.
 PLAN_FILE = "plan.json"
-# Fraction of the battery's charge by which the capacity that an autopilot counts from may differ without a note.
+# Largest difference between the capacity that an autopilot assumes and the battery's charge, as a fraction of this
+# charge; a larger one is noted.
 MAX_CAPACITY_DIFFERENCE = 0.2
 _MAH_PER_AH = 1000.0
 

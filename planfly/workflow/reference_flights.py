@@ -45,9 +45,10 @@ PassesWithAutopilot = Callable[[Autopilot], bool]
 def find_passing_parameter(
     autopilot: Autopilot, findings: tuple[Finding, ...], passes: PassesWithAutopilot
 ) -> DecidingParameter | None:
-    """Find the first parameter that makes the flight pass at another value, and its nearest passing value.
+    """Find an autopilot parameter with which a failed flight passes, and its nearest value that passes.
 
-    Returns None if no parameter does.
+    The parameters that are tried are called candidates.  The autopilot lists them for altitude errors and for
+    cross-track errors.  Returns None if none of them makes the flight pass.
 
     findings: findings of the flight that failed.
     passes: function that flies with the given autopilot and returns True if the flight passes; called about 20 times.
@@ -232,9 +233,10 @@ def passes_with_margin(trial_findings: Sequence[Finding], failed_findings: Seque
 
 
 def _suggested_parameter(verdict: Verdict, passed_trials: Sequence[PassedTrial]) -> DecidingParameter | None:
-    """Return the parameter whose suggested value alone makes a flight pass; None without such a suggestion.
+    """Return the parameter that a passed suggestion changes, if it changes nothing else; otherwise None.
 
-    The parameter acts on the failing leg, so that it is better advice than any other parameter.
+    Such a parameter acts on the failing leg, so it is better advice than a parameter found by other flights.  The
+    verdict must have exactly one failed finding.
     """
     if len(verdict.failed) != 1:
         return None

@@ -140,7 +140,8 @@ def _tighten_slopes(spec: Spec, failed_findings: list[Finding]) -> list[Tighteni
 def _tighten_turns(spec: Spec, scenario: Scenario, failed_findings: list[Finding]) -> list[Tightening]:
     """Tighten the turns in `spec` if turns or corners failed.
 
-    The limit of the scenario is replaced by the limit of the aircraft; if it already is, the bank limit is lowered.
+    A limit that the scenario states is replaced by the limit of the aircraft.  If the limit is already the aircraft's,
+    the bank limit is lowered, but not below `MIN_BANK_DEG`.
     """
     if not any(finding.rule in ("turn", "waypoint", "corridor") for finding in failed_findings):
         return []
