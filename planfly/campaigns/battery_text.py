@@ -98,11 +98,13 @@ def leg_names(result: BatteryResult) -> list[str]:
 
 
 def decision_rows(result: BatteryResult) -> list[tuple[str, str, str]]:
-    """Return a row (part, flights, share) for each part of a flight that decides the battery.
+    """Return a row (part, flights, share) for each part of the flight that decides the battery.
+
+    The end of the mission or a return decides the battery of a flight if it needs the most energy.  The most frequent
+    part comes first.
 
     part: the end of the mission, or a return.
     flights, share: number and percentage of the flights in which this part decides.
-    The most frequent part comes first.
     """
     names, total = leg_names(result), len(result.completed)
     return [

@@ -261,7 +261,7 @@ class BatteryResult:
 
     @property
     def decisions(self) -> tuple[BatteryDecision, ...]:
-        """Parts of a flight that decide the battery, the most frequent first."""
+        """The end of the mission or returns from a leg, with the number of flights that it decides."""
         # Key -1 stands for flights that are decided by the mission, not by a return.
         times_by_leg: dict[int, list[float]] = {}
         for row in self.completed:

@@ -285,7 +285,9 @@ def turn_areas(
 
 
 def areas_between(paths: list[Floats]) -> list[BaseGeometry]:
-    """Return the areas between successive returns, which contain the returns that start between them.
+    """Return an area for each pair of successive returns, bounded by the paths of the two.
+
+    It contains the returns that start between the two.
 
     paths: positions of each return, m, (k, 3).
     """

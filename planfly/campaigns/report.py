@@ -547,7 +547,11 @@ def _lines_without_failures(winds: WindsResult) -> list[str]:
 
 
 def _flown_bound_lines(winds: WindsResult) -> list[str]:
-    """Return what the flights of each direction without a boundary show, with neighbouring directions in one line."""
+    """Return lines on the flown winds of the directions whose boundary is not stated.
+
+    Neighbouring directions with the same text share a line.  Returns [] if all boundaries are stated, or if only calm
+    air was flown.
+    """
     if winds.is_only_calm or all(winds.estimated):
         return []
     texts = [

@@ -707,9 +707,11 @@ def read_path_arrays(path: Path) -> dict[str, NDArray[np.float32]]:
 
 
 def _read_arrays(connection: sqlite3.Connection, name: str, entry_shape: tuple[int, ...]) -> NDArray[np.float32]:
-    """Return the arrays of a column, (n, m, *entry_shape), where m is the length of the longest array.
+    """Return a column of arrays, one row per flight: (n, m) numbers or (n, m, 2) pairs, padded with NaN.
 
-    Shorter arrays are padded with NaN.
+    m is the length of the longest array of a flight.
+
+    entry_shape: shape of an entry: () for a number, (2,) for a pair.
     """
     count, size = connection.execute(f"SELECT COUNT(*), MAX(LENGTH({name})) FROM flights").fetchone()
     arrays = np.full((count, (size or 0) // np.dtype(np.float32).itemsize), np.nan, dtype=np.float32)

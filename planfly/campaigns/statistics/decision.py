@@ -160,7 +160,11 @@ class StoppingBound:
 
     @cached_property
     def parts(self) -> tuple[tuple[float, float, float], ...]:
-        """Weight, a and b of each part of the mixture."""
+        """Weight, a and b of each part of the mixture.
+
+        The a of the first part is `min_flights`.  Its b is found by bisection: the largest value with which
+        `min_flights` flights without a failure still reach the target.
+        """
         scale, min_failures, max_failures = float(self.min_flights), 0.0, 1.0
         for _ in range(_BISECTIONS):
             failures = 0.5 * (min_failures + max_failures)

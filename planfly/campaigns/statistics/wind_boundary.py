@@ -59,7 +59,11 @@ def boundary_quantiles(
 ) -> list[float]:
     """Return quantiles of the boundary's posterior, m/s, from 0 to ``max_speed``.
 
-    draws: possible draws, (m, d), spread evenly even if only the first few are used.
+    Each posterior sample of the coefficients has one boundary.  The quantiles are those of these boundaries, each with
+    the weight of its link.
+
+    fits: failure modes fitted with each link, and the link's weight.
+    draws: possible draws, (m, d); the first few of them are spread as evenly as all.
     failing_fraction: fraction of flights that fail at the boundary, above 0 and below 1.
     probabilities: probability of each quantile, 0 to 1.
 
@@ -86,7 +90,9 @@ def boundary_quantiles(
 def _boundary_speeds(modes: Sequence[FailureMode], draws: Floats, failing_fraction: float, max_speed: float) -> Floats:
     """Return the boundary for each posterior sample of the modes' coefficients, m/s, (n,).
 
-    draws: possible draws, (m, d); the boundary is first bracketed with only some of them.
+    Bisection with the first `_BRACKET_DRAWS` draws brackets each boundary; secant steps with all draws then refine it.
+
+    draws: possible draws, (m, d).
     """
     # The posteriors of the modes are independent: samples of different modes can be combined in any order.
     samples = [
@@ -435,7 +441,7 @@ class _ExpectedPosterior:
     def expected_gains(self, terms: Floats) -> Floats:
         """Return each flight's expected reduction of the boundary's variance, (m/s)^2, (n,).
 
-        Only the variance within the fit is considered.
+        Only the variance within the fit is considered; the reduction is multiplied by the weight of the fit.
 
         terms: regressors of each flight, (n, 2 + d).
         """
