@@ -58,6 +58,7 @@ class PlaceResult(NamedTuple):
         return "" if self.value is None else quantity_text(self.value, self.unit)
 
 
+# Worst result of each rule at each place; the keys are rule and place.
 _Results = dict[tuple[str, PlaceKey], PlaceResult]
 
 
@@ -108,7 +109,7 @@ def flight_results(mission: Mission, route: Route, findings: Iterable[Finding], 
 
 
 def _is_decided_by_plan(finding: Finding) -> bool:
-    """Return True if the margin of a flown place belongs to its planned value, not to its flown value."""
+    """Return True if the margin at a flown place was computed from the planned value, not the flown value."""
     if finding.margin is None or finding.limit is None or finding.planned is None or finding.flown is None:
         return False
     planned_error, flown_error = (
@@ -154,7 +155,10 @@ def _severity_key(result: PlaceResult) -> tuple[bool, int, float]:
 
 
 def _place_key(place: Place, route_items: Sequence[int], order: dict[int, int]) -> tuple[PlaceKey, str]:
-    """Return a key of a place that uses positions in the mission, and a description with item numbers.
+    """Return a key and a description of a place; the key has the positions of its items in the mission.
+
+    An edit renumbers items, so the key has their positions in the list of items instead of their numbers.  The
+    description has the numbers.
 
     route_items: item number of each waypoint.
     order: position of each item number in the mission.

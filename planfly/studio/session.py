@@ -96,7 +96,8 @@ class Session:
     must_autosave: True if options of the command replaced autosaved settings, so that the autosave is written again.
     unused_text: text on autosaved edits that were set aside because the mission file has changed; "" if there are none.
     aircraft_folders: folders of the user's own aircraft that the session has flown, by name.
-    named_parameters: for each autopilot that was flown with a parameter file, the scenario's entries of both, by name.
+    named_parameters: [flight] entries of each autopilot that was flown with a parameter file, by its name; they apply
+    again when this autopilot is chosen again.
     """
 
     document: Document
