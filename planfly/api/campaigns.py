@@ -79,7 +79,10 @@ class CampaignFlight:
 
 
 def _with_stored_options(options: CampaignOptions | WindsOptions, directory: OutputDirectory) -> CampaignOptions:
-    """Return the options of a campaign; those that are not given have the values of a resumed campaign."""
+    """Add the options of a resumed campaign, from its table, to the options that the user gave.
+
+    An option that the user gave replaces the stored option.
+    """
     stored = read_stored_settings(directory.folder / directory.table).get("options", {}) if directory.resume else {}
     # A wind is stored as a list.
     values = {name: tuple(value) if name == "wind" and value else value for name, value in stored.items()}

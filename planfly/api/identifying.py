@@ -203,7 +203,7 @@ def _load_base(base: str | Path) -> Aircraft:
 
 
 def _check_stated_numbers(stated_numbers: dict[str, float], prior: Aircraft) -> None:
-    """Raise FlightError if a number that the user states is out of its range, or too far from the base aircraft's.
+    """Raise FlightError for a stated number that is implausible, or too different from the base aircraft.
 
     Each must be in `_RANGES`, and mass and span within a factor of `_MAX_SIZE_RATIO` of the base aircraft.
 

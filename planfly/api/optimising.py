@@ -294,8 +294,8 @@ def _parse_numbers(name: str, numbers: ArrayLike) -> Floats:
 def _make_priority_levels(violations: int, objectives: int) -> tuple[Level, ...]:
     """Return the priority levels by which scores are ranked: constraints with the goal 0, then objectives.
 
-    A level is a group of columns of the scores; a later level decides only between points that are equal in the earlier
-    ones.
+    A level is a group of columns of the scores; a later level decides only between points that are equally good in the
+    earlier ones.
 
     violations, objectives: numbers of constraints and of objectives.
     """

@@ -247,7 +247,7 @@ def _find_used_end(aircraft: Aircraft, sha256: str, start: float) -> float | Non
 
 
 def draw_flight_variations(aircraft: Aircraft, count: int = DRAWS) -> list[DrawnFlight]:
-    """Draw variations of aircraft, wind, turbulence and position for flights that predict a logged flight.
+    """Draw variations of aircraft, wind, turbulence and position, one set for each predicting flight.
 
     The quantities are drawn as in a campaign with planfly's own dispersions, with two differences: the wind varies by
     the error of a logged wind instead of a forecast, and all levels of turbulence are equally likely.  The position

@@ -54,7 +54,7 @@ def _unknown_reason(result: BatteryResult) -> str:
 
 
 def battery_lines(result: BatteryResult) -> list[str]:
-    """Return the lines below the answer: the aircraft's battery, deciding parts, energy of the legs, and method.
+    """Return the lines below the answer: own battery, what decides the capacity, energies and method.
 
     Return [] if no flight completed the mission.
     """

@@ -238,7 +238,7 @@ class BatteryResult:
 
     @property
     def own_probability(self) -> Interval:
-        """Bounds of the probability that the aircraft's battery keeps the reserve, at the goal's confidence."""
+        """Bounds of the probability that the aircraft's own battery suffices, at the goal's confidence."""
         from scipy import stats
 
         two_sided = 1.0 - 2.0 * (1.0 - self.goal.confidence)
@@ -275,7 +275,10 @@ class BatteryResult:
 
     @property
     def leg_energies(self) -> Floats:
-        """Median energy of each leg over the flights that complete the mission, Wh, (legs,); (0,) if none does."""
+        """Median energy of each leg, Wh, (legs,), over the flights that complete the mission.
+
+        The shape is (0,) if no flight completes the mission.
+        """
         rows = [row.leg_energies for row in self.completed]
         if not rows:
             return np.zeros(0)
@@ -340,7 +343,7 @@ def find_battery(base: CampaignBase, goal: BatteryGoal, workers: Workers, advanc
 def fly_energy_campaign(
     base: CampaignBase, goal: BatteryGoal, workers: Workers, mass_factor: float, advance: Advance
 ) -> tuple[EnergyRow, ...]:
-    """Fly the flights of a campaign, and return rows with the energy of each, in the order of the draws.
+    """Fly the flights of a campaign; return a row with the energies of each, in the order of the draws.
 
     mass_factor: factor on the mass of the aircraft's model.
     advance: called after each flight with the number of flights done, their total and a text.

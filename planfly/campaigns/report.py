@@ -139,7 +139,7 @@ def _draw_pictures(base: CampaignBase, summary: CampaignSummary, store: Store) -
 
 
 def _draw_tracks(base: CampaignBase, store: Store) -> list[tuple[Figure, str]]:
-    """Draw the clearance fan and the crossings of the flights that have a track; return each figure with its title.
+    """Draw the flown heights along the path and the positions at waypoints; return figures and titles.
 
     Return [] if no flight has a track.  There is no clearance fan without terrain.
     """
@@ -482,7 +482,7 @@ def _interval_text(lower: float, upper: float, max_speed: float) -> str:
 
 
 def _unsettled_lines(winds: WindsResult) -> list[str]:
-    """Return lines that state which part of a search is not judged, and why; [] if all of it is judged."""
+    """Return lines that say which directions of a search are not judged, and why; [] if all are judged."""
     reasons = winds.reasons
     word, total = "not judged" if all(reasons) else "not judged in full", len(reasons)
     lines = []

@@ -530,7 +530,7 @@ def _flyable_text(tally: Tally) -> str:
 
 
 def _drivers_text(entry: DecidingRule) -> str:
-    """Return a sentence on the quantities that explain most of the variance of a deciding rule's margin."""
+    """Return a sentence on the causes of the variance of a deciding rule's margin."""
     if not entry.sensitivities:
         return f"At least {MIN_FLIGHTS_FOR_INDEX} judged flights are needed to find what the margin depends on"
     if not entry.drivers:

@@ -50,7 +50,7 @@ ARRAY_COLUMNS = tuple(name for name, column in COLUMN_FIELDS.items() if column.k
 
 
 def _row_columns() -> dict[str, str]:
-    """Return the SQL type of each column, keyed by name, in the order of the fields of `FlightRow`."""
+    """Return the SQL types of a row's columns by name, in the order of the fields of `FlightRow`."""
     columns = {"seed": "INTEGER NOT NULL", **dict.fromkeys(NAMES, "REAL NOT NULL")}
     for name in FlightRow.__dataclass_fields__:
         if name in COLUMN_FIELDS:
@@ -503,7 +503,7 @@ class Store(LockedTable):
 
 
 def _check_column(name: str) -> str:
-    """Return the name of a column; raise KeyError for an unknown name, which must not get into a query."""
+    """Return the name of a column unchanged; raise KeyError for any other text, because it enters a query."""
     if name not in COLUMN_NAMES:
         raise KeyError(name)
     return name
@@ -652,7 +652,7 @@ def read_table(path: Path) -> dict[str, NDArray[Any]]:
 
 
 def with_place_numbers(columns: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
-    """Return a table's columns with kind, index and item of each place in columns of their own, instead of JSON.
+    """Replace each column of places in JSON by three columns: kind, index and item of the place.
 
     The item of a leg is the item to which it leads.  Missing numbers are NaN.
     """

@@ -209,7 +209,7 @@ class _Probe:
     def _evaluate_coefficients(
         self, alpha: float, beta: float = 0.0, rates: Floats | None = None, surfaces: Floats | None = None
     ) -> Floats:
-        """Return (6,): coefficients of drag, lift, side force, roll, pitch and yaw moment, at closed throttle.
+        """Evaluate drag, lift, side force, roll, pitch and yaw moment, as coefficients (6,), without throttle.
 
         alpha, beta: angles of attack and sideslip, rad.
         rates: angular rates p, q, r, rad/s, zero by default.

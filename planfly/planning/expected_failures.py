@@ -33,7 +33,9 @@ _STRIP_STEP_M = 10.0
 
 
 def expected_failures(plan: Plan, uav: Uav) -> tuple[str, ...]:
-    """Return the known causes of failures of a safe plan, each with a remedy; () if the plan is not safe.
+    """Return the reasons to expect that flights of a safe plan fail, each with a remedy.
+
+    The result is empty for a plan that is not safe, and if no reason is known.
 
     >>> from planfly.workflow.uav import load_uav
     >>> from planner.search.plan_path import plan_path

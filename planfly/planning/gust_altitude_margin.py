@@ -120,7 +120,7 @@ def _gusts_displace_aircraft(plan: Plan, uav: Uav) -> bool:
 def _gust_displacements(
     scenario: Scenario, autopilot: Autopilot
 ) -> list[tuple[Gust, Callable[[float, Turbulence], float]]]:
-    """Return pairs of a kind of gust and the function that computes its altitude displacement, m.
+    """Return the kinds of gusts to consider, each with the function that computes its displacement, m.
 
     The function's arguments are the climb or sink rate that the aircraft holds in reserve (m/s) and the turbulence.
     Updrafts are considered only if the scenario has zones or a maximum height.
@@ -280,7 +280,7 @@ class _Parts(NamedTuple):
 
 
 def find_shortfalls(plan: Plan, uav: Uav) -> list[Shortfall]:
-    """Find the places where each kind of gust displaces the aircraft deepest into each kind of hazard.
+    """Find for each kind of gust and hazard the place where the aircraft is displaced deepest into it.
 
     Hazards are the required clearance, the maximum height, missiles and zones.  Only displacements into a hazard are
     returned.

@@ -83,7 +83,7 @@ def _start_process(folder: Path) -> "subprocess.Popen[str]":
 def _feed_process(
     process: "subprocess.Popen[str]", remaining_units: "deque[str]", lines: "queue.SimpleQueue[str]"
 ) -> None:
-    """Send a process the names of units, one after another, and queue the lines that the process prints.
+    """Send unit names to a process, one after another, and queue the lines that it prints.
 
     `_END_OF_OUTPUT` is queued when no unit remains or the process has died.
     """

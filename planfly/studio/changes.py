@@ -76,7 +76,7 @@ class FlightResults(NamedTuple):
 
 
 def flight_results(mission: Mission, route: Route, findings: Iterable[Finding], seconds: float) -> FlightResults:
-    """Collect the worst result of each rule at each place of a flight, over all laps that were flown.
+    """Collect a flight's result for each rule and place; the worst one if a place was flown repeatedly.
 
     seconds: duration of the flight, s.
     """
@@ -332,7 +332,7 @@ def _quantity_name(rule: str) -> str:
 
 
 def _value_changes(old_results: _Results, new_results: _Results) -> list[str]:
-    """Return lines on continued failures whose value changed, then on rules whose smallest margin changed.
+    """Return lines on values that changed: of failures that continue, and of the closest place of a rule.
 
     At most `_MAX_VALUE_CHANGES` lines of each kind are returned, the largest changes of margin first.
     """

@@ -184,7 +184,7 @@ class Session:
 
     @property
     def undo_text(self) -> str:
-        """Text of the next undo, which may be the opening of a document; "" if there is nothing to undo."""
+        """Text of the next undo, which may be "open" and a document; "" if there is nothing to undo."""
         return self.history.undo_text or (f"open {self.document.name}" if self.earlier_states else "")
 
     @property

@@ -105,7 +105,7 @@ class ChangedParameters:
 
 
 def own_aircraft(scenario: Scenario) -> dict[str, str]:
-    """Return the folder of a scenario's aircraft by the aircraft's name; empty for an embedded aircraft."""
+    """Return {name: folder} of a scenario's aircraft if it has its own folder; {} if it is built in."""
     folder = scenario.flight.aircraft
     return {Path(folder).name: folder} if names_folder(folder) else {}
 

@@ -72,7 +72,10 @@ def fly(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any
 
 
 def try_planned_suggestions(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any]:
-    """Try the suggestions of a mission's geometric verdict; return those that pass, as `try_flown_suggestions`."""
+    """Try the suggestions of a mission's geometric verdict, without flights.
+
+    The result is that of `try_flown_suggestions`.
+    """
     context, mission = payload
     return _try_suggestions(context, context.judge(mission), advance)
 
@@ -90,7 +93,7 @@ def try_flown_suggestions(payload: tuple[EditContext, bytes], advance: Advance) 
 
 
 def _try_suggestions(context: EditContext, judged_mission: JudgedMission, advance: Advance) -> dict[str, Any]:
-    """Try the suggestions of a verdict; return those that pass, as described in `try_flown_suggestions`."""
+    """Try the suggestions of a verdict; the result is that of `try_flown_suggestions`."""
 
     def report_and_continue() -> bool:
         """Report that suggestions are tried; return False, so that the trials are not aborted."""

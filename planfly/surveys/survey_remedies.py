@@ -331,7 +331,7 @@ class _Trials:
         return SurveyRemedy("trigger", "", current, shortest, "m", *flight) if self._is_remedy(flight) else None
 
     def try_height(self) -> SurveyRemedy | None:
-        """Try the lowest height, in whole m, at which the photos that are flown have the required overlaps.
+        """Try the lines higher, by the fewest whole metres that give the flown photos the required overlaps.
 
         Returns None if no overlap fails, or if the flight does not pass.
         """
@@ -661,7 +661,7 @@ class _Trials:
 
 
 def missing_height(measure: OverlapMeasure) -> float:
-    """Return how much higher a flight must be so that its lowest photos have the required overlaps, m.
+    """Return the climb with which the lowest photos have the required overlaps, m.
 
     The distances between photos and between lines stay as flown.  Returns 0 if the overlaps are large enough.
     """

@@ -179,7 +179,7 @@ class _EditedMission:
         self.offsets: dict[int, Floats] = {}
 
     def item_index(self, waypoint: int) -> int | None:
-        """Return the index of a waypoint's item in the mission's list, or None if the waypoint has no item."""
+        """Return the index of a waypoint's item in the list of items; None for a waypoint without an item."""
         seq = int(self.route.items[waypoint])
         indices = [index for index in movable_indices(self.mission) if self.mission.items[index].seq == seq]
         return indices[0] if indices else None
@@ -338,14 +338,17 @@ def _change_altitude(edited: _EditedMission, change: Change, finding: Finding) -
 
 
 def _set_home_altitude(edited: _EditedMission, change: Change, _finding: Finding) -> None:
-    """Set the altitude of home, relative to which the altitudes of items are stated."""
+    """Set the altitude of home; items with an altitude above home move with it."""
     if edited.mission.home is not None and edited.mission.home.alt != change.wanted:
         edited.mission = replace(edited.mission, home=replace(edited.mission.home, alt=change.wanted))
         edited.is_changed = True
 
 
 def _set_altitude_frame(edited: _EditedMission, change: Change, _finding: Finding) -> None:
-    """Change the altitude frame of items that fit the terrain only in the other frame; keep their numbers."""
+    """Change the altitude frame of the items that seem misread, but not their numbers.
+
+    An item seems misread if it fits the terrain only in the other frame.
+    """
     scenario, mission, frame = edited.requirements.setup.scenario, edited.mission, Frame(int(change.wanted))
     below_ground, too_high = find_misread_altitudes(mission, scenario.origin, scenario.terrain)
     items, readings = list(mission.items), too_high if frame == Frame.GLOBAL else below_ground

@@ -442,7 +442,7 @@ def _has_margin(finding: Finding, suggestion: Suggestion, verdict: Verdict) -> b
 
 
 def _zone_shortfall(finding: Finding, verdict: Verdict) -> float:
-    """Return how much closer to a finding's zone a path passes than the navigation error allows, m.
+    """Return the distance by which a path passes the zone of a finding too closely, m.
 
     Returns 0 if no other finding of the verdict names this zone as the nearest zone.
     """
@@ -459,7 +459,7 @@ def suggested_parameters(suggestion: Suggestion) -> dict[str, float]:
 
 
 def _has_passing_part(passed_trials: Sequence[PassedTrial], finding: Finding, suggestion: Suggestion) -> bool:
-    """Return True if a part of a finding's suggestion passes by itself, whatever the sizes of its changes."""
+    """Return True if some changes of a finding's suggestion pass without the others."""
 
     def change_keys(changes: Suggestion) -> set[object]:
         """Return what identifies changes, except their sizes."""
@@ -504,7 +504,7 @@ def _larger_suggestion(finding: Finding, suggestion: Suggestion, verdict: Verdic
 
 
 def _add_needed_change(suggestion: Suggestion, open_finding: Finding) -> Suggestion | None:
-    """Add to a suggestion the change of the same kind that an open finding needs; None without such a change."""
+    """Enlarge a suggestion by what an open finding still needs; None if it needs another kind of change."""
     kinds = {change.what for change in suggestion}
     for needed_suggestion in open_finding.suggestions:
         if {change.what for change in needed_suggestion} == kinds:

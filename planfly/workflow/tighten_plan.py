@@ -100,7 +100,7 @@ def tighten_limits(scenario: Scenario, verdict: Verdict) -> tuple[Scenario, list
 
 
 def _limits_table(spec: Spec) -> Spec:
-    """Return the table of limits of a scenario's content, which is added if missing."""
+    """Return the [limits] table of a scenario's content; add an empty one if it is missing."""
     return spec.setdefault("limits", {})
 
 
@@ -207,7 +207,7 @@ def _widen_zone_margin(spec: Spec, scenario: Scenario, failed_findings: list[Fin
 
 
 def _enlarge_missile_spheres(spec: Spec, failed_findings: list[Finding]) -> list[Tightening]:
-    """Enlarge the kill radii in `spec` of missiles whose spheres only the flight, not the plan, entered."""
+    """Enlarge the kill radii in `spec` of the missiles that the flight came too close to, unlike the plan."""
     changes = []
     for finding in failed_findings:
         if finding.planned:

@@ -206,7 +206,10 @@ class StoppingBound:
         return is_beyond and self.evidence(successes, failures, p) >= self._required_evidence
 
     def interval(self, successes: int, failures: int) -> Interval:
-        """Return the interval of all p that are not excluded; it contains the fraction of successes."""
+        """Return the interval of the probabilities p that the flights do not exclude.
+
+        It contains the fraction of successes.
+        """
         trials = successes + failures
         if not trials:
             return Interval(0.0, 1.0)
@@ -216,7 +219,7 @@ class StoppingBound:
         return Interval(lower, upper)
 
     def _find_edge(self, successes: int, failures: int, excluded: float, included: float) -> float:
-        """Find the edge of the values of p that are not excluded, by bisection.
+        """Find by bisection the edge between the excluded and the other probabilities p.
 
         excluded, included: an excluded value, and a value that is not excluded.
         """
@@ -330,7 +333,7 @@ class Estimator:
         return is_reached or bound.excludes(tally.flyable + tally.unknown, tally.failed, target, above=False)
 
     def deciding_flights(self, tally: Tally) -> int | None:
-        """Return the number of flights that would decide the target if the fractions of all outcomes stay the same.
+        """Return the number of flights that would decide the target with the present fractions of outcomes.
 
         Return None for more than `MAX_DECIDING_FLIGHTS`.
         tally: at least one flight, with which the target is undecided.

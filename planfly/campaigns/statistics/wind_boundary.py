@@ -334,7 +334,7 @@ _LARGEST_WIND_TOLERANCE_MPS = 0.3
 
 
 def next_flights(direction: Direction, count: int) -> list[tuple[float, int]]:
-    """Return the wind, m/s, and the index of the draw of the next `count` flights of a direction.
+    """Choose the next `count` flights of a direction: wind, m/s, and index of the draw of each.
 
     As long as all flights have the same outcome, the wind is chosen by bisection.  After that, the flights are chosen
     that are expected to reduce the variance of the boundary most.
@@ -379,7 +379,7 @@ def _next_draws(direction: Direction, count: int, other_draws: list[int]) -> lis
 
 
 def _choose_most_informative(direction: Direction, count: int) -> list[tuple[float, int]]:
-    """Return the wind, m/s, and the index of the draw of the `count` most informative flights of a direction.
+    """Choose the `count` most informative flights of a direction: wind, m/s, and index of the draw.
 
     Each flight is chosen as if the previous ones had been flown.
     """
@@ -415,7 +415,7 @@ def _choose_most_informative(direction: Direction, count: int) -> list[tuple[flo
 
 
 def _expected_between_fit_reductions(fits: tuple[FailureFit, ...], terms: Floats) -> Floats:
-    """Return each flight's expected reduction of the boundary's variance between the fits, (m/s)^2, (n,).
+    """Return the variance between the fits that each flight is expected to remove, (m/s)^2, (n,).
 
     The fits are alternative models, and the outcome of a flight makes one of them more likely.  The reduction is the
     variance, over the two outcomes of a flight, of the mean boundary given the outcome.
@@ -439,7 +439,7 @@ class _ExpectedPosterior:
         self._covariances = [mode.covariance for mode in fit.modes]
 
     def expected_gains(self, terms: Floats) -> Floats:
-        """Return each flight's expected reduction of the boundary's variance, (m/s)^2, (n,).
+        """Return the variance of the boundary that each flight is expected to remove, (m/s)^2, (n,).
 
         Only the variance within the fit is considered; the reduction is multiplied by the weight of the fit.
 
