@@ -231,6 +231,7 @@ def _with_missing_ends_note(
 
     autopilot: name of the autopilot that the user named, which replaces that of the source; "" if the user named none.
     params: parameter file of the named autopilot, whose requirement applies.
+    targets: files to write; without a mission file among them there is no note.
     """
     source_autopilot = source.mission.autopilot if source.autopilot is None else source.autopilot.checks.dialect
     has_items = any(target.suffix.lower() in _MISSION_SUFFIXES for target in targets)

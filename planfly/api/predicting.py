@@ -215,6 +215,8 @@ def _choose_judged_start(
     The default is the end of the part from which the aircraft was identified, or the middle of a log that was not used
     for the identification.  Raises LogError if the aircraft was identified from the whole log, and PlanflyError for a
     start within the part from which it was identified.
+
+    records: usable segments of the log.
     """
     first_time, last_time = motion.inertial.time[[0, -1]].tolist()
     used = _find_used_end(aircraft, motion.sha256, first_time)

@@ -97,6 +97,8 @@ class EnergyRow(FlightRow):
         """Return the smallest nominal capacity that leaves a fraction of the battery unused, Wh.
 
         It is inf if a return does not arrive with any battery, and NaN if an energy is unknown.
+
+        reserve: fraction of the battery that is to be left.
         """
         if self.unknown_returns and not math.isinf(self.return_energy):
             return math.nan
@@ -372,6 +374,8 @@ def quantile_of_capacities(rows: tuple[EnergyRow, ...], goal: BatteryGoal) -> tu
     The capacity is a quantile of the capacities that the flights need; its interval follows from order statistics.
     The capacity or a bound is inf if no battery is enough.  All three are NaN if too few flights have a known energy to
     reach the goal's probability.
+
+    rows: the flights, each with its energies.
     """
     from scipy import stats
 

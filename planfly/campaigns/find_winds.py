@@ -442,6 +442,8 @@ class _Search:
         """Return the failures in the weakest flown wind of the directions whose boundary is calm air.
 
         Return None if no boundary is calm air, or if the weakest flown wind is stronger than `NEARLY_CALM_MPS`.
+
+        boundaries: boundary of each direction.
         """
         calm_directions = {number for number, boundary in enumerate(boundaries) if boundary.estimate < CALM_MPS}
         numbered_flights = [

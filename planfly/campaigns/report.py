@@ -475,7 +475,10 @@ def _speed_text(speed: float, max_speed: float) -> str:
 
 
 def _interval_text(lower: float, upper: float, max_speed: float) -> str:
-    """Return an interval of the boundary as text; bounds beyond the maximum wind are "over" that wind."""
+    """Return an interval of the boundary as text; bounds beyond the maximum wind are "over" that wind.
+
+    lower, upper, max_speed: m/s.
+    """
     if lower >= max_speed - 1e-9:
         return f"over {max_speed:g}"
     return f"{lower:.1f} to {f'over {max_speed:g}' if upper >= max_speed - 1e-9 else f'{upper:.1f}'}"
@@ -570,7 +573,11 @@ def _flown_bound_lines(winds: WindsResult) -> list[str]:
 
 
 def _bounds_text(flyable: float | None, failed: float | None) -> str:
-    """Return the text of the strongest wind without a failure and of the weakest wind with one, m/s."""
+    """Return the text of the strongest wind without a failure and of the weakest wind with one, m/s.
+
+    flyable: strongest wind without a failure up to it; None if there is none.
+    failed: weakest wind with a failure; None if there is none.
+    """
     if failed is None:
         return "not enough flights" if flyable is None else f"at least {flyable:.1f} m/s"
     return f"below {failed:.1f} m/s" if flyable is None else f"between {flyable:.1f} and {failed:.1f} m/s"

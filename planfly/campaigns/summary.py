@@ -239,6 +239,9 @@ def _deciding_rules(margins: Mapping[str, Floats], by_rule: tuple[RuleFailures, 
 
     Without failures, it is the rule with the smallest ratio of mean margin to standard deviation.  Returns () if no
     margin is known.
+
+    margins: margin of each flight, (n,), for each rule.
+    by_rule: failures by rule and place.
     """
     if by_rule:
         return deciding_rules(by_rule)
@@ -254,7 +257,13 @@ def _deciding_rules(margins: Mapping[str, Floats], by_rule: tuple[RuleFailures, 
 def _rank_rules(
     store: Store, margins: Mapping[str, Floats], by_rule: tuple[RuleFailures, ...]
 ) -> tuple[RankedRule, ...]:
-    """Return the ranking of the rules; it includes failed rules without a margin."""
+    """Return the rules in the order of how close the flights came to failing them.
+
+    Rules that flights failed come first, the most flights first; they are included even without a margin.
+
+    margins: margin of each flight, (n,), for each rule: NaN if not judged, -inf if failed by an unknown margin.
+    by_rule: failures by rule and place.
+    """
     failed_counts = {failures.rule: failures.flights for failures in by_rule}
     ranked = []
     for rule, rule_margins in margins.items():

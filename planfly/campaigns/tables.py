@@ -247,7 +247,10 @@ class LockedTable:
                 )
 
     def _repair_file(self, stored_settings: dict[str, str]) -> None:
-        """Rewrite the file with the undamaged flights, and report the damaged flights."""
+        """Rewrite the file with the undamaged flights, and report the damaged flights.
+
+        stored_settings: entries of the file's table ``campaign``, of which "settings" states the number of flights.
+        """
         # A search may have been resumed with fewer flights than the table contains; all of them are kept.
         requested_count = json.loads(stored_settings["settings"]).get("flights", _MAX_FLIGHTS)
         # Largest flight number that can be read from either end of a damaged table; -1 without any.

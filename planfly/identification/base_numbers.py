@@ -271,6 +271,8 @@ def _read_propeller_disc(functions: dict[str, ElementTree.Element], volts: float
     """Return the propeller disc of a model, from its JSBSim functions by name.
 
     Raises KeyError or ValueError for functions of another form.
+
+    volts: nominal voltage of the battery, V.
     """
     exit_function, thrust_function, power = (
         functions[f"motor/{name}"] for name in ("exit-mps", "thrust-n", "battery-power-w")
@@ -289,6 +291,8 @@ def _read_electric_motor(functions: dict[str, ElementTree.Element], volts: float
     """Return the electric motor of a model, from its JSBSim functions by name.
 
     Raises KeyError, ValueError, IndexError or StopIteration for functions of another form.
+
+    volts: nominal voltage of the battery, V.
     """
 
     def read_numbers(name: str) -> list[float]:

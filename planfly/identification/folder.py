@@ -361,6 +361,7 @@ def _format_quantity(name: str, unit: str, numbers: tuple[float, float, float, f
 
     numbers: prior, standard deviation of the prior, estimate, standard deviation of the estimate, and the fraction of
         the prior variance that the logs removed.
+    reason: sentence that says what the quantity is.
     """
     prior, prior_sd, value, sd, log_share = numbers
     return [

@@ -279,6 +279,9 @@ def _replace_entries(saved_spec: Json, opened_spec: Json, table: str, keys: tupl
     """Replace entries in a table of a saved scenario by the entries of the opened scenario.
 
     Returns a text with both values for each entry that was different.
+
+    table: name of the table, such as "flight".
+    keys: keys of the entries in this table.
     """
     replaced, saved, opened = [], saved_spec.setdefault(table, {}), opened_spec.get(table, {})
     for key in keys:

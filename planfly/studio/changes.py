@@ -79,6 +79,7 @@ def flight_results(mission: Mission, route: Route, findings: Iterable[Finding], 
     """Collect a flight's result for each rule and place; the worst one if a place was flown repeatedly.
 
     seconds: duration of the flight, s.
+    findings: findings of the flight's verdict.
     """
     item_contents = tuple((float(item.command), item.lat_deg, item.lon_deg, item.alt) for item in mission.items)
     order = {item.seq: k for k, item in enumerate(mission.items)}

@@ -415,7 +415,10 @@ class Session:
         ), f"insert an item after {previous_item.seq}"
 
     def _delete_items(self, indices: list[int]) -> tuple[Mission, str]:
-        """Return the mission without some items, and a description of the edit."""
+        """Return the mission without some items, and a description of the edit.
+
+        indices: indices in the mission's list of items.
+        """
         mission = self.mission
         for index in sorted(set(indices), reverse=True):
             mission = edits.delete_item(mission, index)

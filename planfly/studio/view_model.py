@@ -252,14 +252,22 @@ def route_json(mission: Mission, route: Route, first: int, last: int) -> Json:
 
 
 def _leg_paths(points: Floats, legs: NDArray[np.int64], first: int, last: int) -> list[list[float]]:
-    """Return the path of each leg as a flat list, m: east, north, up of the first point, then the next."""
+    """Return the path of each leg as a flat list, m: east, north, up of the first point, then the next.
+
+    points: points of the path, (p, 3), m.
+    legs: number of the leg on which each point lies, (p,).
+    first, last: first and last waypoint; the legs between them are returned.
+    """
     edges = np.searchsorted(legs, np.arange(first, last + 1))
     rounded_points = np.round(points, 1)
     return [rounded_points[start : end + 1].ravel().tolist() for start, end in pairwise(edges.tolist())]
 
 
 def states_json(states: PlaceStates, first: int, last: int) -> Json:
-    """Return page data of the legs and corners between two waypoints, each as its state, text and closeness."""
+    """Return page data of the legs and corners between two waypoints, each as its state, text and closeness.
+
+    first, last: numbers of the two waypoints in the route.
+    """
     return {
         "legs": [_state_data(states.legs.get(k, _OK_STATE)) for k in range(first, last)],
         "corners": [_state_data(states.corners.get(k, _OK_STATE)) for k in range(first, last + 1)],

@@ -48,6 +48,8 @@ def fly(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any
 
     The findings have no suggestions.  "judged" is the pickled flight for `try_flown_suggestions`, or empty if nothing
     failed.
+
+    payload: the editing context, and the mission.
     """
     context, mission = payload
     setup = context.setup(mission)
@@ -75,6 +77,8 @@ def try_planned_suggestions(payload: tuple[EditContext, Mission], advance: Advan
     """Try the suggestions of a mission's geometric verdict, without flights.
 
     The result is that of `try_flown_suggestions`.
+
+    payload: the editing context, and the mission.
     """
     context, mission = payload
     return _try_suggestions(context, context.judge(mission), advance)

@@ -415,6 +415,9 @@ class _Trials:
 
         The search is a bisection.  A distance is too long if the flight runs out of energy before its end.
         turn_arounds: distances to try, in increasing order, m.
+
+        stride: interleave stride; 1 flies the lines in order.
+        lead_in: distance before the first line if it is longer than the turn-around distance, m.
         """
         order_text = "" if stride == 1 else f"every {ordinal_text(stride)} line, "
         flights: dict[float, _TrialFlight | None] = {}

@@ -38,6 +38,8 @@ def is_line_unknown(measure: LineMeasure | None) -> bool:
 def lines_headline(measures: list[LineMeasure | None]) -> str:
     """Return one line with the number of usable photo lines, and the worst line if some are not usable.
 
+    measures: measure of each line, in the order flown; None for a line that was not flown.
+
     >>> lines_headline([None, None])
     '0 of 2 photo lines can be used; line 1 is the worst: not flown'
     """

@@ -124,7 +124,10 @@ def read_aircraft_parameters(file: Path) -> AircraftParameters:
 
 
 def _arduplane_value(entries: Mapping[str, Entry], name: str) -> tuple[float, float, str] | None:
-    """Return value, default and text ("NAME value") of an ArduPlane parameter; None if not in the file."""
+    """Return value, default and text ("NAME value") of an ArduPlane parameter; None if not in the file.
+
+    entries: entries of the parameter file, by name; it may state the parameter under its former name.
+    """
     definition = next((candidate for candidate in DEFINITIONS.values() if candidate.name == name), None)
     if definition is None or name not in _USED_PARAMETERS:
         return None
@@ -137,7 +140,11 @@ def _arduplane_value(entries: Mapping[str, Entry], name: str) -> tuple[float, fl
 
 
 def _px4_value(entries: Mapping[str, Entry], name: str) -> tuple[float, float, str] | None:
-    """Return value, default (in ArduPlane's unit) and text of a PX4 parameter; None if not in the file."""
+    """Return value, default (in ArduPlane's unit) and text of a PX4 parameter; None if not in the file.
+
+    entries: entries of the parameter file, by PX4's names.
+    name: ArduPlane's name of the parameter.
+    """
     px4_name, factor = (_PX4_STALL[0], 1.0) if name == "AIRSPEED_STALL" else FROM_ARDUPILOT[name]
     if px4_name not in entries:
         return None

@@ -112,6 +112,8 @@ def _nearest_passing_value(
 
     The search begins at `farthest`; if this value fails, it begins halfway, because a parameter can also be changed too
     much.  Returns None if both fail.
+
+    passes: function that flies with a value of the parameter and returns True if the flight passes.
     """
     step_count = int(abs(farthest - current) / step + 1e-6)
     sign = 1.0 if farthest > current else -1.0
@@ -128,6 +130,8 @@ def _deviation_at_failure(failed_finding: Finding, findings: tuple[Finding, ...]
 
     The result is also None for an altitude error in the other direction, which does not explain the failure: an
     aircraft that is too near to the ground may be above its leg.
+
+    findings: all findings of the flight, whose facts state the errors.
     """
     place, rule = failed_finding.place, failed_finding.rule
     if rule == "corridor":

@@ -267,7 +267,10 @@ def refine(
 
 
 def _next_step_remark(verdict: Verdict, was_flown: bool, is_last: bool, changes: list[Tightening]) -> str:
-    """Return the remark on the step after a round: `NEXT_ROUND_REMARK` or the reason to end."""
+    """Return the remark on the step after a round: `NEXT_ROUND_REMARK` or the reason to end.
+
+    changes: limits that were tightened after the round.
+    """
     if verdict.flyable:
         return "done: the plan is flyable"
     if verdict.undecided:

@@ -192,6 +192,8 @@ class StoppingBound:
 
         E(p) is the ratio of the mixture's likelihood to the likelihood of p.  p is excluded if the logarithm is at
         least ``-log(1 - confidence)``.
+
+        successes, failures: numbers of flights.
         """
         likelihood = _times_log(successes, p) + _times_log(failures, 1.0 - p)
         return _log_mixture(self.parts, successes, failures) - likelihood
@@ -200,6 +202,7 @@ class StoppingBound:
         """Return True if the success probability is proven to be above p, or below p if `above` is False.
 
         p: tested success probability, 0 to 1.
+        successes, failures: numbers of flights.
         """
         fraction = successes / max(1, successes + failures)
         is_beyond = fraction > p if above else fraction < p
@@ -222,6 +225,7 @@ class StoppingBound:
         """Find by bisection the edge between the excluded and the other probabilities p.
 
         excluded, included: an excluded value, and a value that is not excluded.
+        successes, failures: numbers of flights.
         """
         for _ in range(_BISECTIONS):
             candidate = 0.5 * (excluded + included)
@@ -252,6 +256,7 @@ def _log_mixture(parts: tuple[tuple[float, float, float], ...], successes: int, 
     """Return the log-likelihood of outcomes under a mixture of beta distributions.
 
     parts: weight, a and b of each distribution.
+    successes, failures: numbers of flights.
     """
     from scipy.special import betaln
 

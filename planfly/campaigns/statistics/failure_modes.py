@@ -267,6 +267,8 @@ def boundary_speed(modes: Sequence[FailureMode], draws: Floats, failing_fraction
 
     draws: the drawn quantities, (m, d).
     failing_fraction: the fraction of the draws, 0 to 1.
+    modes: fitted failure modes for one link; a flight succeeds if it fails in none of them.
+    max_speed: strongest wind of the search, m/s.
     """
     mode_predictors = [
         (mode.link, make_regressors(WIND_ORIGIN_MPS, draws) @ mode.mean, float(mode.mean[1])) for mode in modes
@@ -307,6 +309,7 @@ def failure_fraction(modes: Sequence[FailureMode], draws: Floats, speed: float) 
 
     draws: drawn quantities, (m, d).
     speed: wind speed, m/s.
+    modes: fitted failure modes for one link.
     """
     terms = make_regressors(speed, draws)
     predictors = [terms @ mode.mean for mode in modes]

@@ -67,6 +67,8 @@ def _score_deviation(only_first: int, only_second: int, pairs: int, difference: 
 
     The probability that only the first trial succeeds is estimated by maximum likelihood for this difference: it is the
     larger root of Tango's quadratic equation.
+
+    difference: true difference of the success probabilities, second minus first.
     """
     a = 2.0 * pairs
     b = -only_second - only_first + (2.0 * pairs - only_second + only_first) * difference

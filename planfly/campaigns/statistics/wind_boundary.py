@@ -93,6 +93,9 @@ def _boundary_speeds(modes: Sequence[FailureMode], draws: Floats, failing_fracti
     Bisection with the first `_BRACKET_DRAWS` draws brackets each boundary; secant steps with all draws then refine it.
 
     draws: possible draws, (m, d).
+    modes: fitted failure modes for one link.
+    failing_fraction: fraction of the flights that fail at the boundary, 0 to 1.
+    max_speed: strongest wind of the search, m/s.
     """
     # The posteriors of the modes are independent: samples of different modes can be combined in any order.
     samples = [
@@ -468,6 +471,8 @@ class _ExpectedPosterior:
         """Yield for each mode the Fisher information of flights, (n,).
 
         A failure in an earlier mode leaves no information on a later mode.
+
+        terms: regressors of each flight, (n, 2 + d).
         """
         reach_probability: Floats = np.ones(len(terms))
         for mode in self._fit.modes:
