@@ -301,7 +301,10 @@ class NamedFences:
     rally: tuple[MissionItem, ...] = ()
 
     def add_to_mission(self, mission: Mission) -> Mission:
-        """Add fence and rally points to a mission; warnings state that those of the mission still apply."""
+        """Add the named fences and rally points to a mission, which is unchanged without any.
+
+        Warnings say that the fences and rally points of the mission still apply.
+        """
         if not self.items and not self.rally:
             return mission
         warnings = mission.warnings

@@ -479,6 +479,8 @@ def find_ground_risk(base: CampaignBase, goal: GroundRiskGoal, workers: Workers,
 def with_ground_class(result: GroundRiskResult) -> GroundRiskResult:
     """Return a result with the population of its footprint and its ground risk class.
 
+    The class stays None if the population is not known.
+
     Raises PlanflyError for a population raster that cannot be used.
     """
     goal, aircraft = result.goal, result.aircraft

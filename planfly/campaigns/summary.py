@@ -279,7 +279,7 @@ def _rank_rules(
 
 
 def _margin_unit(store: Store, rule: str) -> str:
-    """Return the unit of a rule's margins in a table, taken from the first flight that has one."""
+    """Return the unit of a rule's margins: that of the first flight with one, or else the usual unit."""
     words = RULE_WORDS[rule]
     place_json = store.first_text(words.place_column)
     if place_json is not None:

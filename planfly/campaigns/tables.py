@@ -247,7 +247,7 @@ class LockedTable:
                 )
 
     def _repair_file(self, stored_settings: dict[str, str]) -> None:
-        """Rewrite the file with the undamaged flights, and report the damaged flights.
+        """Rewrite a damaged file with its undamaged flights, and report the damaged flights.
 
         stored_settings: entries of the file's table ``campaign``, of which "settings" states the number of flights.
         """

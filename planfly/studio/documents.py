@@ -325,7 +325,10 @@ def _lost_settings(opened_setup: FlightSetup, context: EditContext) -> tuple[str
 
 
 def _lost_parameters(context: EditContext) -> tuple[str, ...]:
-    """Return a line on the autopilot parameters set in the studio, which only a parameter file can store."""
+    """Return a line on the autopilot parameters set in the studio, which only a parameter file can store.
+
+    Returns () if no parameter was set.
+    """
     count = len(context.parameters.values)
     return (f"{count_text(count, 'parameter')} set in the studio: only a .parm contains them",) if count else ()
 

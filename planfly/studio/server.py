@@ -274,7 +274,10 @@ class Server:
         return {**self.session.mission_message(), "planning": self.jobs.is_planning_first_path(self.session)}
 
     async def _send_ground(self, page: Page) -> None:
-        """Send the terrain of the current world to a page, once for each world and each color scheme."""
+        """Send the terrain of the current world to a page, once for each world and each color scheme.
+
+        Nothing is sent for a world without terrain.
+        """
         terrain, world_message = self.session.context.scenario.terrain, self.session.world_message()
         key = (hash(json.dumps(world_message["shown"])), page.dark)
         if terrain is None or page.sent_ground == key:
@@ -361,7 +364,10 @@ class Server:
                 await self._change_session(message)
 
     async def _change_session(self, message: messages.Message) -> None:
-        """Change the session as a message requests, send the result to every page, and start a flight."""
+        """Change the session as a message requests, send the result to every page, and start a flight.
+
+        If the message changes nothing, nothing is sent or started.
+        """
         session = self.session
         async with self._change_lock:
             rev, world_rev = session.rev, session.world_rev

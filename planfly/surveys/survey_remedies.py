@@ -606,6 +606,8 @@ class _Trials:
     def try_default_airspeed(self) -> SurveyRemedy | None:
         """Try longer turn-around distances with the default airspeed, if the mission sets a too low airspeed.
 
+        Returns None if the mission sets none, or if no distance passes.
+
         An airspeed is too low if it is below the minimum airspeed of the aircraft.
         """
         mission, default_airspeed = self._setup.mission, self._uav.airspeed

@@ -361,6 +361,8 @@ def _set_altitude_frame(edited: _EditedMission, change: Change, _finding: Findin
 def _follow_ground(edited: _EditedMission, change: Change, _finding: Finding) -> None:
     """State the altitude of a leg's end as a height above terrain.
 
+    The mission is not changed without a terrain, or if the end has no item.
+
     If the start of the leg is below the required height, it is raised in its own altitude frame, because another leg
     leads to it.
     """
@@ -413,7 +415,10 @@ def _move_inside_area(edited: _EditedMission, change: Change, _finding: Finding)
 
 
 def _move_away_from_missile(edited: _EditedMission, change: Change, finding: Finding) -> None:
-    """Move the waypoints near a missile so that the nearest point of their legs moves away from it."""
+    """Move the waypoints near a missile so that the nearest point of their legs moves away from it.
+
+    The mission is not changed if no leg violates the missile's sphere.
+    """
     missile = edited.context.scenario.threats.position[change.place.index or 0, :2]
     legs, points = violated_legs(edited.requirements, finding), edited.waypoint_positions()
     if not legs:
@@ -461,7 +466,10 @@ def _move_sideways(edited: _EditedMission, change: Change, finding: Finding) -> 
 
 
 def _land_from_other_end(edited: _EditedMission, _change: Change, _finding: Finding) -> None:
-    """Turn the items of the last landing sequence by half a turn about the landing point."""
+    """Turn the last landing sequence by half a turn about the landing point.
+
+    The landing then leads over the strip in the opposite direction.  A mission without a landing is not changed.
+    """
     mission, movable = edited.mission, movable_indices(edited.mission)
     landings = [index for index in movable if mission.items[index].command in LANDINGS]
     waypoints = {edited.item_index(waypoint): waypoint for waypoint in range(edited.route.legs + 1)}

@@ -127,6 +127,8 @@ def finish_plan(plan: Plan, uav: Uav, *, continues: bool = False, keeps_waypoint
 def _add_ground_phases(plan: Plan, uav: Uav, old_plan: Plan | None = None, *, continues: bool) -> Plan:
     """Add departure and approach to a plan, and complete its certificate.
 
+    The departure and the approach are those that the scenario requires.
+
     The certificate then names the hazards near the final loiter, and the slopes and turns that cannot be flown in the
     local wind.
 

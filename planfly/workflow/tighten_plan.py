@@ -177,7 +177,10 @@ def _raise_clearance(spec: Spec, scenario: Scenario, failed_findings: list[Findi
 
 
 def _lower_max_height(spec: Spec, scenario: Scenario, failed_findings: list[Finding]) -> list[Tightening]:
-    """Lower the maximum height above ground in `spec` if the flight exceeded it and can fly lower."""
+    """Lower the maximum height above ground in `spec` if the flight exceeded it and can fly lower.
+
+    Returns this change in a list; [] if nothing is changed.
+    """
     current = scenario.limits.max_height_m
     excesses = [
         -finding.margin for finding in failed_findings if finding.rule == "height" and finding.margin is not None
@@ -192,7 +195,10 @@ def _lower_max_height(spec: Spec, scenario: Scenario, failed_findings: list[Find
 
 
 def _widen_zone_margin(spec: Spec, scenario: Scenario, failed_findings: list[Finding]) -> list[Tightening]:
-    """Widen the margin around zones in `spec` if the flight violated a zone and the plan itself did not."""
+    """Widen the margin around zones in `spec` if the flight violated a zone and the plan itself did not.
+
+    Returns this change in a list; [] if nothing is changed.
+    """
     flight_violations = [
         finding for finding in failed_findings if finding.rule == "fence" and not (finding.planned or 0.0) > ROUNDING_M
     ]
