@@ -14,7 +14,11 @@ _MAX_LISTED = 3
 
 
 def answer_line(result: BatteryResult) -> str:
-    """Return a line with the smallest sufficient battery, or with the reason why there is none."""
+    """Return a line with the smallest sufficient battery and its confidence interval.
+
+    If there is none, the line gives the reason: returns that do not arrive, or a battery that would need too much
+    energy to carry itself. If flights are not judged, the line says why.
+    """
     goal = result.goal
     flown_text = "in the mission and in every return" if result.has_returns else "in the mission (without returns)"
     flown_text += " that arrives" if any(row.blocked_returns for row in result.rows) else ""

@@ -398,7 +398,7 @@ class _Search:
         return min(remaining, self.goal.flights - len(self.flown))
 
     def result(self) -> WindsResult:
-        """Return the result of the search."""
+        """Return the result of the search so far: boundaries, flights and the failures of each direction."""
         boundaries = tuple(direction.boundary() for direction in self.directions)
         conditions = replace(self._base.conditions(), wind_mps=None, wind_from_deg=None)
         calm_failures = self._calm_failures(boundaries)

@@ -171,7 +171,11 @@ class CampaignSummary:
 
 
 def summarise_campaign(base: CampaignBase, goal: Goal, estimate: Estimate, store: Store) -> CampaignSummary:
-    """Summarise a campaign in one pass through its table."""
+    """Summarise the flights in a campaign's table: failures, margins and the worst flights.
+
+    base: the campaign's conditions; without dispersions, they show the faults of the mission itself.
+    estimate: the estimate from all flights of the table.
+    """
     by_rule = count_failures(store.failures())
     worst_rows = tuple(store.worst_flights(WORST_FLIGHT_COUNT))
     # Margin of each flight by rule: NaN if the rule was not judged, -inf if the flight failed the rule by an

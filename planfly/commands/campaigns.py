@@ -181,7 +181,11 @@ def add_flights_options(parser: CommandParser) -> None:
 
 
 def campaign(args: argparse.Namespace) -> int:
-    """Fly a campaign, resume one, or fly one of its flights again."""
+    """Fly a campaign, resume one, or fly one of its flights again; return the exit code.
+
+    The code follows from the answer on the target; it is also INCOMPLETE if there is no target and a flight is
+    undecided.
+    """
     from planfly.api import campaigns
 
     folder = _result_folder(args, "campaign")

@@ -100,7 +100,7 @@ def check_power(estimate: Estimate, records: Sequence[FlightRecord], base: BaseM
 def check_estimate(estimate: Estimate, base: BaseModel, outputs: dict[str, int], source: str) -> None:
     """Raise LogError for an estimate with an implausible value.
 
-    Implausible are a reversed control, a lift slope or a parameter outside its limits, and a mass that changes.
+    A reversed control, a lift slope or a parameter outside its limits, and a mass that changes are implausible.
 
     outputs: servo output number of each control that has its own output.
     source: name of the logs, for the one-line message.

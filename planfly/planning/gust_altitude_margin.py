@@ -457,7 +457,11 @@ def _gust_paths(parts: _Parts) -> list[Floats]:
 
 
 def _shortfall_text(shortfall: Shortfall, plan: Plan, uav: Uav) -> str:
-    """Describe a shortfall and its remedies in one line."""
+    """Describe a shortfall and its remedies in one line.
+
+    The remedies are less turbulence, a better aircraft, and a change of the height that limits the path, if there is
+    one.
+    """
     ability_text = "climbs better" if shortfall.gust == "downdrafts" else "sinks faster"
     remedies = f"Less turbulence, an aircraft that {ability_text}"
     is_below_height_limit = shortfall.gust == "updrafts" and not shortfall.is_threat

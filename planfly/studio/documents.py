@@ -344,7 +344,11 @@ def _saved_parameters(name: str, context: EditContext) -> SavedFile:
 
 
 def _saved_plan(name: str, context: EditContext, judged_mission: JudgedMission) -> SavedFile:
-    """Return the mission as a plan of its scenario, with the current certificate of its path."""
+    """Return the mission as a plan of its scenario, with the current certificate of its path.
+
+    A plan whose certificate still applies is returned as it is. A new plan is certified; the losses say what it does
+    not keep of the mission, and why it is not feasible.
+    """
     plan = judged_mission.setup.plan
     if plan is not None:
         return SavedFile(name, plan_json(plan).encode())

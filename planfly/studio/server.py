@@ -303,7 +303,11 @@ class Server:
     # Messages of a page.
 
     async def _handle_message(self, page: Page, text: str) -> None:
-        """Handle a message. Raises ValueError for a message that is not understood."""
+        """Handle a message.
+
+        An error that the user can mend is sent to the page. An edit of a mission that has changed since is not made;
+        the page is sent the current mission. Raises ValueError for a message that is not understood.
+        """
         try:
             message = read_message(text)
         except ValidationError as error:
@@ -384,7 +388,11 @@ class Server:
                 await self._send_ground(page)
 
     def _apply_change(self, message: messages.Message) -> None:
-        """Change the session as a message requests; called in the judging thread."""
+        """Change the session as a message requests; called in the judging thread.
+
+        A file that is opened replaces the document, which is autosaved first if needed. Opening, undo and redo discard
+        the results of jobs. A parameter file from the folder only changes the settings.
+        """
         session = self.session
         match message:
             case messages.Move() | messages.Insert() | messages.Delete() | messages.Raise() | messages.Apply():

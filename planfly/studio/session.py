@@ -511,7 +511,10 @@ class Session:
     # Page data, and files.
 
     def mission_message(self) -> Json:
-        """Return the message with the current mission and its verdict, with the suggestions that passed a trial."""
+        """Return the message with the current mission and its verdict, as the page shows them.
+
+        It also has the texts of undo and redo and the notes, and the suggestions that passed a trial, if any.
+        """
         tried = self.tried.get("geometric")
         return {
             "kind": "sheet",

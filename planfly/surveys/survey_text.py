@@ -163,7 +163,11 @@ def count_line_photos(lines: Sequence[LineMeasure | None]) -> int:
 
 
 def usable_segments_text(survey: Survey, lines: Sequence[LineMeasure | None]) -> str:
-    """Describe the length lost at the ends of the lines, which indicates the needed turn-around distance."""
+    """Describe the length lost at the ends of the lines, which indicates the needed turn-around distance.
+
+    If no line has a usable part, the text says that instead.
+    lines: None for a line that was not flown.
+    """
     usable_lines = [measure for measure in lines if measure is not None and measure.usable > 0.0]
     if not usable_lines:
         return (

@@ -92,7 +92,10 @@ def make_plan(
 
 
 def _complete_in_gusts(plan: Plan, uav: Uav, search: Search) -> Plan:
-    """Return a plan that is safe in gusts, or the given plan marked as not safe."""
+    """Return a plan that is safe in gusts, or the given plan marked as not safe.
+
+    search: plans a path in a scenario within limits.
+    """
 
     def limit_orbits(candidate: Plan, search_limits: Limits) -> Plan:
         """Return a plan whose waypoints are few enough to avoid orbits in gusts."""

@@ -418,7 +418,11 @@ class _Posterior:
         return beta
 
     def log_density(self, points: Floats) -> Floats:
-        """Return the logarithm of the posterior density at points (n, k), up to a constant, (n,)."""
+        """Return the logarithm of the posterior density at points (n, k), up to a constant, (n,).
+
+        It is the sum of the logarithms of the prior and of the probability of each outcome. It is -inf where a flight
+        that passed has a practically impossible predictor, or where the margin's coefficient is not positive.
+        """
         beta = self.coefficients(points)
         deviations = points - self._prior_mean
         has_failed = self._outcomes.failed

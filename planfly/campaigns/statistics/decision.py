@@ -367,7 +367,10 @@ class Estimator:
         return enough
 
     def estimate(self, tally: Tally) -> Estimate:
-        """Estimate the probability from a tally."""
+        """Estimate the probability from a tally, and answer whether it reaches the target.
+
+        The bounds come from the stopping bound if the goal stops the campaign, otherwise from the number of flights.
+        """
         confidence = self._goal.confidence
         if self._bound is not None:
             interval = self._bound.bounds(tally)
