@@ -250,9 +250,8 @@ def _fly_rounds(
 
 
 def _record_round(task: _RunTask, plan: Plan, number: int) -> Round:
-    """Write a plan, its mission and its verdict into the run's folder; fly a feasible plan first.
+    """Write a plan, its mission and its verdict into the run's folder; fly and draw a feasible plan.
 
-    A feasible plan is also recorded and drawn in a report. A plan that is not feasible is judged without a flight.
     number: number of the round, from 0.
     """
     # Imported here: only the report needs matplotlib.

@@ -555,7 +555,8 @@ class Session:
     def save(self, form: str) -> SavedFile:
         """Return the mission as a file of a format. Raises PlanflyError if the format cannot store it.
 
-        A mission without a file to overwrite is then no longer unsaved.
+        If there is no file to overwrite, the mission then counts as saved, unless the file is only a map or a parameter
+        file.
         """
         saved_file = save_document(self.document, self.context, self.judged, form)
         if form in KINDS and form != "kml" and not self.file_kind:

@@ -47,8 +47,7 @@ def find_passing_parameter(
 ) -> DecidingParameter | None:
     """Find an autopilot parameter with which a failed flight passes, and its nearest value that passes.
 
-    The parameters that are tried are called candidates.  The autopilot lists them for altitude errors and for
-    cross-track errors.  Returns None if none of them makes the flight pass.
+    The autopilot lists the parameters to try, the candidates.  Returns None if none of them makes the flight pass.
 
     findings: findings of the flight that failed.
     passes: function that flies with the given autopilot and returns True if the flight passes; called about 20 times.
