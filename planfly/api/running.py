@@ -250,10 +250,7 @@ def _fly_rounds(
 
 
 def _record_round(task: _RunTask, plan: Plan, number: int) -> Round:
-    """Write a plan, its mission and its verdict into the run's folder; fly and draw a feasible plan.
-
-    number: number of the round, from 0.
-    """
+    """Write a plan, its mission and its verdict into the run's folder; fly and draw a feasible plan."""
     # Imported here: only the report needs matplotlib.
     from logs.views.report.page import write_report
 
