@@ -135,7 +135,11 @@ class Optimiser:
         self._is_asked = False
 
     def _update_front(self, points: Floats, scores: Floats) -> None:
-        """Merge points into the front, which keeps only non-dominated points, sorted by the first objective."""
+        """Merge points into the front, which keeps only non-dominated points, sorted by the first objective.
+
+        points: evaluated points, (n, d).
+        scores: violations and then values of these points, (n, v + m).
+        """
         all_points, all_scores = np.concatenate([self._points, points]), np.concatenate([self._scores, scores])
         front = np.flatnonzero(ranks(all_scores, self._levels) == 0)
         order = front[np.argsort(all_scores[front, self._violation_count], kind="stable")][: self._max_points]
@@ -293,6 +297,9 @@ def _parse_numbers(name: str, numbers: ArrayLike) -> Floats:
 
 def _make_priority_levels(violations: int, objectives: int) -> tuple[Level, ...]:
     """Return the priority levels by which scores are ranked: constraints with the goal 0, then objectives.
+
+    A level is a group of columns of the scores; a later level decides only between points that are equally good in the
+    earlier ones.
 
     violations, objectives: numbers of constraints and of objectives.
     """
