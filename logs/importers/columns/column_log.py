@@ -179,7 +179,7 @@ class ColumnLog:
         return Series(time, factor * angles[angle]() + offset)
 
     def raw_values(self, quantity: str) -> tuple[Floats, Column]:
-        """Return the times and the unconverted values of a quantity, such as the names or numbers of modes."""
+        """Return the times, s, and the values of a quantity as in the file, such as the names or numbers of modes."""
         entry = self.table.columns[quantity][0]
         clock = self._get_clock(entry.clock)
         return self._align_times(entry.clock), self._find_column_on_clock(
@@ -394,7 +394,9 @@ class ColumnLog:
     def _read_entry(self, quantity: str, entry: ColumnTable) -> Series:
         """Return the series of one entry in SI units, radians and the default frame.
 
-        Only the time span that the table names is read.  Rows that do not meet the entry's condition are NaN.
+        Only rows in the time span that the table states are returned.  Rows that do not meet the entry's condition are
+        NaN.  An entry with a rate has only the rows in which its value changes, and a constant all rows of the main
+        clock.  Raises LogError for implausible values, and for values that change more often than the stated rate.
         """
         if entry.value is not None:
             time = self._align_times(self._main_clock)
