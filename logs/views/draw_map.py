@@ -137,7 +137,7 @@ def _draw_colour_bar(figure: Figure, colours: Any, norm: Any, levels: Floats, co
     """Draw the colour bar of the ground's altitude in the column right of the map.
 
     colours, norm: matplotlib's colour map and normalisation of altitudes.
-    levels: altitudes between colours, m AMSL.
+    levels: altitudes of the contours, m AMSL; some of them label the bar.
     column, top: left edge of the column, and distance of the bar from the figure's top, inches.
     """
     figure_height = float(figure.get_figheight())

@@ -412,7 +412,7 @@ def _set_place_ticks(axes: Any, panel: Panel) -> None:
 def draw_layers(axes: Any, panel: Panel, min_zorder: float = 2.0) -> None:
     """Draw the layers of a panel, the lowest first, and its limit lines between bands and other layers.
 
-    min_zorder: zorder of the lowest layer.
+    min_zorder: matplotlib's zorder of the lowest layer.
     """
     for label, value in panel.limits:
         role_style = theme.ROLE_STYLES["limit"]

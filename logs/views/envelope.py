@@ -30,7 +30,7 @@ class EnvelopeLine:
 
 
 def sample_envelope_lines(setup: FlightSetup) -> list[EnvelopeLine]:
-    """Return the envelope at the lowest and the highest altitude of the route."""
+    """Return the envelope at the lowest and the highest altitude of the route; once if both are equal."""
     envelope, altitudes = setup.envelope, setup.route.positions[:, 2]
     speeds = np.linspace(envelope.airspeed[0], envelope.airspeed[-1], 120)
     lines = []

@@ -1,4 +1,7 @@
-"""Chart a front of plans: all plans from above, and the objectives of each over its length."""
+"""Chart a front of plans: all plans from above, and the objectives of each over its length.
+
+A front is a set of plans of which none is better than another in every objective.
+"""
 
 import math
 from dataclasses import dataclass

@@ -185,7 +185,7 @@ def scenario_map(
     labels: labels that take precedence over the names of threats and zones.
     extent: range as from `map_extent`.
     route: waypoints (w, 3), m, whose ends are start and destination, and whose altitudes determine the filled sections
-    of missiles.
+        of missiles; None to use the start and destination of the scenario.
     failing_threats: indices of the threats whose rule fails.
     """
     east, north = extent
@@ -278,7 +278,7 @@ def _make_waypoint_layers(
 
 
 def _name_ends(scenario: Scenario, route: Floats | None) -> tuple[tuple[str, Floats], tuple[str, Floats]]:
-    """Return start and destination, by name: the ends of the route, or the scenario's without a route."""
+    """Return start and destination, each as its name and position; the scenario's if there is no route."""
     first, last = (scenario.start, scenario.destination) if route is None else (route[0], route[-1])
     return ("start", first), ("destination", last)
 

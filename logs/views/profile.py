@@ -104,7 +104,7 @@ def _make_chart(
     """Make the chart of the profile from its panel.
 
     waypoint_distances: distance of each waypoint along the route, m.
-    stop_starts: waypoints at which a stop begins.
+    stop_starts: index of the first waypoint of each stop, as from `stop_rows`.
     """
     path = "the straight line from start to destination" if is_straight else "the planned path"
     title = f"{shorten(scenario.name, 60)}: heights along the path"
@@ -134,7 +134,9 @@ def _compute_planned_altitudes(
     ground: Floats,
     scenario: Scenario,
 ) -> Floats:
-    """Return the planned altitude at each route sample, m AMSL, (s,), including terrain-following legs.
+    """Return the planned altitude at each route sample, m AMSL, (s,), with the legs that follow the terrain.
+
+    On such a leg the height above ground changes linearly from its start to its end; other legs are straight.
 
     waypoint_distances: distance of each waypoint along the route, m.
     height_above_ground: height above ground at the end of each leg, m, (w,); NaN if it does not follow the terrain.
@@ -278,7 +280,10 @@ def _make_waypoint_labels(
 def _make_limit_lines(
     scenario: Scenario, min_altitude: float, max_altitude: float
 ) -> tuple[tuple[tuple[str, float], ...], str]:
-    """Return ceiling and floor as horizontal lines, and a note if the ceiling is outside the picture."""
+    """Return ceiling and floor as horizontal lines, and a note if the ceiling is outside the picture.
+
+    A mission without a scenario has neither.
+    """
     if scenario.external:
         return (), ""
     ceiling, floor = f"ceiling, {scenario.ceiling:.0f} m AMSL", f"floor, {scenario.floor:.0f} m AMSL"
