@@ -98,7 +98,11 @@ def find_contacts(aircraft: Aircraft, gear: Gear) -> tuple[Contact, ...]:
 
 
 def with_contacts(model: bytes, aircraft: Aircraft, gear: Gear) -> bytes:
-    """Return the XML of a model with default contacts added; unchanged if the model has contacts."""
+    """Return the XML of a model with default contacts added; unchanged if the model has contacts.
+
+    model: XML of the model.
+    gear: landing gear that is added, belly skids or wheels.
+    """
     if _model_contacts(model):
         return model
     contacts = default_contacts(aircraft, gear)

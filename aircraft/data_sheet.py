@@ -239,7 +239,7 @@ MAX_ZERO_LIFT_ELEVATOR = 0.9
 CRUISE_ELEVATOR = -0.035
 # Sharpness of the stall, the M of Beard and McLain.
 STALL_SHARPNESS = 80.0
-# Fraction of a rigid propeller's braking that an idle propeller has.
+# An idle propeller brakes with this fraction of the negative thrust that the propeller's formula gives.
 WINDMILL_FRACTION = 0.5
 # Resistance of the Aerosonde's motor at full throttle in cruise, dimensionless: R P / V^2.
 _RESISTANCE_RATIO = 0.026
@@ -354,7 +354,7 @@ class SizedAircraft:
     numbers: numbers of the model.
     sheet: the sheet with all missing values filled in.
     guessed: fields that were filled in.
-    partial_climb: stated climb at less than full throttle, rad; NaN if none was stated. The sheet's climb is that at
+    partial_climb: stated climb at less than full throttle, rad; NaN if none was stated. `sheet.climb` is the climb at
         full throttle.
     """
 

@@ -151,7 +151,7 @@ class BlindPrediction:
 
     earlier: records before the judged part, for biases, trims, filters and errors.
     judged: records of the judged part.
-    clocks: clocks of the log, from the earlier part.
+    clocks: lags and delays of the log's sensors and servos, estimated from the earlier part.
     base: the central aircraft.
     window: length of a window, s.
     """

@@ -174,12 +174,14 @@ def drag_priors(*, with_current: bool) -> tuple[Floats, Floats]:
 
 
 def _fold_nuisances(forces: ForwardForces, unknown: Floats) -> tuple[Floats, Floats]:
-    """Change the five parameters so that they replace the aircraft's fitted nuisance parameters, by least squares.
+    """Change the five parameters so that they include the effect of the aircraft's fitted nuisance parameters.
+
+    The model of the identified aircraft does not have these nuisance parameters. The five parameters are therefore
+    changed by least squares, so that force and current without them differ least from force and current with them.
 
     unknown: (p,) fitted values of the unknowns.
 
-    The differences of force and current over the signals are minimised. Returns the values of the parameters (5,), and
-    their derivatives with respect to the unknowns, (5, p).
+    Returns the values of the parameters (5,), and their derivatives with respect to the unknowns, (5, p).
     """
     parameter_count = int(_IS_DRAG_PARAMETER.sum())
     nuisance_indices = parameter_count + np.flatnonzero(_IS_OF_AIRCRAFT)

@@ -311,7 +311,10 @@ def fit_parameters(
 
 
 def alpha_uncertainty(fit: Fit, lift: Floats) -> AlphaUncertainty:
-    """Return the uncertainty of the angle of attack from a fit of the lift curve and from the level."""
+    """Return the uncertainty of the angle of attack, from a fit of the lift curve and from the autopilot's level.
+
+    lift: (n,) lift coefficients of the fitted signals.
+    """
     slope_sd, offset_sd = np.sqrt(np.diag(fit.covariance)).tolist()
     return AlphaUncertainty(float(np.hypot(offset_sd, LEVEL_SD)), slope_sd, float(lift.mean()))
 

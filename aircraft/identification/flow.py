@@ -15,7 +15,7 @@ from aircraft.identification.motor import Motor
 from aircraft.identification.parameters import INDEX
 from world.arrays import Floats
 
-# Cutoff of the vane, Hz.
+# Cutoff of the low-pass of the flow angles from the accelerometers, which serve as a vane, Hz.
 VANE_CUTOFF_HZ = 8.0
 
 

@@ -327,7 +327,7 @@ class VehicleMessages:
     """Messages of one vehicle, with times on the vehicle's clock."""
 
     def __init__(self, messages: SystemMessages, items: list[tuple[float, Any]], source: str) -> None:
-        """Take the messages that the vehicle sent, and the messages that transfer missions, whoever sent them.
+        """Take the messages that the vehicle sent, and the messages that transfer missions, from any sender.
 
         items: messages that transfer missions, each with its time of reception, s since 1970.
         source: path of the log.
