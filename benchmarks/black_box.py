@@ -205,7 +205,7 @@ def measure_paths(terrain: Path, seeds: int) -> None:
         print(f"paths by {name}: {EVALUATIONS:,} evaluations, {seeds} seeds; median, worst")
 
         def cost(rows: Floats, decode: Callable[[Floats, Floats], Floats] = decode) -> Floats:
-            """Make the function of a BBOB problem: the error of points."""
+            """Return the costs of paths, decoded from rows of variables."""
             return np.asarray(path_costs(decode(rows, ground), ground, CYLINDERS))
 
         for model in MODELS:
@@ -264,7 +264,7 @@ def bbob_functions(seed: int) -> dict[str, Cost]:
     from cocoex import BareProblem
 
     def cost(number: int) -> Cost:
-        """Return the costs of paths, decoded from rows of variables."""
+        """Make the function of a BBOB problem: the error of points."""
         problem = BareProblem("bbob", number, VARIABLES, seed)
         least = float(problem.best_value())
         return lambda points: np.array([problem(point) for point in points]) - least

@@ -134,7 +134,7 @@ def moderate(seeds: Sequence[int], guidance_hz: int = 60) -> list[Errors]:
 
 
 def anywhere(seeds: Sequence[int]) -> list[Errors]:
-    """Fly in winds of 0 to 10 m/s, none to moderate turbulence."""
+    """Fly the standard mission once for each seed, in a random wind of 0 to 10 m/s with none to moderate turbulence."""
     found = []
     for seed in seeds:
         random = np.random.default_rng([seed, 1])
@@ -182,7 +182,10 @@ def straight_rms(setup: FlightSetup, flown: SimulatedFlight, clear: float = CLEA
 
 
 def reference_laws(seeds: Sequence[int]) -> dict[str, list[float]]:
-    """Return the RMS on the straight legs of the reference laws relative to planfly's, in the same wind, by seed."""
+    """Compare the cross-track errors of reference laws with those of planfly's guidance on straight legs.
+
+    Returns the ratios of the RMS errors in the same wind, one for each seed, by the name of the law.
+    """
     gains = load_gains(aerosonde())
     laws: dict[str, tuple[str, Gains]] = {
         "L1, ArduPlane's defaults": ("l1", gains),

@@ -24,8 +24,11 @@ from planner.search.plan_path import plan_path
 from world.arrays import Floats
 from world.scenario import Scenario, load_scenario, scenario_from_spec
 
+# Largest relative difference of equal objectives.
 EQUAL = 1e-12
+# Levels by which paths are ranked: the four counts of violations, length and kill exposure, then the other objectives.
 LEVELS = (Level((0, 1, 2, 3), (0.0,) * 4), Level((4, 5), (NO_GOAL,) * 2), Level((6, 7), (NO_GOAL,) * 2))
+# Number of threats of the test of scale.
 MANY = 10_000
 
 
@@ -204,6 +207,7 @@ def _searches_of(task: Task, algorithm: str, seeds: int) -> dict[str, Any]:
     }
 
 
+# Program of a new process: it plans to the first certified path, and prints its result and CPU time.
 _FIRST = """
 import json, time
 from benchmarks.task import make_task

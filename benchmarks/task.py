@@ -120,7 +120,10 @@ def scalar(violations: Floats, objectives: Floats) -> Floats:
 
 
 def smooth_axes(task: Task) -> tuple[Floats, Floats]:
-    """Return directions (d, d) of the smooth basis and the spread of paths along each (d,), m."""
+    """Return the directions of the smooth basis, (d, d), and the spread of paths along each direction, m, (d,).
+
+    A step along a direction moves all waypoints of a path together, so that the path stays smooth.
+    """
     inner = task.encoding.waypoints - 2
     _, deviations = bridge_modes(inner)
     low, high = task.encoding.lower.reshape(inner, 3), task.encoding.upper.reshape(inner, 3)

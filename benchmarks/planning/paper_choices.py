@@ -31,8 +31,11 @@ from world.arrays import Floats, Ints
 from world.random_streams import PLANNER, stream
 from world.scenario import load_scenario
 
+# Last level of both orders: detection exposure and height.
 LAST = Level((DETECTION, HEIGHT), (NO_GOAL, NO_GOAL))
+# Order of preference of the paper: constraints, then length and kill exposure together.
 PAPER_LEVELS = (CONSTRAINTS, Level((LENGTH, KILL), (NO_GOAL, NO_GOAL)), LAST)
+# The same with kill exposure ahead of length.
 KILL_FIRST = (CONSTRAINTS, Level((KILL,), (NO_GOAL,)), Level((LENGTH,), (NO_GOAL,)), LAST)
 
 

@@ -102,6 +102,7 @@ class Environment:
         return np.array([list(self._first_vector(rng)) for _ in range(count)])
 
     def _first_vector(self, rng: np.random.Generator) -> Iterator[float]:
+        """Yield the variables of one vector of `first_vectors`: east and north of each inner control point."""
         previous = np.ones(2)
         for number in range(2, self.control_count):
             point = np.full(2, -math.inf)

@@ -107,11 +107,13 @@ def leg_costs(
 
 
 def find_cheapest(layers: list[Floats]) -> tuple[Ints, list[Floats]]:
-    """Return the cheapest chain through tables of leg costs, and the cost of the best chain through each sample.
+    """Find the cheapest chain that has one of n samples at each waypoint, by dynamic programming.
 
-    layers: (1, n), then (n, n) for each further pair of waypoints, then (n, 1).
+    layers: costs of the legs: from the start to each sample of the first waypoint, (1, n); then between all samples of
+        each pair of waypoints, (n, n); then from each sample of the last waypoint to the end, (n, 1).
 
-    Returns the sample of each waypoint (w,), and an array (n,) for each waypoint.
+    Returns the sample of each waypoint in the cheapest chain, (w,), and for each waypoint the costs of the best chains
+    through each of its samples, (n,).
     """
     forward = [layers[0][0]]
     for table in layers[1:-1]:

@@ -47,9 +47,9 @@ def string_is_open(scenario: Scenario, a: Floats, b: Floats) -> bool:
 
 
 def shortest_on_map(scenario: Scenario) -> Floats:
-    """Return points (k, 2) of a nearly shortest route on the map from start to destination.
+    """Return the points of a nearly shortest route on the map from start to destination, m, (k, 2).
 
-    (0, 2) without one.
+    The route is the shortest on a grid, pulled taut.  Without a route the result is empty, (0, 2).
     """
     (west, east), (south, north) = scenario.bounds
     start, destination = scenario.start[:2], scenario.destination[:2]

@@ -41,9 +41,9 @@ SWINGS = 3.0
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """Settings of a law, and its RMS (m) on the straight legs in each training wind.
+    """Settings of a law, and its errors.
 
-    Empty if a flight failed.
+    rms: RMS distance from the straight legs in each training wind, m; empty if a flight failed.
     """
 
     gains: dict[str, float]
