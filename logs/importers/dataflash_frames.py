@@ -54,12 +54,12 @@ class MappedFile:
 
 
 def iterate_piece_ends(size: int, release_memory: Callable[[], None]) -> Iterator[int]:
-    """Yield the byte numbers at which the successive pieces of a file end, to read a large file piece by piece.
+    """Yield the byte number at which each piece of a file ends, to read a large file piece by piece.
 
     After each piece was used, `release_memory` is called.
 
-
     size: size of the file, bytes; all pieces but the last have `PIECE_BYTES`.
+
     >>> list(iterate_piece_ends(3, lambda: None))
     [3]
     >>> list(iterate_piece_ends(PIECE_BYTES + 1, lambda: None)) == [PIECE_BYTES, PIECE_BYTES + 1]
@@ -133,7 +133,10 @@ class MessageFormat(NamedTuple):
 
     @property
     def scales(self) -> dict[str, int]:
-        """Factors by which values are multiplied before they are stored, by field; fields without factor are absent."""
+        """Factors by which values are multiplied before they are stored, by field.
+
+        Fields that are stored unchanged are absent.
+        """
         letters_by_name = zip(self.columns, self.letters, strict=True)
         return {name: FIELDS[letter][1] for name, letter in letters_by_name if FIELDS[letter][1] != 1}
 

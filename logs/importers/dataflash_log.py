@@ -42,7 +42,9 @@ _HOME = 1
 def make_dataflash_missions(
     commands: Messages, time: Floats, origins: Messages, source: str
 ) -> Iterator[LoggedMission]:
-    """Yield the missions of a log in their order, without repetitions of items that are logged again when flown.
+    """Yield the missions of a log in their order.
+
+    An item that is logged again when it is flown is not repeated.
 
     commands: CMD messages.
     time: time of each CMD message, s, (n,).
@@ -199,7 +201,7 @@ class _Reader:
         )
 
     def _select_messages(self, name: str) -> Messages:
-        """Return the messages with a name; if several sensors or estimators log them, only those of the first one."""
+        """Return the messages with a name; only those of the first sensor or estimator that logs them."""
         if name not in self._cache:
             messages = self._index.messages(name)
             for column in ("I", "C", "Inst", "Instance"):
@@ -240,7 +242,10 @@ class _Reader:
         return np.asarray(raw_time + shifts[np.clip(np.searchsorted(starts, messages.starts), 0, len(shifts) - 1)])
 
     def _read_table(self, name: str, columns: Iterable[str], scale: float = 1.0) -> LogSeries | None:
-        """Return fields of the messages with a name, multiplied by `scale`; None if the log lacks a field or times."""
+        """Return fields of the messages with a name, multiplied by `scale`.
+
+        Returns None if the log lacks a field or the times.
+        """
         columns = tuple(columns)
         messages = self._select_messages(name)
         if not messages.has(*columns) or not (messages.has("TimeUS") or messages.has("TimeMS")):

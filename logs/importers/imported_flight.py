@@ -120,9 +120,10 @@ def find_flight_parts(
 
 
 def _find_stretches(start: float, end: float, modes: Sequence[ModeChange], log_end: float) -> list[MissionStretch]:
-    """Return the periods of a flight in modes that follow the mission, such as AUTO, and how each period ended.
+    """Return the periods in which a flight followed its mission, and how each ended.
 
-    In a log without mode changes the whole flight is one period.
+    In these periods the vehicle's mode was one that follows the mission, such as AUTO.  In a log without mode changes
+    the whole flight is one period.
 
     log_end: time of the last row of the log, s.
     """
@@ -385,7 +386,7 @@ def _interpolate_at(series: LogSeries | None, name: str, time: Floats, positions
 
 
 def with_flown_altitudes(mission: Mission, lat: Floats, lon: Floats, up: Floats) -> Mission:
-    """Set the altitude of each item with a position to the altitude at which a flight passed closest to it.
+    """Set each item with a position to the altitude at which a flight passed closest to it.
 
     If no altitude of the flight is known, the altitudes are set to 0.
 

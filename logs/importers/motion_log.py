@@ -147,7 +147,7 @@ class _DataflashMotionReader:
         )
 
     def _select_messages(self, name: str) -> Messages:
-        """Return the messages with a name; if several sensors or estimators log them, only those of the first one."""
+        """Return the messages with a name; only those of the first sensor or estimator that logs them."""
         messages = self._index.messages(name)
         for column in _INSTANCES:
             if name in ("IMU", "XKF1", "XKF2", "NKF1", "NKF2", "ARSP", "BAT") and messages.has(column):

@@ -161,7 +161,7 @@ def _read_inertial(topics: Topics) -> Samples:
 
 
 def _read_airspeed(topics: Topics) -> tuple[Samples, Samples]:
-    """Return the measured calibrated airspeed (m/s, (n, 1)), and the ratio of true to calibrated airspeed, (k, 1).
+    """Return calibrated airspeed, m/s, (n, 1), and the ratio of true to calibrated airspeed, (k, 1).
 
     Rows whose airspeed is not from a sensor are left out; rows up to 1 m/s have no ratio.
     """

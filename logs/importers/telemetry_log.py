@@ -458,7 +458,7 @@ class VehicleMessages:
         return LogSeries(table.source, table.time, table.values * np.array([1e-3, 0.01]))
 
     def _read_measured_table(self, name: str, columns: tuple[str, ...]) -> LogSeries | None:
-        """Return fields of a battery message, only the rows in which all were measured; None if there are none."""
+        """Return fields of a battery message, only rows in which all were measured; None without rows."""
         table = self.table(name, columns)
         if table is None:
             return None

@@ -351,7 +351,7 @@ def _get_local_name(element: ElementTree.Element) -> str:
 
 
 def _pair_times_with_positions(track: ElementTree.Element, path: Path) -> tuple[list[tuple[str, str]], int]:
-    """Return the pairs of time and position of a track as texts, and the number of times and positions left over.
+    """Pair the times and positions of a track, as texts; also return how many are left over.
 
     Either all times come before all positions, or each time comes before its position.  Raises LogError if the numbers
     of times and positions differ in the first case.

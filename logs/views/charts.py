@@ -186,7 +186,9 @@ def filled_series(name: str, role: str, along: Floats, values: ArrayLike) -> Lay
 
 
 def join_with_gaps(parts: Sequence[Floats]) -> tuple[Floats, Floats]:
-    """Join lines into the x and y of one layer, with a gap (NaN) after each line; lines without points are left out.
+    """Join lines into the x and y of one layer, with a gap (NaN) after each line.
+
+    Lines without points are left out.
 
     parts: points of each line, (k, 2).
 

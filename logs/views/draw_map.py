@@ -48,7 +48,7 @@ _LINE = 0.145
 
 
 def draw_map(chart: MapChart) -> Figure:
-    """Draw the top view: north up, equal scales, axes in m labelled in km from the scenario's origin."""
+    """Draw the top view: north up, equal scales, axes in km from the scenario's origin."""
     with clean_style():
         handles = [make_legend_handle(entry) for entry in legend_entries([chart.panel])]
         # A legend of four columns.

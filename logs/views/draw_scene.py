@@ -74,7 +74,10 @@ class Projection:
 
     @property
     def toward(self) -> Floats:
-        """Vector from any position towards the viewer, to east, north and up, (3,), m; its horizontal length is 1 m."""
+        """Vector from any position towards the viewer, to east, north and up, m, (3,).
+
+        Its horizontal length is 1 m.
+        """
         return np.array([math.cos(self.azimuth), math.sin(self.azimuth), math.tan(_ELEVATION) / self.stretch])
 
 
@@ -294,7 +297,10 @@ def _draw_paths(
     failed: Failures,
     placer: LabelPlacer,
 ) -> list[Any]:
-    """Draw route (w, 3), track, waypoints with poles to the ground, and failures; return handles for the legend."""
+    """Draw route (w, 3), track, waypoints with poles to the ground, and failures.
+
+    Returns the handles for the legend.
+    """
     _, samples = route_samples(route, max(float(route_distance(route)[-1]) / 600.0, 1.0))
     if terrain is not None:
         ground = terrain.height(route[:, 0], route[:, 1])
@@ -381,7 +387,7 @@ def _draw_labels(
     last = len(route) - 1
 
     def write(text: str, point: Floats, rank: LabelRank, role: str = "ink") -> None:
-        """Write one label at a projected point."""
+        """Write a label at a point in picture coordinates, as from `Projection.project`."""
         write_label(placer, Label(text, float(point[0]), float(point[1]), rank, role))
 
     # The same words as on the map.

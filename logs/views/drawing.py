@@ -98,7 +98,7 @@ _MAX_PANEL_TITLE_LINES = 2
 
 @contextmanager
 def clean_style() -> Iterator[None]:
-    """Use matplotlib's defaults and the settings above instead of the user's matplotlibrc.
+    """Use matplotlib's defaults and planfly's settings for pictures instead of the user's matplotlibrc.
 
     The previous settings are restored at the end.
 
@@ -434,7 +434,7 @@ def draw_layers(axes: Any, panel: Panel, min_zorder: float = 2.0) -> None:
 
 
 def _make_dash_pattern(role_style: theme.RoleStyle, dashed: bool = False) -> Any:
-    """Return matplotlib's line style of a role, with dashes in units of the line width; "-" for a solid line."""
+    """Return the line style of a role for matplotlib: dashes in line widths, or "-" for a solid line."""
     pattern = role_style.dash or ((8.0, 3.5) if dashed else ())
     return (0, tuple(part / max(role_style.width, 0.1) for part in pattern)) if pattern else "-"
 

@@ -18,9 +18,11 @@ _MAX_DOTS = 2000
 
 @dataclass(frozen=True, slots=True)
 class EnvelopeLine:
-    """Steepest steady path angles (°) at one altitude (m AMSL) over true airspeed (m/s), (120,).
+    """Steepest steady path angles at one altitude, over true airspeed.
 
-    Descents have negative angles.
+    amsl: altitude, m AMSL.
+    airspeed: true airspeeds, m/s, (120,).
+    climb, descent: path angle at each airspeed, degrees, (120,); angles of descents are negative.
     """
 
     amsl: int

@@ -182,7 +182,7 @@ def threat_radius(threats: Threats, place: Place) -> float:
 
 
 def find_rows_inside_threats(failed: Failures, threats: Threats, track: Track) -> NDArray[np.bool_]:
-    """Return a mask (t,): True for rows of the track inside the sphere of a threat that the flight must not enter."""
+    """Return a mask (t,): True for rows of the track inside the sphere of a threat whose rule fails."""
     is_inside = np.zeros(len(track), dtype=bool)
     for place in failed.threats:
         offsets = track.position - threats.position[place.index or 0]

@@ -23,7 +23,7 @@ LEAST_LENGTH = 0.01
 
 @dataclass(frozen=True, slots=True)
 class _NamedPlan:
-    """Best plan in one objective: its number from 0, name and role."""
+    """Plan of a front that is best in one objective: its index in the front, and its name and role."""
 
     row: int
     name: str

@@ -17,7 +17,7 @@ _ROLES_AND_NAMES: dict[Reach, tuple[str, str]] = {reach: (f"reach-{reach}", reac
 
 
 def glide_chart(setup: FlightSetup, drawn_returns: DrawnReturns, track: Track | None) -> MapChart | None:
-    """Map where the aircraft can glide to: the glide footprint, and the path coloured by the destination in reach.
+    """Map the glide footprint, and the path, coloured by the best destination in gliding reach.
 
     The footprint consists of the areas from which home or another site can be reached without an engine.  Return None
     if glides were not judged.

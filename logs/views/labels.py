@@ -34,7 +34,9 @@ _DIRECTIONS = ((1, 1), (-1, 1), (1, -1), (-1, -1), (0, 1), (0, -1), (1, 0), (-1,
 
 @dataclass(slots=True)
 class LabelPlacer:
-    """Places labels on axes one after another, each where it covers least; it does not move earlier labels.
+    """Places labels on axes one after another, each where it covers least.
+
+    Labels that were placed earlier are not moved.
 
     axes: matplotlib's axes, whose limits and position must be final.
     lines: positions that labels should not cover, pixels, (n, 2).

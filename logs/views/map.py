@@ -47,7 +47,7 @@ class NamedWind:
 class DrawnTrack:
     """A flown track, its name and its role.
 
-    flight: number of the flight in the page's data, which hold its moments.
+    flight: index of the flight in the page's data, which contain the flight's moments.
     """
 
     label: str
@@ -284,7 +284,9 @@ def _name_ends(scenario: Scenario, route: Floats | None) -> tuple[tuple[str, Flo
 
 
 def end_labels(scenario: Scenario, route: Floats | None, stops: Sequence[int]) -> list[Label]:
-    """Return the labels of start and destination, with the numbers of their waypoints; one label if they coincide.
+    """Return the labels of start and destination, with the numbers of their waypoints.
+
+    Returns one label if start and destination coincide.
 
     stops: number of each waypoint of the route.
     """

@@ -50,7 +50,8 @@ def profile_chart(
     at the progress of the flight along the route, which never decreases.
 
     stops: number of each waypoint, (w,), shown at the first of those with the same number; None numbers all waypoints.
-    above_ground: (w,) m, as in `flight.mission.route.Route`; None if no leg follows the ground.
+    above_ground: height above ground at the end of each leg, m, (w,), as in `flight.mission.route.Route`; None if no
+        leg follows the terrain.
 
     >>> from logs.recording.example_log import example_log
     >>> setup = example_log().setup
@@ -134,7 +135,7 @@ def _compute_planned_altitudes(
     ground: Floats,
     scenario: Scenario,
 ) -> Floats:
-    """Return the planned altitude at each route sample, m AMSL, (s,), with the legs that follow the terrain.
+    """Return the planned altitude at each route sample, m AMSL, (s,), also on terrain-following legs.
 
     On such a leg the height above ground changes linearly from its start to its end; other legs are straight.
 

@@ -37,7 +37,7 @@ class PlaceValue:
 
 
 def list_place_values(findings: Sequence[Finding], rule: str) -> list[PlaceValue]:
-    """Return the values of a rule's findings at waypoints or legs, sorted by the number of the waypoint or leg."""
+    """Return the values of a rule's findings, sorted by the number of the waypoint or leg."""
     place_rows = []
     for finding in findings:
         place = finding.place

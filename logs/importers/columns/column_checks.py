@@ -353,7 +353,10 @@ def _check_not_frozen(log: ColumnLog, quantity: str, grid: Floats) -> None:
 
 
 def _check_pair(log: ColumnLog, pair: _Pair, grid: Floats) -> None:
-    """Raise LogError if the measurements of a pair have opposite signs, do not correlate, or differ by a factor.
+    """Raise LogError if the measurements of a pair contradict each other.
+
+    They contradict each other if they vary in opposite directions, do not correlate, or differ by a factor although
+    they should be equal.
 
     With errors in both measurements, the factor lies between r c and r / c, where r is the ratio of the standard
     deviations and c the correlation (Frisch 1934).

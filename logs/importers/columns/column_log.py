@@ -179,7 +179,7 @@ class ColumnLog:
         return Series(time, factor * angles[angle]() + offset)
 
     def raw_values(self, quantity: str) -> tuple[Floats, Column]:
-        """Return the times, s, and the values of a quantity as in the file, such as the names or numbers of modes."""
+        """Return the times, s, and the unconverted values of a quantity, such as the names of modes."""
         entry = self.table.columns[quantity][0]
         clock = self._get_clock(entry.clock)
         return self._align_times(entry.clock), self._find_column_on_clock(

@@ -425,7 +425,7 @@ def _format_missing_lines(guesses: Sequence[_Guess]) -> Iterator[str]:
 
 
 def _format_unused_lines(guesses: Sequence[_Guess], files: dict[str, DataFile]) -> Iterator[str]:
-    """Yield a comment line for each file with columns that no guess uses, next to columns that a guess uses."""
+    """Yield a comment line for each file that has unused columns next to columns that a guess uses."""
     used = {(guess.clock.file, guess.column) for guess in guesses} | {
         (guess.clock.file, guess.clock.column) for guess in guesses
     }

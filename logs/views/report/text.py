@@ -169,7 +169,10 @@ def missed_text(finding: Finding) -> str:
 
 
 def rule_row(rule: RuleFindings) -> RuleRow:
-    """Return the row of one rule: the numbers of its findings, and the values of the finding that represents it."""
+    """Return the row of one rule: numbers of its findings, and values of the representative finding.
+
+    Without a representative finding there are no values.  A rule that was not judged states the reason as its place.
+    """
     head = (rule.state, _describe_state(rule.state), rule.words.word, rule.tally_text)
     if rule.shown is None:
         return RuleRow(*head, "" if rule.judged else rule.findings[0].reason)
