@@ -165,7 +165,7 @@ def _model_contacts(model: bytes) -> tuple[Contact, ...]:
 
 
 def _center_of_gravity(model: bytes) -> Floats:
-    """Return the center of gravity of the loaded aircraft, m aft, right and up of the reference point, (3,).
+    """Return the loaded aircraft's center of gravity, m aft, right and up of the reference point, (3,).
 
     As in JSBSim, the loaded aircraft consists of the empty aircraft, its point masses and the initial contents of its
     tanks.

@@ -754,7 +754,7 @@ def _size_engine(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> tuple
 
 
 def _solve_engine(sheet: DataSheet, drag: Drag, target_fields: list[str]) -> tuple[FuelEngine, DataSheet]:
-    """Solve for the engine torque that meets one field of a sheet; for two fields also solve for the pitch.
+    """Solve for the engine torque that meets one field of a sheet; for two fields also for the pitch.
 
     Returns the engine and the sheet with its performance. Raises _NoPropellerError if there is no solution.
     """
@@ -789,7 +789,7 @@ def _solve_engine(sheet: DataSheet, drag: Drag, target_fields: list[str]) -> tup
 
 
 def _thrust_error(motor: Motor, sheet: DataSheet, drag: Drag, field: str) -> float:
-    """Return the relative thrust error of a motor: thrust divided by the thrust that a field requires, minus 1.
+    """Return a motor's thrust divided by the thrust that a field of the sheet requires, minus 1.
 
     field: field of the sheet. "top" requires its thrust at full throttle, "climb" at `DataSheet.climb_throttle`, and
         "trim_throttle" requires the drag at that throttle.
@@ -858,7 +858,9 @@ def _solve_by_newton(errors: Callable[[Floats], Floats], x: Floats) -> Floats | 
 
 
 def _no_propeller_error(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> FlightError:
-    """Return the error for a sheet that no propeller meets; it states the feasible range of a stated value.
+    """Return the error for a sheet that no propeller meets.
+
+    For a stated climb, top speed or motor, the error states the range of it that some propeller meets.
 
     sheet: the sheet with missing values filled in.
     """

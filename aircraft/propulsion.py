@@ -241,7 +241,7 @@ class FuelEngine:
         return thrust if thrust > 0.0 else self.windmill * thrust
 
     def power(self, throttle: float, airspeed: float, rho: float) -> float:
-        """Return the heat of the fuel per second, W, at a throttle, an airspeed (m/s) and an air density (kg/m^3)."""
+        """Return the fuel's heat per second, W, at a throttle, an airspeed (m/s) and an air density (kg/m^3)."""
         work = throttle * self.torque * rho / _SEA_LEVEL_DENSITY * self.speed(throttle, airspeed, rho)
         return work / self.efficiency
 

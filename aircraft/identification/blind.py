@@ -111,7 +111,7 @@ class Band:
 
     @property
     def is_informative(self) -> bool:
-        """True if the band is narrower than the band without a model (`unchanged`), or if that band is unknown."""
+        """True if the band is narrower than the band without a model (`unchanged`), or that is unknown."""
         return not self.half_width >= self.unchanged
 
     @property

@@ -56,7 +56,7 @@ def dynamic_force(signals: Signals, base: BaseModel) -> Floats:
 
 
 def rate_and_elevator_lift(signals: Signals, base: BaseModel) -> Floats:
-    """Return the lift coefficient due to pitch rate and elevator, with the derivatives of the base model, (n,)."""
+    """Return the lift coefficient due to pitch rate and elevator, by the base model's derivatives, (n,)."""
     c = base.coefficients
     pitching = signals.rates[:, 1] * base.chord / (2.0 * signals.airspeed)
     return np.asarray(c.lift_rate * pitching + c.lift_elevator * signals.surfaces[:, 0])
