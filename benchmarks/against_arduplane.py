@@ -95,7 +95,9 @@ class Compared:
 
 
 def random_setup(seed: int, *, steep: bool = False) -> tuple[FlightSetup, Uav]:
-    """Make the first feasible plan between random ends in a random wind, for ArduPlane with exact navigation.
+    """Make the first feasible plan between random ends in a random wind.
+
+    The plan is for ArduPlane with exact navigation.
 
     The same seed gives the same plan.  steep: True to allow the climbs of `_climbing`.
     """
@@ -148,7 +150,7 @@ def _legs(setup: FlightSetup) -> tuple[Floats, Floats, Floats]:
 
 
 def _along_legs(setup: FlightSetup, track: Track) -> tuple[Floats, Floats]:
-    """Return cross-track distance (right positive) and altitude at each step along every leg, m, (n,) each."""
+    """Return cross-track distance (right positive) and altitude at steps along every leg, m, (n,) each."""
     across, up = [], []
     begin = 0
     for start, course, run in zip(*_legs(setup), strict=True):
@@ -168,7 +170,7 @@ def _along_legs(setup: FlightSetup, track: Track) -> tuple[Floats, Floats]:
 
 
 def _corners(setup: FlightSetup, track: Track) -> tuple[Corner, ...]:
-    """Measure the overshoot at each corner of a route that is sharp enough and has a long enough leg after it."""
+    """Measure the overshoot at each corner that is sharp enough and has a long enough leg after it."""
     starts, courses, runs = _legs(setup)
     found = []
     for i in range(1, len(runs)):

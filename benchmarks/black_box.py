@@ -150,7 +150,10 @@ def path_costs(paths: Floats, ground: Floats, cylinders: Floats) -> Floats:
 
 
 def by_bearing(rows: Floats, ground: Floats) -> Floats:
-    """Decode paths (n, 12, 3) from distances, [climb angles,] and bearings (n, 20 or 30), as `SphericalToCart.m`."""
+    """Decode paths (n, 12, 3) from distances, [climb angles,] and bearings (n, 20 or 30).
+
+    The decoding is that of `SphericalToCart.m`.
+    """
     distance, bearing = rows[:, :NODES], rows[:, -NODES:]
     climb = rows[:, NODES:-NODES] if rows.shape[1] > 2 * NODES else np.zeros_like(distance)
     steps = (distance * np.cos(climb) * np.sin(bearing), distance * np.cos(climb) * np.cos(bearing))
@@ -164,7 +167,10 @@ def by_bearing(rows: Floats, ground: Floats) -> Floats:
 
 
 def by_offset(rows: Floats, ground: Floats) -> Floats:
-    """Decode paths (n, 12, 3) from offsets to the left of the straight line, at equal steps, and heights (n, 20)."""
+    """Decode paths (n, 12, 3) from offsets to the left of the straight line, and heights (n, 20).
+
+    The points are at equal steps along the line.
+    """
     start, displacement = np.array(START), np.array(END) - np.array(START)
     left = np.array([-displacement[1], displacement[0]]) / math.hypot(displacement[0], displacement[1])
     paths = np.empty((len(rows), NODES + 2, 3))

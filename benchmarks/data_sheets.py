@@ -44,7 +44,7 @@ SLOPE = 0.5
 
 
 def random_sheet(random: np.random.Generator) -> DataSheet:
-    """Draw the data sheet of a small aircraft: log-uniform mass, with typical speeds and span for the mass.
+    """Draw the data sheet of a small aircraft: log-uniform mass, and speeds and span typical of the mass.
 
     Wing loading and span are within a factor of 1.5 of typical aircraft of this mass.
     """
@@ -85,7 +85,10 @@ def sheets(count: int, seed: int) -> list[DataSheet]:
 
 
 def route(aircraft: Aircraft, random: np.random.Generator, climb: float, descent: float) -> Floats:
-    """Return waypoints (w, 3) of 5 km: turns of 20 to 90 degrees, slopes up to half of the aircraft's limits."""
+    """Return waypoints (w, 3) of a route of 5 km.
+
+    It has turns of 20 to 90 degrees, and slopes up to half of the aircraft's limits.
+    """
     legs = 7
     runs = random.uniform(0.6, 1.4, legs)
     runs *= LENGTH / runs.sum()
@@ -124,7 +127,10 @@ def fly_both(aircraft: Aircraft, seed: int) -> dict[str, tuple[str, float, float
 
 
 def fly_random_sheets(count: int, seed: int) -> dict[str, int]:
-    """Count the random sheets whose aircraft completes its mission, with planfly's guidance and ArduPlane's model."""
+    """Count the random sheets whose aircraft completes its mission, with each guidance.
+
+    Each mission is flown with planfly's guidance, and with the model of ArduPlane's.
+    """
     done = {"planfly": 0, "arduplane": 0}
     print(f"{count} random data sheets (seed {seed}), {LENGTH / 1000.0:g} km each:")
     with tempfile.TemporaryDirectory() as place:
@@ -197,7 +203,10 @@ INSIDE = 0.95
 
 
 def sheet_of(name: str) -> DataSheet:
-    """Return the data sheet of one of `SHEETS_OF`, which include a Cessna, although it is not a small aircraft."""
+    """Return the data sheet of one of `SHEETS_OF`.
+
+    They include a Cessna, although it is not a small aircraft.
+    """
     known = load_aircraft(name)
     top = fastest_level_flight(Fdm(known), AMSL)
     return DataSheet(

@@ -151,7 +151,7 @@ def fly_missions(folder: Path, truth: Truth, seed: int) -> tuple[list[Track], Ai
 
 
 def errors(base: BaseModel, truth: Floats, estimate: Estimate) -> dict[str, Any]:
-    """Return the errors of climb, sink, power and drag, and whether the true values are within their intervals."""
+    """Return the errors of climb, sink, power and drag, and if the true values are in their intervals."""
     best = performance(base, np.vstack([truth, estimate.values]), _CRUISE_MPS, DENSITY)
     drawn = performance(base, draw_aircraft(estimate), _CRUISE_MPS, DENSITY)
     low, high = np.degrees(np.percentile(drawn.climb, [2.5, 97.5]))

@@ -64,7 +64,10 @@ GLIDES = (0, 20, 60, 120, 300)
 
 
 def flown_as(base: BaseModel, values: Floats, unknown: Floats) -> Floats:
-    """Return sink (rad), power (W) and climb (rad) at cruise for these unknowns, including nuisance parameters."""
+    """Return sink (rad), power (W) and climb (rad) at cruise for these unknowns.
+
+    The unknowns include nuisance parameters.
+    """
     own = int(_IS_DRAG_PARAMETER.sum())
     resistance, idle, voltage, elevator = unknown[own + 1 : own + 5]
     motor = base.motor.with_factors(resistance=1.0 + resistance, idle=1.0 + idle)

@@ -74,7 +74,10 @@ def best_path(task: Task, vectors: Floats) -> Floats:
 
 
 def solve_with_cmaes(task: Task, seed: int, evaluations: int, *, seeded: bool = True, sigma: float = 0.05) -> Found:
-    """Search with CMA-ES in the smooth basis with restarts, from planfly's best coarse seed or the straight line."""
+    """Search with CMA-ES in the smooth basis, with restarts.
+
+    It starts from planfly's best coarse seed if `seeded`, otherwise from the straight line.
+    """
     from cmaes import CMA
 
     started, inside = time.process_time(), 0.0
@@ -145,7 +148,10 @@ def solve_with_nsga2(task: Task, seed: int, evaluations: int) -> Found:
 
 
 def solve_with_ompl(task: Task, seed: int, seconds: float, ratio: float = 0.0) -> Found:
-    """Search with Informed RRT* for a time or to a length ratio, in a process of its own, as it prints at exit."""
+    """Search with Informed RRT* for a time or to a length ratio.
+
+    It runs in a process of its own, because it prints at exit.
+    """
     command = [sys.executable, "-m", "benchmarks.ompl_peer", task.scenario.name]
     command += [str(number) for number in (seed, seconds, ratio)]
     result = subprocess.run(command, check=True, capture_output=True, text=True)
@@ -192,7 +198,9 @@ def measure(seconds: float) -> dict[str, Any]:
 
 
 def race(seconds: float) -> dict[str, Any]:
-    """Print the CPU time to a certified path within 2 % of the best known, for OMPL's Informed RRT* and planfly.
+    """Print the CPU time of OMPL's Informed RRT* and of planfly to a nearly best certified path.
+
+    The path is at most 2 % longer than the best known one.
 
     Planfly's time begins with the call of the planner, with scenario and envelope loaded, and includes problem, grids
     and certificates.  OMPL's time begins with its first step, without certificates.  A search that does not reach the

@@ -92,7 +92,9 @@ def predict_thor(folder: Path) -> tuple[dict[str, object], Path]:
 def _score_rates(
     earlier: list[FlightRecord], judged: list[FlightRecord], base: BaseModel, suffix: str
 ) -> dict[str, dict[str, float]]:
-    """Score predictions of roll, pitch and yaw rate by a model that is identified from the earlier part of a flight.
+    """Score predictions of roll, pitch and yaw rate by an identified model.
+
+    The model is identified from the earlier part of a flight.
 
     Returns the errors relative to the errors of constant rates, for the identified model and for the base alone, and
     how white the innovations are (`aircraft.identification.prediction.whiteness`).

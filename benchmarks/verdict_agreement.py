@@ -61,7 +61,10 @@ def by_law(made: FieldMission) -> tuple[Verdict, float]:
 
 
 def by_program(made: FieldMission, program: Path) -> tuple[Verdict, bool]:
-    """Return the verdict on the program's flight, and True if it violated clearance or a sphere by over `GRAVE`."""
+    """Return the verdict on the program's flight, and True if it has a grave violation.
+
+    A violation of the clearance or of a sphere is grave if it exceeds `GRAVE`.
+    """
     setup, _ = setup_of(made)
     flown = fly_and_judge(setup, autopilot=program)
     threats, position = made.scenario.threats, flown.track.position

@@ -115,7 +115,10 @@ def _zones(rng: np.random.Generator, ends: Floats) -> list[dict[str, Any]]:
 
 
 def star(rng: np.random.Generator, place: Floats, radius: float, corners: int, least: float = 0.4) -> list[list[float]]:
-    """Draw a ring of corners around a place, at distances between `least` times the radius and the radius, m."""
+    """Draw a ring of corners around a place.
+
+    The corners are at distances between `least` times the radius and the radius, m.
+    """
     turns = (np.arange(corners) + rng.uniform(-0.35, 0.35, corners)) * 2.0 * math.pi / corners
     away = radius * rng.uniform(least, 1.0, corners)
     return [
@@ -169,7 +172,10 @@ def passable(scenario: Scenario) -> bool:
 
 
 def _band(scenario: Scenario, places: Floats, pitch: float) -> tuple[Floats, Floats]:
-    """Return the lowest and highest altitude of a path at each place, by the surrounding ground, m AMSL, (s, y) each.
+    """Return the lowest and highest altitude of a path at each place, m AMSL, (s, y) each.
+
+    The lowest altitude is counted from the highest ground within half a pitch of the place, the highest altitude from
+    the lowest ground there.
 
     places: east and north of the places, m, (s, y, 2): stages along the line, and places across it.
     """
@@ -184,7 +190,10 @@ def _band(scenario: Scenario, places: Floats, pitch: float) -> tuple[Floats, Flo
 
 
 def _open(scenario: Scenario, places: Floats) -> Flags:
-    """Return a mask (s, y): True for places (s, y, 2) on the map that no zone forbids at any height, with margins."""
+    """Return a mask (s, y): True for places (s, y, 2) that are on the map and in no zone, with margins.
+
+    Zones count at all heights.
+    """
     free = (np.abs(places) < HALF - ZONE_ROOM).all(axis=-1)
     for zone in scenario.spec.zones or ():
         if zone.radius_m is not None:
@@ -210,7 +219,10 @@ def ring_distance(ring: Floats, places: Floats) -> Floats:
 
 
 def _slopes(scenario: Scenario) -> tuple[float, float]:
-    """Return the climb and dive limits for all courses, rad, reduced by a tenth for turbulence and by half a degree."""
+    """Return the climb and dive limits for all courses, rad.
+
+    They are the smallest limits, reduced by a tenth for turbulence and by half a degree.
+    """
     limits = load_uav(scenario).limits
     up = float(max(scenario.start[2], scenario.destination[2])) + 100.0
     found = np.array([limits.slopes(course, up) for course in np.radians(np.arange(0, 360, 15))])

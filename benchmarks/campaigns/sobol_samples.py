@@ -22,7 +22,7 @@ SOBOL_FLIGHTS = 1024
 
 @lru_cache
 def _shares(quantities: int, seed: int) -> NDArray[np.float64]:
-    """Return a quantile (0 to 1) of each quantity's distribution for each flight, (SOBOL_FLIGHTS, quantities)."""
+    """Return the quantile (0 to 1) of each quantity for each flight, (SOBOL_FLIGHTS, quantities)."""
     out: NDArray[np.float64] = qmc.Sobol(quantities, scramble=True, seed=seed).random(SOBOL_FLIGHTS)
     return out
 

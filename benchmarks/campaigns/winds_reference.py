@@ -95,7 +95,7 @@ def found_winds() -> WindsResult:
 
 
 def winds_row() -> dict[str, float]:
-    """Return the number of flights of the search, and of the reference's directions that are right within 0.5 m/s."""
+    """Count the flights of the search, and its directions that agree with the reference, by row name."""
     found = found_winds()
     kept = json.loads(REFERENCE.read_text(encoding="utf-8")) if REFERENCE.exists() else {}
     pairs = [(found.boundaries[int(direction)].estimate, points) for direction, points in kept.items()]
@@ -115,7 +115,9 @@ def is_within(boundary: float, points: list[dict[str, Any]], confidence: float) 
 
 
 def reference_interval(points: list[dict[str, Any]], confidence: float) -> tuple[float, float]:
-    """Return the confidence interval of the reference's boundary, m/s; for confidence 0 the most likely boundary twice.
+    """Return the confidence interval of the reference's boundary, m/s.
+
+    For confidence 0 both ends are the most likely boundary.
 
     points: wind speed, number of flights and of flyable flights at each wind of one direction.
 

@@ -187,7 +187,10 @@ def theirs(
 
 
 def _thinned(contest: Contest, vectors: Floats) -> Floats:
-    """Return the paths of vectors (n, d) that contribute most to the hypervolume, five times the required number."""
+    """Return the paths of vectors (n, d) that contribute most to the hypervolume.
+
+    Five times the required number is returned.
+    """
     paths = contest.task.to_paths(vectors[-20_000:])
     objectives = contest.task.objectives(contest.task.values(paths))
     chosen: list[int] = []

@@ -144,7 +144,9 @@ def _straight_seconds(scenario: Scenario, limits: Limits, course: float, level: 
 
 
 def bounds(name: str, first: int, count: int) -> Floats:
-    """Print and return lower bounds of the flight time, relative to the time of the shortest path by its legs, (n, 2).
+    """Print and return lower bounds of the flight time, (n, 2).
+
+    They are relative to the time of the shortest path by its legs.
 
     The columns are the two bounds that the module describes; the rows of missions without a safe plan are NaN.
     """

@@ -43,7 +43,12 @@ PATTERNS = 1500
 
 
 class Lattice(NamedTuple):
-    """Places of a lattice: open flags (columns, rows, layers), layer distance and position of the first place, m."""
+    """Places of a lattice.
+
+    open: True for open places, (columns, rows, layers).
+    layer: distance between layers, m.
+    west, south, bottom: position of the first place, m.
+    """
 
     open: Flags
     layer: float
@@ -186,7 +191,10 @@ def _units(task: Task, lattice: Lattice) -> tuple[Floats, Ints]:
 
 
 def _gentlest(data: ProblemArrays) -> tuple[float, float]:
-    """Return the tangents of the climb and dive limits at the start's altitude, the smallest over all courses."""
+    """Return the tangents of the climb and dive limits at the start's altitude.
+
+    They are the smallest over all courses.
+    """
     courses = np.linspace(0.0, 2.0 * math.pi, 16, endpoint=False)
     ends = data.start + 100.0 * np.column_stack([np.sin(courses), np.cos(courses), np.zeros(16)])
     slopes = np.array([slope_limits(data, np.array(data.start), end) for end in ends])

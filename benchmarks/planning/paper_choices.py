@@ -91,7 +91,10 @@ def _widest(degrees: float) -> Callable[[Space, int], Encoding]:
 
 
 def _from_east(space: Space, waypoints: int) -> Encoding:
-    """Return a polar encoding within 45 degrees, with a free first angle from east, as no leg is before it."""
+    """Return a polar encoding within 45 degrees whose first angle is free, and counted from east.
+
+    The first angle cannot be relative, because no leg is before it.
+    """
     encoding = polar_45_encoding(space, waypoints)
     lower, upper = encoding.lower.copy(), encoding.upper.copy()
     lower[1], upper[1] = -math.pi, math.pi

@@ -83,7 +83,10 @@ class PublicInstance:
         return np.tile([longest, HALF_RANGE_RAD, self._bearing() + HALF_RANGE_RAD], WAYPOINT_COUNT)
 
     def _bearing(self) -> float:
-        """Angle of the straight line, rad, counted from east; the cost counts bearings from north, as published."""
+        """Angle of the straight line, rad, counted from east.
+
+        The published cost counts bearings from north.
+        """
         return math.atan2(self.end[1] - self.start[1], self.end[0] - self.start[0])
 
     def costs(self, vectors: Floats) -> Floats:

@@ -53,7 +53,9 @@ GAUSSIAN_POPULATION = 20
 
 @compiled
 def needed_rise(leg: Floats, ground: Floats, rises: Floats) -> float:
-    """Return the rise of the ends of a leg (2, 4), m, that keeps its places above the ground; infinity off the map.
+    """Return the rise of the ends of a leg (2, 4), m, that keeps its places above the ground.
+
+    The rise is infinite if the leg leaves the map, or if neither end can rise as needed.
 
     rises: 1 for an end that can rise, and 0 for the start and the end of the path.
     """
@@ -163,7 +165,9 @@ class PublicPlan:
         return plain, clear
 
     def search_lattices(self, spacing: float) -> Floats:
-        """Return the cheapest path (w, 3) on two lattices with a spacing in cells: of centres and of highest places.
+        """Return the cheapest path (w, 3) on two lattices with a spacing in cells.
+
+        The places of one lattice are the centres of its cells, those of the other the highest places near them.
 
         Decides whether the path clears the ground.
         """
@@ -242,7 +246,10 @@ class PublicPlan:
         return np.clip(vector, self._instance.lower, self._instance.upper)
 
     def refine(self, vector: Floats, spent: Callable[[], int], budget: int) -> None:
-        """Search around a vector (30,) with Gaussians, each from the best one so far, until the budget is spent."""
+        """Search around a vector (30,) with Gaussians until the budget is spent.
+
+        Each Gaussian starts from the best vector so far.
+        """
         lower, width = self._instance.lower, self._instance.upper - self._instance.lower
         best, least = (vector - lower) / width, math.inf
         deviation = GAUSSIAN_DEVIATION

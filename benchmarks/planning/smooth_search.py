@@ -118,7 +118,10 @@ class Programme:
         return points[:, 2] - np.where(np.isnan(ground), 1e4, ground) - self.above, points
 
     def constraints(self, x: Floats, near: Near) -> tuple[Floats, Floats]:
-        """Return the constraints' values (c,), 0 or more if met, in units or cosines, and derivatives (c, 3 w)."""
+        """Return the constraints' values (c,) and their derivatives (c, 3 w).
+
+        A value is in units or cosines, and 0 or more if the constraint is met.
+        """
         path = self.path(x)
         count = len(path) - 1
         values, rows = [], []

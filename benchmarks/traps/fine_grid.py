@@ -127,7 +127,7 @@ def map_length(points: Floats) -> float:
 
 
 def climbing_length(scenario: Scenario, path: Floats, climb: float, margin: float = 0.0) -> float:
-    """Return the smallest length on the map of a route (k, 2) that climbs no more than `climb` (a tangent).
+    """Return the smallest length on the map of a route (k, 2) that climbs at most `climb` (a tangent).
 
     The ground at each place must be cleared when it is reached; a missing height is gained by a longer path before it.
     margin: height above the scenario's clearance, m.
@@ -144,7 +144,9 @@ def climbing_length(scenario: Scenario, path: Floats, climb: float, margin: floa
 
 
 def length_within(scenario: Scenario, limits: Limits, path: Floats) -> float:
-    """Return the smallest length on the map of a route (k, 2) within the slopes and the clearance of certificates.
+    """Return the smallest length on the map of a route (k, 2).
+
+    The route keeps within the slopes and the clearance of certificates.
 
     The slope is the harmonic mean of the slopes from the altitude of the start to the highest place on the route.
     """
