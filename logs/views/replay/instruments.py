@@ -42,7 +42,7 @@ _NARROW = _Size(MIN_WIDTH, 11, 21)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Instruments:
-    """Instruments of a recorded flight.
+    """Instruments of a recorded flight as frames of text, with its timeline and the ground below.
 
     log: log with legs computed from its track.
     entries: timeline of the flight.
