@@ -297,10 +297,7 @@ def _draw_paths(
     failed: Failures,
     placer: LabelPlacer,
 ) -> list[Any]:
-    """Draw route (w, 3), track, waypoints with poles to the ground, and failures.
-
-    Returns the handles for the legend.
-    """
+    """Draw route (w, 3), waypoints on poles, track and failures; return handles for the legend."""
     _, samples = route_samples(route, max(float(route_distance(route)[-1]) / 600.0, 1.0))
     if terrain is not None:
         ground = terrain.height(route[:, 0], route[:, 1])
