@@ -342,6 +342,8 @@ _IS_READING = 4
 _IS_CUT = 5
 
 
+# The walk goes from message to message by their lengths.  In a damaged place, where no valid message begins, it goes on
+# byte by byte to the next valid message.
 @compiled
 def _walk_messages(
     data: Bytes,
@@ -355,9 +357,6 @@ def _walk_messages(
     is_requested: NDArray[np.bool_],
 ) -> tuple[Ints, Bytes]:
     """Find the requested messages up to byte `stop`, and return their starts (byte numbers) and types.
-
-    The walk goes from message to message by their lengths.  In a damaged place, where no valid message begins, it goes
-    on byte by byte to the next valid message.
 
     state: progress of the walk, indexed by `_NEXT_BYTE` and so on; the walk continues from it and updates it.
     lengths: length of the messages of each type, bytes, (256,); 0 if not yet known, updated by each FMT message.
