@@ -340,7 +340,8 @@ def _weight(sheet: DataSheet) -> float:
 def _wing_area(sheet: DataSheet) -> float:
     """Return the wing area, m^2.
 
-    The area is the stated area, or else the area that the stall speed requires at the maximum lift of the class.
+    The area is the stated area, or else the area that the stall speed requires at the maximum lift coefficient of the
+    aircraft's class.
     """
     if sheet.area:
         return sheet.area

@@ -193,6 +193,9 @@ class BlindPrediction:
     def bands(self, draws: Sequence[BaseModel]) -> tuple[Band, ...]:
         """Return the band of each of `QUANTITIES` in the judged windows.
 
+        Each draw predicts every window, and gets the prediction errors of a random window of the earlier part.  The
+        bands are those of `band_limits` for these predictions.
+
         draws: draws of the aircraft with which the windows are predicted.
         """
         generator = np.random.default_rng(_SEED)

@@ -59,7 +59,8 @@ def read_track_text(path: Path, *, xml: bool) -> str:
 def _read_bytes(path: Path) -> bytes:
     """Return the bytes of a file, or of the first `.kml` in a zipped file.
 
-    Raises LogError for a zipped file that cannot be read, or that contains no `.kml`.
+    Raises LogError for a zipped file that cannot be read, that contains no `.kml`, or whose `.kml` has more than
+    `MAX_BYTES`.
     """
     if not zipfile.is_zipfile(path):
         return path.read_bytes()

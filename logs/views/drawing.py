@@ -461,7 +461,10 @@ def _draw_line(axes: Any, layer: Layer, role_style: theme.RoleStyle, **options: 
 
 
 def _draw_band(axes: Any, layer: Layer, role_style: theme.RoleStyle, **options: Any) -> None:
-    """Draw a layer as filled bands between its two edges, with gaps where an edge is unknown."""
+    """Draw a layer as filled bands between its two edges, with gaps where an edge is unknown.
+
+    A layer without a lower edge is filled down to 0.
+    """
     lower_edge = layer.lower_edge if layer.lower_edge is not None else np.zeros(len(layer.y))
     is_known = np.isfinite(layer.x) & np.isfinite(layer.y) & np.isfinite(lower_edge)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], is_known, [False]]).astype(np.int8)))

@@ -100,7 +100,7 @@ def path_layers(
 
 
 def returns_map(setup: FlightSetup, drawn_returns: DrawnReturns, track: Track | None) -> MapChart:
-    """Return a map of the worst returns, and of the path, coloured by the outcome of returns from it.
+    """Return a map of the path, coloured by the outcome of returns from it, and of the worst returns.
 
     track: the flown track; None for returns from the planned path.
     """

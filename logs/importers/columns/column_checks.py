@@ -405,7 +405,8 @@ def _check_delay(log: ColumnLog, pair: _Pair, grid: Floats) -> None:
 def _check_airspeed(log: ColumnLog, grid: Floats) -> None:
     """Raise LogError for an airspeed near zero in flight, or one that contradicts velocity and heading.
 
-    If the flight has turns, a logged wind that contradicts the wind of the velocity triangle also raises LogError.
+    The contradiction is found only in a flight with turns.  There, a logged wind that contradicts the wind of the
+    velocity triangle also raises LogError.
     """
     airspeed, column = _average_on_grid(log.series("airspeed"), grid), log.column("airspeed")
     if np.median(airspeed) < _MIN_AIRSPEED_MPS:

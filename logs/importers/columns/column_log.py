@@ -189,7 +189,8 @@ class ColumnLog:
     def parameters(self) -> dict[str, float]:
         """Return the autopilot's parameters by name, from the parameter columns and from [parameters].
 
-        A value in [parameters] takes precedence.  Raises LogError if the columns of names and values differ in length.
+        A value in [parameters] takes precedence.  Column values that are not finite are left out.  Raises LogError if
+        the columns of names and values differ in length.
         """
         if self.table.parameter_columns is None:
             return dict(self.table.parameters)
@@ -301,7 +302,10 @@ class ColumnLog:
         return MAIN_CLOCK if MAIN_CLOCK in self.table.clocks else next(iter(self.table.clocks))
 
     def _align_times(self, name: str) -> Floats:
-        """Return the times of a clock, converted to the main clock, s."""
+        """Return the times of a clock, converted to the main clock, s.
+
+        Raises LogError for a clock without `align` that has no time in common with the main clock.
+        """
         time, main = self._get_unaligned_times(name), self._get_unaligned_times(self._main_clock)
         if self.table.clocks[name].align is None and (time[0] > main[-1] or time[-1] < main[0]):
             spans = f"{time[0]:.6g} to {time[-1]:.6g} s, {self._main_clock} from {main[0]:.6g} to {main[-1]:.6g} s"

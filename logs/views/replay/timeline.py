@@ -164,7 +164,7 @@ def _list_leg_entries(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEnt
 def _list_turn_entries(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:
     """List an entry for each change to the next leg: the turn of the route, and the peak bank.
 
-    The peak bank is the largest bank between the middles of the two legs.
+    The peak bank is the largest bank between the middles of the two legs.  Corners within a loiter have no entries.
     """
     route, track = log.setup.route, log.track
     turns = signed_turns(route.positions)
