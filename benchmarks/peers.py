@@ -159,9 +159,9 @@ def solve_with_ompl(task: Task, seed: int, seconds: float, ratio: float = 0.0) -
 
 
 def measure(seconds: float) -> dict[str, Any]:
-    """Run every peer once on each problem, seed 1, the paper's budget, OMPL for a CPU time, s.
+    """Run every peer once on each problem, print a table and return it.
 
-    Print a table.
+    All peers use seed 1 and the paper's budget of evaluations, but OMPL runs for a CPU time, `seconds`.
     """
     print("\nPeers on the hard set and traps, seed 1: one problem, evaluation and certificate; one core, CPU s, warm")
     print(f"  {'problem':<13}{'method':<28}{'safe':>5}{'PLR':>9}{'/ best':>8}{'CPU s':>8}{'checks':>9}{'in ours':>9}")

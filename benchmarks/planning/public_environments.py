@@ -249,7 +249,7 @@ def make_mountains(peaks: int, zone_radius: float, rng: np.random.Generator, *, 
 def make_environments(seed: int) -> list[Environment]:
     """Make the six environments of the published programs.
 
-    The numbers of buildings and peaks and the zones are the programs'.
+    They have the numbers of buildings and peaks, and the zones, of these programs.
     """
     kinds = (
         ("city", make_city, 120, -1.0),

@@ -116,7 +116,11 @@ def decode_path(vector: Floats, ground: Floats, start: Floats, end: Floats) -> F
 
 @compiled
 def threat_cost(path: Floats, threats: Floats) -> float:
-    """Return the cost of all legs of a path (w, 4) near or in threats."""
+    """Return the cost of all legs of a path (w, 4) near or in threats.
+
+    A leg costs `COLLISION_COST` for each threat that it touches.  For each other threat it costs the number of cells by
+    which it is nearer than `DANGER_ZONE_CELLS`.
+    """
     total = 0.0
     for i in range(path.shape[0] - 1):
         east, north = path[i + 1, 0] - path[i, 0], path[i + 1, 1] - path[i, 1]

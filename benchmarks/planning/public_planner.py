@@ -79,7 +79,7 @@ def leg_costs(
     A place is east, north and height above ground.
 
     limits: longest leg in cells, the middle of the range of bearings, rad, and the highest rise, m; a longer leg
-    costs infinity, as does a leg outside the range.
+    costs infinity, as does a leg outside the range or steeper than 45 degrees that does not lead to the path's end.
     rises: see `needed_rise`.
 
     Returns the costs (n, m) without the ground, the costs with the rise that clears the ground, and the number.

@@ -318,7 +318,8 @@ def _guess_entries(quantity: str, clocks: Sequence[_Clock], files: dict[str, Dat
 def _guess_entry(quantity: str, column: str, clock: _Clock, values: Column, stated_unit: str) -> _Guess | None:
     """Guess in which unit and frame a column holds a quantity.
 
-    Return None if the column is not numeric, if it is constant, or if it is implausible in every unit.
+    Return None if the column is not numeric, if it is constant, or if it is implausible in every unit.  A column for
+    `mode` may have any values.
 
     stated_unit: unit from the column's name or the file, or "".
     """
