@@ -104,7 +104,7 @@ def _most(values: NDArray[Any]) -> float:
 def windy(seed: int, speed: float = 10.0, turbulence: str = "moderate", share: float = 0.8, **more: Any) -> FlightSetup:
     """Make the standard mission in a wind from the seed's direction.
 
-    The slopes of the mission are scaled to the model's limits.
+    Its slopes are limited to the fraction `share` of the model's limits in this wind.
     """
     from_deg = float(np.random.default_rng(seed).uniform(0.0, 360.0))
     waypoints = standard()

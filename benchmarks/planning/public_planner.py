@@ -168,8 +168,7 @@ class PublicPlan:
         """Return the cheapest path (w, 3) on two lattices with a spacing in cells.
 
         The places of one lattice are the centres of its cells, those of the other the highest places near them.
-
-        Decides whether the path clears the ground.
+        Also sets `is_clear`: True if the path clears the ground.
         """
         ground = self._instance.ground
         rows, columns = ground.shape
