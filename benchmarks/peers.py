@@ -76,8 +76,8 @@ def best_path(task: Task, vectors: Floats) -> Floats:
 def solve_with_cmaes(task: Task, seed: int, evaluations: int, *, seeded: bool = True, sigma: float = 0.05) -> Found:
     """Search with CMA-ES in the smooth basis, with restarts.
 
-    It starts from planfly's best coarse seed if `seeded`, otherwise from the straight line.  A restart begins at the best path
-    so far.
+    It starts from planfly's best coarse seed if `seeded`, otherwise from the straight line.  A restart begins at
+    the best path so far.
     """
     from cmaes import CMA
 
