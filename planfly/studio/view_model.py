@@ -370,7 +370,7 @@ def profile_json(scenario: Scenario, setup: FlightSetup) -> Json:
                 "role": "zone",
                 "name": cut.zone.name,
                 "x": round_to_json(distance),
-                "top": round_to_json(np.where(cut.where, cut.top, np.nan)),
+                "top": round_to_json(np.where(cut.is_forbidden, cut.top, np.nan)),
                 "low": round_to_json(cut.bottom),
             }
             for cut in zone_cuts(scenario.zones, view)
