@@ -2,15 +2,16 @@
 
 A suggestion is applied to the mission, judged by geometry, and flown if the verdict is on a flight that reached the
 place of the finding.  It passes if its finding is then ok, and every finding that passed before still passes.  A step
-that is too small, such as a change of height, is enlarged by the missing part.  A suggestion that passed states the
-moves of the items, and the findings that fail or are undecided on a part of the mission that was not flown before.
+that is too small, such as a change of height, is enlarged by the missing part.  If a part of its moves passes too,
+this part is suggested.  A suggestion that passed states the moves of the items, and the findings that fail or are
+undecided on a part of the mission that was not flown before.
 """
 
 import math
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from itertools import islice
+from itertools import combinations, islice
 
 from flight.mission.items import Mission
 from flight.simulation.setup import FlightSetup
@@ -49,12 +50,16 @@ MAX_TRIED_FINDINGS = 6
 MAX_TRIAL_FLIGHTS = 4
 # Greatest number of missions that are tried for one suggestion: the suggestion itself and larger steps.
 _MAX_STEPS = 10
+# Greatest number of parts of one suggestion's moves that are tried: all parts of four moves.
+_MAX_TRIED_PARTS = 14
 # Greatest number of failed findings with suggestions; if more fail, no single change is worth a trial.
 _MAX_FAILED_FINDINGS = 40
 # Greatest number of legs of a mission with trials and a reference flight: each judges all legs, 2 s for a thousand.
 MAX_TRIED_LEGS = 5000
 # Changes by a step, m, and of a parameter in m, which are enlarged while the finding fails.
 _STEP_KINDS = frozenset(("height", "descent", "inset", "distance", "north", "east", "south", "west", "parameter"))
+# Changes of which a part of the moves may be enough.
+_PART_KINDS = frozenset(("height", "descent", "north", "east", "south", "west"))
 # Changes of the energy carried or needed, as a ratio or a percentage.
 _ENERGY_KINDS = frozenset(("battery", "tank", "duration"))
 # Greatest share of a leg's height error that may remain with a suggestion for its slope.
@@ -266,7 +271,7 @@ class SuggestionTrials:
     def find_passing(self) -> list[PassedTrial]:
         """Try the first suggestion of each finding, then the second and so on.
 
-        Returns the suggestions that pass.
+        Returns the suggestions that pass, with the fewest moves that are enough.
         """
         requests = [
             (number, rank, finding)
@@ -280,6 +285,8 @@ class SuggestionTrials:
                     continue
                 passed_trial = self.try_suggestion(finding, number)
                 passed_trials += [] if passed_trial is None else [passed_trial]
+            for index, trial in enumerate(passed_trials):
+                passed_trials[index] = self._with_fewest_moves(trial)
         return [
             trial for trial in passed_trials if not _has_passing_part(passed_trials, trial.finding, trial.suggestion)
         ]
@@ -305,9 +312,14 @@ class SuggestionTrials:
 
         number: index of the suggestion among those of the finding.
         """
-        candidates = islice(self._growing_suggestions(finding, finding.suggestions[number]), _MAX_STEPS)
+        return self._first_passing(finding, self._growing_suggestions(finding, finding.suggestions[number]), _MAX_STEPS)
+
+    def _first_passing(
+        self, finding: Finding, candidates: Iterator[tuple[Suggestion, Trial]], max_count: int
+    ) -> PassedTrial | None:
+        """Return the first of at most `max_count` candidates whose trial passes, or None."""
         passed_candidate = first_that_passes(
-            candidates,
+            islice(candidates, max_count),
             lambda candidate: (
                 _has_margin(finding, candidate[0], candidate[1].geometry_verdict)
                 and self._passes_trial(finding, candidate[1])
@@ -324,6 +336,34 @@ class SuggestionTrials:
             not_flown=self._is_unreached(finding),
         )
         return PassedTrial(finding, (*first_changes, last_change), trial.setup)
+
+    def _with_fewest_moves(self, whole: PassedTrial) -> PassedTrial:
+        """Return the trial of the smallest part of a suggestion's moves that passes; the whole if no part does.
+
+        Single moves are tried first, then pairs and so on, with the flights that are left.
+        """
+        parts = self._parts(whole.finding, whole.suggestion)
+        return self._first_passing(whole.finding, parts, _MAX_TRIED_PARTS) or whole
+
+    def _parts(self, finding: Finding, suggestion: Suggestion) -> Iterator[tuple[Suggestion, Trial]]:
+        """Yield the parts of a suggestion's moves, the smallest first, each with its trial."""
+        moves = _item_moves(suggestion)
+        if len(moves) < 2 or not {change.what for change in suggestion} <= _PART_KINDS:
+            return
+        for count in range(1, len(moves)):
+            for part in combinations(moves, count):
+                if all(change.place.kind in ("leg", "waypoint") for change in suggestion):
+                    smaller = tuple(self._raised_waypoint(suggestion, move) for move in part)
+                else:
+                    smaller = (*suggestion[:-1], replace(suggestion[-1], moves=part))
+                with suppress(PlanflyError):
+                    yield smaller, self._trial(finding, smaller)
+
+    def _raised_waypoint(self, suggestion: Suggestion, move: ItemMove) -> Change:
+        """Return the change of a waypoint's altitude that a suggestion for legs makes to its item."""
+        waypoint = self.judged.setup.route.items.tolist().index(move.item)
+        place = self.judged.requirements.waypoint(waypoint)
+        return replace(suggestion[-1], place=place, wanted=round(abs(move.up), 2), moves=(move,))
 
     def _passes_trial(self, finding: Finding, trial: Trial) -> bool:
         """Return True if a trial passes by geometry, and by a flight if the judged flight reached the finding's place.
@@ -367,16 +407,10 @@ class SuggestionTrials:
         a suggestion cannot be enlarged or applied. Raises TrialAborted.
         """
         while True:
-            if self.should_abort():
-                raise TrialAborted
             try:
-                mission, setup = self._changed_flight(finding, suggestion)
+                trial = self._trial(finding, suggestion)
             except PlanflyError:
                 return
-            new_trial = Trial(setup, self.context.uav.aircraft, self.should_abort)
-            parameters = tuple(suggested_parameters(suggestion).items())
-            key = mission.items, mission.home, setup.battery, setup.scenario.launch, parameters
-            trial = self._trials.setdefault(key, new_trial)
             yield suggestion, trial
             verdict = trial.flight_verdict if "flight_verdict" in vars(trial) else trial.geometry_verdict
             larger_suggestion = _larger_suggestion(finding, suggestion, verdict)
@@ -385,6 +419,18 @@ class SuggestionTrials:
             if larger_suggestion is None:
                 return
             suggestion = larger_suggestion
+
+    def _trial(self, finding: Finding, suggestion: Suggestion) -> Trial:
+        """Return the trial of a suggestion, the same one for equal missions and setups.
+
+        Raises MissionError if the suggestion cannot be applied, and TrialAborted.
+        """
+        if self.should_abort():
+            raise TrialAborted
+        mission, setup = self._changed_flight(finding, suggestion)
+        parameters = tuple(suggested_parameters(suggestion).items())
+        key = mission.items, mission.home, setup.battery, setup.scenario.launch, parameters
+        return self._trials.setdefault(key, Trial(setup, self.context.uav.aircraft, self.should_abort))
 
     def _with_present_lengths(self, suggestion: Suggestion) -> Suggestion:
         """Return a suggestion whose current leg lengths are those of the unchanged mission."""

@@ -176,7 +176,7 @@ def test_items_that_state_heights_above_home_as_amsl_are_offered_the_other_frame
     judged = judge_mission_geometry(setup_of(*lines, home="36.5 -84.2 100"))
     (finding, *_) = [finding for finding in judged.failed if finding.rule == "clearance"]
     first = "read the altitudes of the items below ground as heights above home (frame 3 instead of 0)"
-    assert finding.suggestion.startswith(f"{first}, or raise both ends of leg 0")
+    assert finding.suggestion.startswith(f"{first}, or raise waypoint 1 (item 2) by 50 m (move item 2 up by 50 m)")
     # Below the ground in both frames, the item is raised.
     lines[1] = wp(0, 2500, -20.0, frame=0)
     judged = judge_mission_geometry(setup_of(*lines, home="36.5 -84.2 100"))
@@ -253,8 +253,10 @@ class Flights:
 def trials_of(
     monkeypatch: pytest.MonkeyPatch, findings: list[Finding], fails: Callable[[float], list[Finding]]
 ) -> tuple[SuggestionTrials, Flights]:
+    """Trials of whole suggestions: no parts of their moves are tried."""
     flights = Flights(fails)
     monkeypatch.setattr(suggestion_trials, "Trial", flights)
+    monkeypatch.setattr(suggestion_trials, "_MAX_TRIED_PARTS", 0)
     judged = replace(SESSION.judged, verdict=verdict_of(*findings))
     return SuggestionTrials(CONTEXT, judged), flights
 
@@ -266,6 +268,60 @@ def test_a_step_that_is_too_small_in_flight_is_enlarged_by_what_is_missing(monke
     [tried] = tried_suggestions(trials.find_passing())
     assert tried.suggestions == (higher(1, 23.0),)
     assert flights.count == 2
+
+
+@pytest.mark.parametrize(
+    ("enough", "moved"),
+    [({1}, {1}), ({7}, {7}), ({2, 6}, {2, 6}), ({1, 2, 7}, {1, 2, 7}), ({1, 2, 6, 7}, {1, 2, 6, 7}), (set(), {1})],
+)
+def test_the_smallest_part_of_the_moves_that_passes_is_suggested(
+    enough: set[int], moved: set[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Raising legs 1 and 6 moves waypoints 1, 2, 6 and 7; the flight passes if all waypoints of `enough` are raised."""
+    altitudes = SESSION.judged.setup.route.positions[:, 2]
+    flown: list[int] = []
+
+    class RaisedTrial:
+        def __init__(self, setup: FlightSetup, *_: Any) -> None:
+            raised = {k for k, up in enumerate(setup.route.positions[:, 2] - altitudes) if up > 1.0}
+            flown.append(len(raised))
+            self.setup, self.requirements, self.geometry_verdict = setup, SESSION.judged.requirements, verdict_of()
+            self.flight_verdict = verdict_of() if raised and enough <= raised else verdict_of(low(1))
+
+    monkeypatch.setattr(suggestion_trials, "Trial", RaisedTrial)
+    judged = replace(SESSION.judged, verdict=verdict_of(low(1, (*higher(1, 12.0), *higher(6, 12.0)))))
+    (trial,) = SuggestionTrials(CONTEXT, judged).find_passing()
+    items = SESSION.judged.setup.route.items
+    assert {move.item for change in trial.suggestion for move in change.moves} == {items[k] for k in moved}
+    assert {change.wanted for change in trial.suggestion} == {12.0}
+    # The whole suggestion is tried first, after the unchanged mission, and then single items before pairs.
+    assert flown[:2] == [0, 4]
+    assert flown[2:] == sorted(flown[2:])
+    if len(moved) < 4:
+        assert [change.place.index for change in trial.suggestion] == sorted(moved)
+        change = trial.suggestion[0]
+        assert f"(item {items[min(moved)]}) by 12 m (move item" in suggestion_text((change,))
+
+
+def test_one_end_of_a_leg_is_raised_if_that_is_enough() -> None:
+    """From 80 m down to 20 m above ground where 30 m are required: 10 m are missing at the end, and 1 m is added."""
+    lines = [wp(0, 500, 80.0), wp(0, 2500, 80.0), wp(0, 4500, 20.0)]
+    judged = judge_mission_geometry(setup_of(*lines, home="36.5 -84.2 100"))
+    (finding,) = [finding for finding in judged.failed if finding.rule == "clearance"]
+    assert finding.suggestion == "raise waypoint 2 (item 3) by 11 m (move item 3 up by 11 m)"
+
+
+def test_one_end_of_a_leg_is_moved_past_a_zone_if_that_is_enough() -> None:
+    """The zone reaches 40 m west of item 3, 2000 m behind item 2, which stays."""
+    corners = [[-40.0, 2400.0], [300.0, 2400.0], [300.0, 2700.0], [-40.0, 2700.0]]
+    zone = {"name": "town", "kind": "exclusion", "polygon_m": corners}
+    lines = [wp(-3000, 500, 80.0), wp(0, 500, 80.0), wp(0, 2500, 80.0), wp(-3000, 2500, 80.0)]
+    judged = judge_mission_geometry(setup_of(*lines, home="36.5 -84.2 100", zones=[zone]))
+    (finding,) = judged.failed
+    (west,) = [way[-1] for way in finding.suggestions if way[-1].what == "west"]
+    assert [move.item for move in west.moves] == [3]
+    assert west.moves[0].east == pytest.approx(-west.wanted, abs=0.1)
+    assert west.wanted > 40.0
 
 
 def test_no_larger_step_shortens_a_flight_to_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
