@@ -13,6 +13,8 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from itertools import combinations, islice
 
+import numpy as np
+
 from flight.mission.items import Mission
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Finding, undecided_findings, worst_first_key
@@ -30,7 +32,7 @@ from logs.verdict.places import (
 from logs.verdict.rules.registry import with_passing_suggestions
 from logs.verdict.suggestions import RTL_ALTITUDE_STEP_M
 from logs.verdict.tolerances import HEIGHT_ERROR_LIMIT_M
-from logs.verdict.trials import first_that_passes
+from logs.verdict.trials import first_that_passes, least_change
 from logs.verdict.verdict import Verdict
 from planfly.workflow.apply_suggestion import apply_suggestion, item_moves
 from planfly.workflow.mission_context import JudgedMission, MissionContext
@@ -406,12 +408,15 @@ class SuggestionTrials:
         Each suggestion is applied to the unchanged mission in one step, as a user would apply it. The series ends when
         a suggestion cannot be enlarged or applied. Raises TrialAborted.
         """
+        failed_value = max((change.current or 0.0 for change in suggestion if change.parameter), default=0.0)
         while True:
             try:
+                suggestion = self._with_least_parameter(finding, suggestion, failed_value)
                 trial = self._trial(finding, suggestion)
             except PlanflyError:
                 return
             yield suggestion, trial
+            failed_value = max(suggested_parameters(suggestion).values(), default=0.0)
             verdict = trial.flight_verdict if "flight_verdict" in vars(trial) else trial.geometry_verdict
             larger_suggestion = _larger_suggestion(finding, suggestion, verdict)
             if larger_suggestion is not None:
@@ -419,6 +424,33 @@ class SuggestionTrials:
             if larger_suggestion is None:
                 return
             suggestion = larger_suggestion
+
+    def _with_least_parameter(self, finding: Finding, suggestion: Suggestion, failed_value: float) -> Suggestion:
+        """Return a suggestion with the smallest value of its parameters that passes by geometry.
+
+        The suggestion is returned unchanged if it has no parameters, if it fails by geometry, or if the failed value
+        passes by geometry and fails only in flight.
+
+        failed_value: greatest value that was tried, all parameters being set to the same value.
+        """
+
+        def with_value(value: float) -> Suggestion:
+            """Return the suggestion with another value of its parameters."""
+            return tuple(replace(change, wanted=value) if change.parameter else change for change in suggestion)
+
+        def passes(value: float) -> bool:
+            """Return True if a value passes by geometry, with a margin."""
+            candidate = with_value(value)
+            verdict = self._trial(finding, candidate).geometry_verdict
+            is_better = is_improved(self._current_trial.geometry_verdict, verdict, finding)
+            return is_better and _has_margin(finding, candidate, verdict)
+
+        largest_value = max(suggested_parameters(suggestion).values(), default=failed_value)
+        if largest_value <= failed_value or passes(failed_value) or not passes(largest_value):
+            return suggestion
+        first_value = math.floor(failed_value / RTL_ALTITUDE_STEP_M + 1.0) * RTL_ALTITUDE_STEP_M
+        values = np.arange(first_value, largest_value, RTL_ALTITUDE_STEP_M).tolist()
+        return with_value(least_change([*values, largest_value], passes) or largest_value)
 
     def _trial(self, finding: Finding, suggestion: Suggestion) -> Trial:
         """Return the trial of a suggestion, the same one for equal missions and setups.
@@ -539,7 +571,7 @@ def _larger_suggestion(finding: Finding, suggestion: Suggestion, verdict: Verdic
     if not (same_finding or same_rule_legs) and suggested_parameters(suggestion):
         # The finding passes without the margin of a parameter.
         return tuple(
-            replace(change, wanted=change.wanted + RTL_ALTITUDE_STEP_M) if change.what == "parameter" else change
+            replace(change, wanted=change.wanted + _GROWTH_M) if change.what == "parameter" else change
             for change in suggestion
         )
     return larger_suggestion

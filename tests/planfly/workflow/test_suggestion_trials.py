@@ -539,8 +539,8 @@ def test_a_low_return_is_offered_the_parameter_of_its_altitude_or_a_higher_start
     (finding,) = [finding for finding in judge_mission_geometry(low_return()).failed if finding.rule == "clearance"]
     (end,), (start,) = finding.suggestions
     assert (end.what, end.place, end.parameter, end.current) == ("parameter", FLIGHT, "RTL_ALTITUDE", 100.0)
-    # In steps of 5 m, with the margin of 1.2 m, and the enlargement of steps.
-    assert end.wanted in (115.0, 120.0)
+    # 1.2 m more than the required 130 m are kept: twice 131.2 m less 150 m is 112.4 m.  The grid cuts the top.
+    assert end.wanted in (112.0, 113.0)
     assert (start.what, start.place) == ("height", Place("waypoint", 1, 2))
     assert 10.0 <= start.wanted <= 22.0
     assert f"set RTL_ALTITUDE to {end.wanted:g} m instead of 100 m" in finding.suggestion
@@ -548,11 +548,12 @@ def test_a_low_return_is_offered_the_parameter_of_its_altitude_or_a_higher_start
         f"raise waypoint 1 (item 2) by {start.wanted:.0f} m (move item 2 up by {start.wanted:.0f} m)"
         in finding.suggestion
     )
-    # It passes with the parameter, and with its margin.
-    passing = judge_mission_geometry(low_return(rtl_altitude=end.wanted))
-    assert not passing.failed
-    margins = [other.margin for other in passing.findings if other.rule == "clearance" and other.place.to_item == 3]
-    assert all(margin is not None and margin >= 1.2 for margin in margins)
+    # It passes with the parameter, and with its margin; 1 m less has no such margin.
+    for altitude, has_margin in ((end.wanted, True), (end.wanted - 1.0, False)):
+        judged = judge_mission_geometry(low_return(rtl_altitude=altitude))
+        margins = [other.margin for other in judged.findings if other.rule == "clearance" and other.place.to_item == 3]
+        assert all(margin is not None and margin >= 1.2 for margin in margins) is has_margin
+        assert not (has_margin and judged.failed)
 
 
 def test_a_return_that_keeps_its_altitude_is_offered_a_higher_start_only() -> None:
