@@ -522,8 +522,9 @@ def _zone_shortfall(finding: Finding, verdict: Verdict) -> float:
     """Return by how much a path passes the zone of a finding closer than the navigation error, m; 0 if it does not."""
     for other in verdict.findings:
         facts = {fact.what: fact.value for fact in other.facts if other.rule == "fence"}
-        if "nearest zone" in facts and facts["nearest zone"] == finding.place.index:
-            return facts["navigation error"] - facts["nearest"]
+        distance = facts.get(f"distance to zone {finding.place.index}")
+        if distance is not None:
+            return facts["navigation error"] - distance
     return 0.0
 
 
