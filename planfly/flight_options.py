@@ -198,7 +198,7 @@ class WindsOptions(MissionOptions, total=False):
 
     spread: str | Path | None
     flights: int | None
-    confidence: Annotated[float, 0.95]
+    confidence: float | None
     workers: int | None
     scheduler: str | None
 
