@@ -311,6 +311,39 @@ def test_one_end_of_a_leg_is_raised_if_that_is_enough() -> None:
     assert finding.suggestion == "raise waypoint 2 (item 3) by 11 m (move item 3 up by 11 m)"
 
 
+def test_a_distance_from_a_missile_is_enlarged_by_what_is_missing() -> None:
+    """40 m that still lack 10 m become 40 m and once and a half of 10 m and 2 m; 10.4 m add 17.6 m, rounded."""
+    place = Place("missile", 0, name="sa")
+
+    def near(missing: float) -> Finding:
+        change = Change("distance", place, None, missing, "m")
+        return replace(make_finding("threat", place, ok=False, reason=""), suggestions=((change,),))
+
+    for missing, wanted in ((10.0, 57.0), (10.4, 58.0), (0.0, 42.0)):
+        larger = suggestion_trials._larger_suggestion(near(40.0), near(40.0).suggestions[0], verdict_of(near(missing)))
+        assert larger == (Change("distance", place, None, wanted, "m"),)
+    # Another missile's distance is no part of it.
+    other = replace(near(10.0), place=Place("missile", 1, name="sb"))
+    assert suggestion_trials._larger_suggestion(near(40.0), near(40.0).suggestions[0], verdict_of(other)) is None
+
+
+@pytest.mark.parametrize(
+    ("distance", "wanted"),
+    # The navigation error of 4.5 m less 1.3 m is 3.2 m, and 1.5 times 3.2 m and 2 m are 6.8 m, rounded up to 7 m.
+    [(1.3, 19.0), (3.5, 16.0), (4.5, None), (9.0, None)],
+)
+def test_a_distance_from_a_zone_is_enlarged_to_the_navigation_error(distance: float, wanted: float | None) -> None:
+    """Zone 1 is passed at its own distance, also if zone 0 is nearer."""
+    place = Place("exclusion", 1, name="town")
+    suggestion = (Change("north", place, None, 12.0, "m"),)
+    finding = replace(make_finding("fence", place, ok=False, reason=""), suggestions=(suggestion,))
+    values = {"navigation error": 4.5, "distance to zone 0": 0.5, "distance to zone 1": distance}
+    facts = [Fact(name, value, "m") for name, value in values.items()]
+    passed = make_finding("fence", FLIGHT, ok=True, reason="", facts=facts)
+    larger = suggestion_trials._larger_suggestion(finding, suggestion, verdict_of(passed))
+    assert larger == (None if wanted is None else (replace(suggestion[0], wanted=wanted),))
+
+
 def test_one_end_of_a_leg_is_moved_past_a_zone_if_that_is_enough() -> None:
     """The zone reaches 40 m west of item 3, 2000 m behind item 2, which stays."""
     corners = [[-40.0, 2400.0], [300.0, 2400.0], [300.0, 2700.0], [-40.0, 2700.0]]
