@@ -201,7 +201,10 @@ class Plan:
 
     @property
     def safe(self) -> bool:
-        """True if the path is feasible and outside every missile sphere."""
+        """True if the path is feasible and outside every missile sphere.
+
+        Flights of a safe plan may still fail; `planfly.what_may_fail` returns known causes.
+        """
         return self.feasible and self.certificate.kill_distance > 0.0
 
     @property
