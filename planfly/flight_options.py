@@ -198,7 +198,7 @@ class WindsOptions(MissionOptions, total=False):
 
     spread: str | Path | None
     flights: int | None
-    confidence: Annotated[float, 0.95]
+    confidence: float | None
     workers: int | None
     scheduler: str | None
 
@@ -314,7 +314,10 @@ class NamedFences:
         if mission.rally and self.rally:
             mission_rally_text = count_text(len(mission.rally), "rally point")
             warnings = (*warnings, f"the mission's own {mission_rally_text} may be used in addition to the named ones")
-        fences = number_items([*mission.fences, *self.items])
+        fences = (*mission.fences, *self.items)
+        if len({item.seq for item in fences}) < len(fences):
+            # Fence items of several files are numbered together.
+            fences = number_items(fences)
         rally = number_items([*mission.rally, *self.rally])
         return replace(mission, fences=fences, rally=rally, warnings=warnings)
 

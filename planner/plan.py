@@ -201,7 +201,10 @@ class Plan:
 
     @property
     def safe(self) -> bool:
-        """True if the path is feasible and outside every missile sphere."""
+        """True if the path is feasible and outside every missile sphere.
+
+        Flights of a safe plan may still fail; `planfly.what_may_fail` returns known causes.
+        """
         return self.feasible and self.certificate.kill_distance > 0.0
 
     @property
@@ -263,9 +266,15 @@ class Plan:
         return plan_json(self) == plan_json(other) if isinstance(other, Plan) else NotImplemented
 
     def __repr__(self) -> str:
-        """Describe the plan in a line: scenario, number of waypoints, state and length."""
-        ratio = self.objectives.length_ratio
-        return f"<Plan {self.scenario.name}: {len(self.waypoints)} waypoints, {self.state}, {ratio:.4f} times straight>"
+        """Describe the plan in a line: scenario, number of waypoints, state and length.
+
+        A safe plan under a number in [limits] is "safe by [limits]", because the number may be looser than the limit of
+        the aircraft or its autopilot.
+        """
+        ratio, limits = self.objectives.length_ratio, self.scenario.limits
+        has_numbers = {limits.max_turn_deg, limits.max_climb_deg, limits.max_dive_deg} != {"aircraft"}
+        state = "safe by [limits]" if self.safe and has_numbers else self.state
+        return f"<Plan {self.scenario.name}: {len(self.waypoints)} waypoints, {state}, {ratio:.4f} times straight>"
 
     def _repr_html_(self) -> str:
         """Return HTML for notebooks."""

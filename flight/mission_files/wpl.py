@@ -118,7 +118,8 @@ def parse_waypoints(text: str, source: str) -> Mission:
     # Fence and rally items without a home line are numbered from 0, too.
     first_number = 0 if _begins_with_home(items) or items[0].command in _COMMANDS_WITH_OWN_FILES else 1
     home, body = _split_home([replace(item, seq=seq) for seq, item in enumerate(items, first_number)])
-    fences = number_items([item for item in body if item.command in FENCES])
+    # Messages on a fence item state its number in the file, as ground stations show it.
+    fences = tuple(item for item in body if item.command in FENCES)
     fence_shapes(fences, source)
     return Mission(
         home=home,
@@ -278,7 +279,7 @@ def fence_text(mission: Mission) -> str:
 
     MAVProxy's `fence load` reads this form.
     """
-    return _file_without_home(mission.fences)
+    return _file_without_home(number_items(mission.fences))
 
 
 def rally_text(mission: Mission) -> str:

@@ -635,7 +635,7 @@ def suggest_flying_higher(
 
 
 # Step in which the altitude of an RTL is suggested, m.
-RTL_ALTITUDE_STEP_M = 5.0
+RTL_ALTITUDE_STEP_M = 1.0
 
 
 def _suggest_higher_return(requirements: RouteRequirements, shortfall: float) -> tuple[Suggestion, ...]:

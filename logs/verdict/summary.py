@@ -227,7 +227,9 @@ def _near_miss_notes(findings: Sequence[Finding]) -> list[str]:
         place = _NEAR_MISS_PLACES.get(finding.rule)
         facts = {fact.what: fact.value for fact in finding.facts if place and finding.ok}
         if facts.get("nearest", math.inf) < facts.get("navigation error", 0.0):
-            notes.append(f"passes {max(0.0, facts['nearest']):.1f} m {place}, less than the navigation error")
+            other_count = sum(name.startswith("distance to zone") for name in facts) - 1
+            others = f" ({count_text(other_count, 'other zone')}, too)" if other_count > 0 else ""
+            notes.append(f"passes {max(0.0, facts['nearest']):.1f} m {place}, less than the navigation error{others}")
     return notes
 
 

@@ -22,10 +22,9 @@ from planfly.campaigns.dispersions import Dispersions, default_dispersions, read
 from planfly.campaigns.find_battery import BatteryGoal, BatteryResult, find_battery
 from planfly.campaigns.find_winds import (
     SEARCHED_QUANTITIES,
-    WindsGoal,
     WindsResult,
     find_winds,
-    flight_limit,
+    make_winds_goal,
     open_winds_store,
 )
 from planfly.campaigns.flight_row import FlightRow
@@ -399,9 +398,9 @@ def compare_campaigns(first: str | Path, second: str | Path) -> CampaignComparis
 def winds(
     target: Plan | Scenario | str | Path,
     *,
-    prove: float = 0.99,
-    directions: int = 16,
-    most: float = 20.0,
+    prove: float | None = None,
+    directions: int | None = None,
+    most: float | None = None,
     out: str | Path | None = None,
     resume: bool = False,
     overwrite: bool = False,
@@ -414,12 +413,12 @@ def winds(
 
     target: a built-in scenario's name, a scenario's TOML file, a `Scenario`, a `Plan`, or a plan.json, .waypoints or
     .plan file.
-    prove: required probability of a flyable flight.
-    directions: number of wind directions, 4 to 72.
-    most: strongest wind that is searched, m/s.
-    flights: maximum number of flights for all directions together; None takes 5,000, or the earlier number of a resumed
-    search.
-    confidence: confidence level of each interval.
+    prove: required probability of a flyable flight; None takes 0.99.
+    directions: number of wind directions, 4 to 72; None takes 16.
+    most: strongest wind that is searched, m/s; None takes 20.
+    flights: maximum number of flights for all directions together; None takes 5,000.
+    confidence: confidence level of each interval; None takes 0.95.
+    For a resumed search, None takes the earlier value of each of these five.
     spread, seed, workers, scheduler: see `planfly.campaign`.  For the other options, see `planfly.fly`.
     out: a folder for ``winds.html``, ``winds.png``, ``winds.json`` and the flights; None keeps no files.
     resume: True continues the search in the folder.  overwrite: True replaces the search.
@@ -436,7 +435,8 @@ def winds(
     workers_used = make_workers(options["workers"], options["scheduler"], options["seed"])
     with campaign_folder(out, WINDS_DATABASE, resume=resume, overwrite=overwrite) as directory:
         folder = directory.folder
-        goal = WindsGoal(prove, confidence, directions, most, flight_limit(flights, folder, resume=resume))
+        numbers = {"target": prove, "confidence": confidence, "directions": directions, "most": most}
+        goal = make_winds_goal({**numbers, "flights": flights}, folder, resume=resume)
         mission_options = _with_stored_options(options, directory)
         spread = mission_options["spread"]
         base = _open_base(target, mission_options, _read_spread(spread).without(SEARCHED_QUANTITIES), directory)

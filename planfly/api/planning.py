@@ -71,7 +71,7 @@ def plan(
     >>> import planfly
     >>> path = planfly.plan("tight", seed=1)
     >>> path
-    <Plan tight: 22 waypoints, safe, ...>
+    <Plan tight: 22 waypoints, safe by [limits], ...>
     >>> path.waypoints.shape
     (22, 3)
     >>> mine = path.waypoints + [[0.0, 0.0, 0.0], *[[0.0, 100.0, 0.0]] * 20, [0.0, 0.0, 0.0]]

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planfly.arguments import check_arguments
-from planfly.campaigns.find_winds import DEFAULT_WIND_FLIGHTS, WindsGoal
+from planfly.campaigns.find_winds import DEFAULT_WINDS_GOAL, WindsGoal
 from planfly.campaigns.statistics.decision import DEFAULT_CONFIDENCE, Answer, Goal, Interval
 from planfly.campaigns.summary import CampaignSummary, campaign_lines
 from planfly.campaigns.tables import read_path_arrays, with_place_numbers
@@ -51,7 +51,7 @@ def winds_command_line(target: str, goal: WindsGoal, options: Mapping[str, objec
     >>> winds_command_line("jacksboro-air", WindsGoal(0.9, 0.95, 8, 20.0, 5000), {"seed": 1})
     'planfly winds jacksboro-air --prove 0.9 --directions 8 --seed 1'
     """
-    flights = None if goal.flights == DEFAULT_WIND_FLIGHTS else goal.flights
+    flights = None if goal.flights == DEFAULT_WINDS_GOAL.flights else goal.flights
     goal_options = {"prove": goal.target, "directions": goal.directions, "most": goal.most, "flights": flights}
     return command_line("winds", target, {**goal_options, "confidence": goal.confidence, **options})
 

@@ -7,7 +7,7 @@ from contextlib import ExitStack
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from logs.verdict.conditions import Conditions
 from logs.verdict.places import Place
@@ -76,19 +76,22 @@ class WindsGoal:
     flights: int
 
 
-# Default number of flights of a search.
-DEFAULT_WIND_FLIGHTS = 5000
+# Goal of a search without any of its options.
+DEFAULT_WINDS_GOAL = WindsGoal(target=0.99, confidence=0.95, directions=16, most=20.0, flights=5000)
 
 
-def flight_limit(requested: int | None, folder: Path, *, resume: bool) -> int:
-    """Return the maximum number of flights of a search for winds.
+def make_winds_goal(requested: Mapping[str, float | None], folder: Path, *, resume: bool) -> WindsGoal:
+    """Return the goal of a search for winds.
 
-    It is the requested number.  If that is None, it is the number stored in the folder of a resumed search, or else the
-    default.
+    requested: values of the goal's fields; for None, the value is that in the folder of a resumed search, or else the
+        default.
     Raises StoreError for a file that planfly did not write, or that another process has locked.
     """
     settings = read_stored_settings(folder / WINDS_DATABASE) if resume else {}
-    return int(settings.get("flights", DEFAULT_WIND_FLIGHTS)) if requested is None else requested
+    stored = {name: settings[name] for name in asdict(DEFAULT_WINDS_GOAL) if name in settings}
+    stated = {name: value for name, value in requested.items() if value is not None}
+    values: dict[str, Any] = {**asdict(DEFAULT_WINDS_GOAL), **stored, **stated}
+    return WindsGoal(**values)
 
 
 # Boundary below which a mission is not flyable with the target probability even in calm air, m/s; printed as 0.0.

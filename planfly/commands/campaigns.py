@@ -91,28 +91,24 @@ def add_winds_parser(command_line: LineParser) -> None:
         "--prove",
         metavar="P",
         type=number_parser("prove"),
-        default=0.99,
-        help="probability of a flyable flight that is to be proved (default: 0.99)",
+        help="probability of a flyable flight that is to be proved (default: 0.99; with --resume, its earlier value)",
     )
     parser.add_argument(
         "--confidence",
         metavar="C",
         type=number_parser("confidence"),
-        default=0.95,
         help="confidence level of each interval (default: 0.95)",
     )
     parser.add_argument(
         "--directions",
         metavar="N",
         type=number_parser("directions"),
-        default=16,
         help="number of directions, 4 to 72 (default: 16)",
     )
     parser.add_argument(
         "--most",
         metavar="M/S",
         type=number_parser("most"),
-        default=20.0,
         help="strongest wind to try, m/s (default: 20)",
     )
     parser.add_argument(

@@ -121,6 +121,7 @@ def overlap_lines(measure: OverlapMeasure | None, *, is_flown: bool = True) -> t
         sampling_text = " to ".join(dict.fromkeys(f"{100.0 * distance:.1f}" for distance in measure.ground_sampling))
         heights_text = f"{measure.min_height:.0f} m to {measure.max_height:.0f} m above ground"
         texts.append(f"ground sampling distance {sampling_text} cm per pixel ({heights_text})")
+    texts.append("motion blur is not judged")
     return tuple(texts)
 
 

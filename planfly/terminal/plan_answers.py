@@ -56,6 +56,8 @@ class FrontEntry:
     energy_wh: float | None
     """Energy, Wh; null if the power of the aircraft is not known."""
     time_s: float
+    expected_failures: list[str]
+    """As for planfly plan, but without flights of a steep final approach."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
@@ -92,9 +94,9 @@ def front_answer(front: "Front", folder: Path, code: int) -> FrontAnswer:
 
     default_plan = front.default.plan
     entries = []
-    for row in table_rows(front):
+    for row, failures in zip(table_rows(front), _expected_failures(front), strict=True):
         number = row.pop("plan")
-        entries.append(FrontEntry(file=str(folder / f"plan-{number}.json"), **row))
+        entries.append(FrontEntry(file=str(folder / f"plan-{number}.json"), expected_failures=list(failures), **row))
     return FrontAnswer(
         exit_code=code,
         scenario=default_plan.scenario.name,
@@ -106,6 +108,15 @@ def front_answer(front: "Front", folder: Path, code: int) -> FrontAnswer:
         problems=[] if front.plans else list(default_plan.certificate.problems),
         conditions=conditions_of_plan(default_plan),
     )
+
+
+def _expected_failures(front: "Front") -> list[tuple[str, ...]]:
+    """Return the known causes of failures in dispersed flights of each plan of a front."""
+    from planfly.planning.expected_failures import expected_failures
+    from planfly.workflow.uav import load_uav
+
+    uav = load_uav(front.default.plan.scenario)
+    return [expected_failures(front_plan.plan, uav) for front_plan in front.plans]
 
 
 def fewer_plans_line(front: "Front") -> str:
@@ -145,8 +156,6 @@ def front_lines(front: "Front", folder: Path) -> list[str]:
     from logs.verdict.conditions import autopilot_line, condition_lines
     from planfly.api.fronts import PICTURES
     from planfly.api.planning import conditions_of_plan
-    from planfly.planning.expected_failures import expected_failures
-    from planfly.workflow.uav import load_uav
 
     default_plan = front.default.plan
     if not front.plans:
@@ -171,9 +180,8 @@ def front_lines(front: "Front", folder: Path) -> list[str]:
             f"{front_plan.time:>9.1f}"
         )
         lines.append(f"  {number:>4}{values}")
-    uav = load_uav(default_plan.scenario)
-    for number, front_plan in enumerate(front.plans, 1):
-        lines += [f"  note    plan {number}: {text}" for text in expected_failures(front_plan.plan, uav)]
+    for number, failures in enumerate(_expected_failures(front), 1):
+        lines += [f"  note    plan {number}: {text}" for text in failures]
     if len(front.plans) < front.asked:
         lines.append(f"  note    {fewer_plans_line(front)}")
     names = f"plan-1.json ... plan-{len(front.plans)}.json" if len(front.plans) > 1 else "plan-1.json"

@@ -59,6 +59,7 @@ def apply_suggestion(
 
     If several items can be moved, all choices are tried.  The mission with the fewest failed findings is returned;
     among equal ones, the mission with the fewest findings that become failed or undecided.
+    If the suggestion states moves of items, no other item is moved.
 
     Raises MissionError if no item can be moved for the suggestion, or if it does not change the mission's items.
     """
@@ -75,10 +76,11 @@ def apply_suggestion(
         choices = [_Choice(max_moves, radially) for max_moves, radially in product((1, None), (False, True))]
     elif [change.what for change in suggestion] == ["rise"]:
         choices = [_Choice(end_fraction=end_fraction) for end_fraction in _END_FRACTIONS]
+    moved_items = frozenset(move.item for change in suggestion for move in change.moves)
     open_places = _open_places(judged_mission.verdict)
     fewest_open = math.inf, math.inf
     for choice in choices:
-        edited_mission = _EditedMission(context, judged_mission, choice)
+        edited_mission = _EditedMission(context, judged_mission, choice, moved_items)
         try:
             for change in suggestion:
                 _CHANGE_FUNCTIONS[change.what](edited_mission, change, finding)
@@ -166,11 +168,15 @@ class _Choice:
 class _EditedMission:
     """Mission whose items are moved one by one."""
 
-    def __init__(self, context: MissionContext, judged: JudgedMission, choice: _Choice) -> None:
+    def __init__(
+        self, context: MissionContext, judged: JudgedMission, choice: _Choice, moved_items: frozenset[int]
+    ) -> None:
         """Start with the unchanged mission.
 
         judged: the mission with its verdict.  choice: choice of the items to move.
+        moved_items: numbers of the only items that may move; empty if any may.
         """
+        self.moved_items = moved_items
         self.context, self.mission, self.route = context, judged.mission, judged.setup.route
         self.requirements, self.choice = judged.requirements, choice
         self.is_changed = False
@@ -208,6 +214,8 @@ class _EditedMission:
         """
         for index in dict.fromkeys(self.item_index(waypoint) for waypoint in waypoints):
             if index is None or self.mission.items[index].command in LANDINGS:
+                continue
+            if self.moved_items and self.mission.items[index].seq not in self.moved_items:
                 continue
             if offset[:2].any() and index in self.approach_indices and not along_approach:
                 raise MissionError(

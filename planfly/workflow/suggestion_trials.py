@@ -2,15 +2,18 @@
 
 A suggestion is applied to the mission, judged by geometry, and flown if the verdict is on a flight that reached the
 place of the finding.  It passes if its finding is then ok, and every finding that passed before still passes.  A step
-that is too small, such as a change of height, is enlarged by the missing part.  A suggestion that passed states the
-moves of the items, and the findings that fail or are undecided on a part of the mission that was not flown before.
+that is too small, such as a change of height, is enlarged by the missing part.  If a part of its moves passes too,
+this part is suggested.  A suggestion that passed states the moves of the items, and the findings that fail or are
+undecided on a part of the mission that was not flown before.
 """
 
 import math
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from itertools import islice
+from itertools import combinations, islice
+
+import numpy as np
 
 from flight.mission.items import Mission
 from flight.simulation.setup import FlightSetup
@@ -29,7 +32,7 @@ from logs.verdict.places import (
 from logs.verdict.rules.registry import with_passing_suggestions
 from logs.verdict.suggestions import RTL_ALTITUDE_STEP_M
 from logs.verdict.tolerances import HEIGHT_ERROR_LIMIT_M
-from logs.verdict.trials import first_that_passes
+from logs.verdict.trials import first_that_passes, least_change
 from logs.verdict.verdict import Verdict
 from planfly.workflow.apply_suggestion import apply_suggestion, item_moves
 from planfly.workflow.mission_context import JudgedMission, MissionContext
@@ -49,12 +52,16 @@ MAX_TRIED_FINDINGS = 6
 MAX_TRIAL_FLIGHTS = 4
 # Greatest number of missions that are tried for one suggestion: the suggestion itself and larger steps.
 _MAX_STEPS = 10
+# Greatest number of parts of one suggestion's moves that are tried: all parts of four moves.
+_MAX_TRIED_PARTS = 14
 # Greatest number of failed findings with suggestions; if more fail, no single change is worth a trial.
 _MAX_FAILED_FINDINGS = 40
 # Greatest number of legs of a mission with trials and a reference flight: each judges all legs, 2 s for a thousand.
 MAX_TRIED_LEGS = 5000
 # Kinds of changes that are a step in m, or a parameter in m; the step is enlarged until the finding passes.
 _STEP_KINDS = frozenset(("height", "descent", "inset", "distance", "north", "east", "south", "west", "parameter"))
+# Changes of which a part of the moves may be enough.
+_PART_KINDS = frozenset(("height", "descent", "north", "east", "south", "west"))
 # Changes of the energy carried or needed, as a ratio or a percentage.
 _ENERGY_KINDS = frozenset(("battery", "tank", "duration"))
 # Greatest share of a leg's height error that may remain with a suggestion for its slope.
@@ -266,7 +273,8 @@ class SuggestionTrials:
     def find_passing(self) -> list[PassedTrial]:
         """Try the first suggestion of each finding, then the second and so on; return those that pass.
 
-        A suggestion is left out if a part of its changes passes by itself.
+        A suggestion is left out if a part of its changes passes by itself. The moves of a suggestion are the fewest that
+        are enough.
         """
         requests = [
             (number, rank, finding)
@@ -280,6 +288,8 @@ class SuggestionTrials:
                     continue
                 passed_trial = self.try_suggestion(finding, number)
                 passed_trials += [] if passed_trial is None else [passed_trial]
+            for index, trial in enumerate(passed_trials):
+                passed_trials[index] = self._with_fewest_moves(trial)
         return [
             trial for trial in passed_trials if not _has_passing_part(passed_trials, trial.finding, trial.suggestion)
         ]
@@ -305,9 +315,14 @@ class SuggestionTrials:
 
         number: index of the suggestion among those of the finding.
         """
-        candidates = islice(self._growing_suggestions(finding, finding.suggestions[number]), _MAX_STEPS)
+        return self._first_passing(finding, self._growing_suggestions(finding, finding.suggestions[number]), _MAX_STEPS)
+
+    def _first_passing(
+        self, finding: Finding, candidates: Iterator[tuple[Suggestion, Trial]], max_count: int
+    ) -> PassedTrial | None:
+        """Return the first of at most `max_count` candidates whose trial passes, or None."""
         passed_candidate = first_that_passes(
-            candidates,
+            islice(candidates, max_count),
             lambda candidate: (
                 _has_margin(finding, candidate[0], candidate[1].geometry_verdict)
                 and self._passes_trial(finding, candidate[1])
@@ -324,6 +339,34 @@ class SuggestionTrials:
             not_flown=self._is_unreached(finding),
         )
         return PassedTrial(finding, (*first_changes, last_change), trial.setup)
+
+    def _with_fewest_moves(self, whole: PassedTrial) -> PassedTrial:
+        """Return the trial of the smallest part of a suggestion's moves that passes; the whole if no part does.
+
+        Single moves are tried first, then pairs and so on, with the flights that are left.
+        """
+        parts = self._parts(whole.finding, whole.suggestion)
+        return self._first_passing(whole.finding, parts, _MAX_TRIED_PARTS) or whole
+
+    def _parts(self, finding: Finding, suggestion: Suggestion) -> Iterator[tuple[Suggestion, Trial]]:
+        """Yield the parts of a suggestion's moves, the smallest first, each with its trial."""
+        moves = _item_moves(suggestion)
+        if len(moves) < 2 or not {change.what for change in suggestion} <= _PART_KINDS:
+            return
+        for count in range(1, len(moves)):
+            for part in combinations(moves, count):
+                if all(change.place.kind in ("leg", "waypoint") for change in suggestion):
+                    smaller = tuple(self._raised_waypoint(suggestion, move) for move in part)
+                else:
+                    smaller = (*suggestion[:-1], replace(suggestion[-1], moves=part))
+                with suppress(PlanflyError):
+                    yield smaller, self._trial(finding, smaller)
+
+    def _raised_waypoint(self, suggestion: Suggestion, move: ItemMove) -> Change:
+        """Return the change of a waypoint's altitude that a suggestion for legs makes to its item."""
+        waypoint = self.judged.setup.route.items.tolist().index(move.item)
+        place = self.judged.requirements.waypoint(waypoint)
+        return replace(suggestion[-1], place=place, wanted=round(abs(move.up), 2), moves=(move,))
 
     def _passes_trial(self, finding: Finding, trial: Trial) -> bool:
         """Return True if a trial passes by geometry, and by a flight if the judged flight reached the finding's place.
@@ -366,18 +409,15 @@ class SuggestionTrials:
         Each suggestion is applied to the unchanged mission in one step, as a user would apply it. The series ends when
         a suggestion cannot be enlarged or applied. Raises TrialAborted.
         """
+        failed_value = max((change.current or 0.0 for change in suggestion if change.parameter), default=0.0)
         while True:
-            if self.should_abort():
-                raise TrialAborted
             try:
-                mission, setup = self._changed_flight(finding, suggestion)
+                suggestion = self._with_least_parameter(finding, suggestion, failed_value)
+                trial = self._trial(finding, suggestion)
             except PlanflyError:
                 return
-            new_trial = Trial(setup, self.context.uav.aircraft, self.should_abort)
-            parameters = tuple(suggested_parameters(suggestion).items())
-            key = mission.items, mission.home, setup.battery, setup.scenario.launch, parameters
-            trial = self._trials.setdefault(key, new_trial)
             yield suggestion, trial
+            failed_value = max(suggested_parameters(suggestion).values(), default=0.0)
             verdict = trial.flight_verdict if "flight_verdict" in vars(trial) else trial.geometry_verdict
             larger_suggestion = _larger_suggestion(finding, suggestion, verdict)
             if larger_suggestion is not None:
@@ -385,6 +425,45 @@ class SuggestionTrials:
             if larger_suggestion is None:
                 return
             suggestion = larger_suggestion
+
+    def _with_least_parameter(self, finding: Finding, suggestion: Suggestion, failed_value: float) -> Suggestion:
+        """Return a suggestion with the smallest value of its parameters that passes by geometry.
+
+        The suggestion is returned unchanged if it has no parameters, if it fails by geometry, or if the failed value
+        passes by geometry and fails only in flight.
+
+        failed_value: greatest value that was tried, all parameters being set to the same value.
+        """
+
+        def with_value(value: float) -> Suggestion:
+            """Return the suggestion with another value of its parameters."""
+            return tuple(replace(change, wanted=value) if change.parameter else change for change in suggestion)
+
+        def passes(value: float) -> bool:
+            """Return True if a value passes by geometry, with a margin."""
+            candidate = with_value(value)
+            verdict = self._trial(finding, candidate).geometry_verdict
+            is_better = is_improved(self._current_trial.geometry_verdict, verdict, finding)
+            return is_better and _has_margin(finding, candidate, verdict)
+
+        largest_value = max(suggested_parameters(suggestion).values(), default=failed_value)
+        if largest_value <= failed_value or passes(failed_value) or not passes(largest_value):
+            return suggestion
+        first_value = math.floor(failed_value / RTL_ALTITUDE_STEP_M + 1.0) * RTL_ALTITUDE_STEP_M
+        values = np.arange(first_value, largest_value, RTL_ALTITUDE_STEP_M).tolist()
+        return with_value(least_change([*values, largest_value], passes) or largest_value)
+
+    def _trial(self, finding: Finding, suggestion: Suggestion) -> Trial:
+        """Return the trial of a suggestion, the same one for equal missions and setups.
+
+        Raises MissionError if the suggestion cannot be applied, and TrialAborted.
+        """
+        if self.should_abort():
+            raise TrialAborted
+        mission, setup = self._changed_flight(finding, suggestion)
+        parameters = tuple(suggested_parameters(suggestion).items())
+        key = mission.items, mission.home, setup.battery, setup.scenario.launch, parameters
+        return self._trials.setdefault(key, Trial(setup, self.context.uav.aircraft, self.should_abort))
 
     def _with_present_lengths(self, suggestion: Suggestion) -> Suggestion:
         """Return a suggestion whose current leg lengths are those of the unchanged mission."""
@@ -448,8 +527,9 @@ def _zone_shortfall(finding: Finding, verdict: Verdict) -> float:
     """
     for other in verdict.findings:
         facts = {fact.what: fact.value for fact in other.facts if other.rule == "fence"}
-        if "nearest zone" in facts and facts["nearest zone"] == finding.place.index:
-            return facts["navigation error"] - facts["nearest"]
+        distance = facts.get(f"distance to zone {finding.place.index}")
+        if distance is not None:
+            return facts["navigation error"] - distance
     return 0.0
 
 
@@ -497,7 +577,7 @@ def _larger_suggestion(finding: Finding, suggestion: Suggestion, verdict: Verdic
     if not (same_finding or same_rule_legs) and suggested_parameters(suggestion):
         # The finding passes without the margin of a parameter.
         return tuple(
-            replace(change, wanted=change.wanted + RTL_ALTITUDE_STEP_M) if change.what == "parameter" else change
+            replace(change, wanted=change.wanted + _GROWTH_M) if change.what == "parameter" else change
             for change in suggestion
         )
     return larger_suggestion

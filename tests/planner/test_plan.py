@@ -294,8 +294,17 @@ def plan() -> Plan:
     )
 
 
+ANGLES = ("max_turn_deg", "max_climb_deg", "max_dive_deg")
+
+
 def test_a_plan_prints_in_a_line(plan: Plan) -> None:
-    assert repr(plan) == "<Plan tight: 2 waypoints, safe, 1.2500 times straight>"
+    """[limits] of tight states max_turn_deg; a limit of the aircraft is not looser than itself."""
+    assert repr(plan) == "<Plan tight: 2 waypoints, safe by [limits], 1.2500 times straight>"
+    limits = plan.scenario.limits.model_copy(update=dict.fromkeys(ANGLES, "aircraft"))
+    for name in (None, *ANGLES):
+        stated = limits if name is None else limits.model_copy(update={name: 20.0})
+        word = "safe" if name is None else "safe by [limits]"
+        assert f", {word}, " in repr(replace(plan, scenario=replace(plan.scenario, limits=stated)))
 
 
 @pytest.mark.parametrize(

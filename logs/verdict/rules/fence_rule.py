@@ -80,7 +80,8 @@ def fence_findings(
         for zone_number in np.flatnonzero(is_touched).tolist()
     ]
     if not any(finding.ok is False for finding in zone_findings):
-        zone_findings.insert(0, _compliance_finding(requirements, planned_visits, flown_visits))
+        moves = planned_moves(requirements) if aligned is None else flown_moves(aligned)
+        zone_findings.insert(0, _compliance_finding(requirements, planned_visits, flown_visits, moves))
     return findings + zone_findings
 
 
@@ -98,11 +99,14 @@ def _findings_on_legs(requirements: RouteRequirements, first: int, last: int) ->
 
 
 def _compliance_finding(
-    requirements: RouteRequirements, planned_visits: Records, flown_visits: Records | None
+    requirements: RouteRequirements, planned_visits: Records, flown_visits: Records | None, moves: Records
 ) -> Finding:
     """Return the finding that no judged zone is violated, with the distance to the nearest zone.
 
+    It names all zones that the flight, or the planned path if nothing was flown, passes within the navigation error.
+
     planned_visits, flown_visits: one record of `logs.verdict.measures.zone_visits.VISIT` for each zone.
+    moves: the judged path, of dtype `logs.verdict.measures.path_moves.MOVE`.
     """
     airspace, corridor = requirements.airspace, requirements.setup.corridor
     count = len(airspace.zones)
@@ -121,11 +125,17 @@ def _compliance_finding(
             reason += f", within the corridor of {corridor:.0f} m about the legs"
         navigation_error = position_error(requirements.setup)
         if margin < navigation_error:
-            facts += [
-                Fact("navigation error", navigation_error, "m"),
-                Fact("nearest zone", float(nearest_zone), "1"),
-            ]
+            near_zones = _near_zones(requirements, visits, moves, navigation_error)
+            facts.append(Fact("navigation error", navigation_error, "m"))
+            facts += [Fact(f"distance to zone {zone}", distance, "m") for zone, distance in near_zones.items()]
             reason += f"; that is less than the navigation error of {navigation_error:.1f} m"
+            others = [
+                f"{place_text(airspace.place(zone))}, {distance:.1f} m away"
+                for zone, distance in near_zones.items()
+                if zone != nearest_zone
+            ]
+            if others:
+                reason += f"; so {'is' if len(others) == 1 else 'are'} {' and '.join(others)}"
     return make_finding(
         "fence",
         FLIGHT,
@@ -141,6 +151,22 @@ def _compliance_finding(
         method=_METHOD,
         facts=facts,
     )
+
+
+def _near_zones(
+    requirements: RouteRequirements, visits: Records, moves: Records, navigation_error: float
+) -> dict[int, float]:
+    """Return the distance of each zone that a path passes by less than the navigation error, m, the nearest first.
+
+    visits: the path's visits, in which the depth of a zone that is not the nearest may be larger than its real one.
+    """
+    records, terrain = requirements.airspace.records, requirements.setup.scenario.terrain
+    distances = {}
+    for zone in np.flatnonzero(visits["depth"] > -navigation_error).tolist():
+        visit = path_zones(moves, ZoneRecords(records.zones[zone : zone + 1], records.edges), terrain)[0]
+        if not visit.unknown and -visit.depth < navigation_error:
+            distances[zone] = -float(visit.depth)
+    return dict(sorted(distances.items(), key=lambda near: near[1]))
 
 
 def _zone_finding(

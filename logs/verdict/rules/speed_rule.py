@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from flight.mission.items import Command
 from logs.verdict.findings import (
     NOT_FLOWN,
     UNKNOWN_AIRCRAFT,
@@ -206,14 +207,40 @@ def _uncertainty_text(requirements: RouteRequirements, leg: int, commanded: floa
 
 
 def _speed_range_notes(requirements: RouteRequirements, leg: int) -> list[str]:
-    """Return a note if the autopilot does not accept a leg's commanded speed; otherwise []."""
+    """Return a note if the autopilot does not accept the airspeed set for a leg; otherwise [].
+
+    The note names what sets the airspeed, and states the airspeed that the autopilot flies, within its limits.
+    """
     setup, autopilot = requirements.setup, requirements.setup.autopilot
     command, limits = float(setup.route.leg_airspeeds[leg]), autopilot.speeds.limits
     if limits is None or limits.min <= command <= limits.max:
         return []
     range_text = f"{limits.min_name} {limits.min:g} to {limits.max_name} {limits.max:g} m/s"
-    behaviour = "flies the nearest one instead" if limits.nearest else "ignores the command"
-    return [f"the mission commands {command:g} m/s; {autopilot.title} accepts {range_text}, and {behaviour}"]
+    accepted = float(autopilot.speeds.flown_airspeeds(setup.route.leg_airspeeds, setup.airspeed)[leg])
+    flown = min(limits.max, max(limits.min, accepted))
+    source = _airspeed_source(requirements, leg)
+    return [f"{source} {command:g} m/s; {autopilot.title} accepts {range_text}, and flies {flown:g} m/s"]
+
+
+def _airspeed_source(requirements: RouteRequirements, leg: int) -> str:
+    """Return what sets the airspeed of a leg, with its verb: an item, the scenario or an option, or a parameter."""
+    setup, end_item = requirements.setup, int(requirements.setup.route.items[leg + 1])
+    airspeed = float(setup.route.leg_airspeeds[leg])
+    commands = [
+        item.seq
+        for item in setup.mission.items
+        if item.command == Command.DO_CHANGE_SPEED and item.params[:2] == (0.0, airspeed) and item.seq < end_item
+    ]
+    if commands:
+        return f"item {commands[-1]} commands"
+    if airspeed != setup.airspeed:
+        return "the mission commands"
+    if setup.scenario.flight.airspeed_mps is not None:
+        return "the scenario or --airspeed sets"
+    parameter = setup.autopilot.speeds.cruise_parameter
+    return (
+        f"{parameter} is" if setup.autopilot.stated_value(parameter) is not None else "the aircraft's cruise speed is"
+    )
 
 
 def _short_leg_notes(requirements: RouteRequirements, leg: int, commanded: float) -> list[str]:

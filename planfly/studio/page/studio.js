@@ -492,6 +492,8 @@ const app = {
   },
   // Anything else that is asked of the server, after the edits that were made before it.
   send(message) {
+    // The hint is about the mission as it was.
+    if (HISTORY.includes(message.kind)) app.hint(null);
     app.flush();
     now.queue.push(message);
     pump();

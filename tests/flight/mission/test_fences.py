@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import replace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -15,8 +15,9 @@ from flight.mission.fences import (
     zone_fences,
 )
 from flight.mission.from_plan import plan_mission
-from flight.mission.items import Command, Frame, MissionItem
+from flight.mission.items import Command, Frame, Mission, MissionItem
 from flight.mission_files.formats import mission_text, parse_mission
+from flight.mission_files.wpl import fence_text
 from planner.plan import Plan
 from tests.mission_lines import a_plan
 from tests.setups import small_scenario
@@ -83,10 +84,18 @@ def test_fences_come_back_from_every_form(kind: Any) -> None:
     assert mission_text(again, kind) == mission_text(mission, kind)
 
 
-def test_mission_planners_fence_has_a_home_line() -> None:
-    text = "QGC WPL 110\n0 1 0 16 0 0 0 0 36.5 -84.2 300 1\n1 0 0 5004 90 0 0 0 36.6 -84.3 0 1\n"
-    (item,) = parse_mission(text, "a.fence").fences
-    assert (item.seq, item.params[0], item.x) == (0, 90.0, 366_000_000)
+@pytest.mark.parametrize(("home", "number"), [("0 1 0 16 0 0 0 0 36.5 -84.2 300 1\n", 3), ("", 2)])
+def test_a_zone_is_named_after_its_number_in_the_file(home: str, number: int) -> None:
+    """Mission Planner writes a home line, which is number 0; MAVProxy begins with fence item 0."""
+    radii, first = (70.0, 80.0, 90.0), 1 if home else 0
+    lines = [f"{first + k} 0 0 5004 {radius} 0 0 0 36.6 -84.3 0 1\n" for k, radius in enumerate(radii)]
+    fences = parse_mission(f"QGC WPL 110\n{home}{''.join(lines)}", "a.fence").fences
+    zones = fence_zones(fences, GeoOrigin(36.5, -84.2))
+    assert [(zone.name, cast("Cylinder", zone.shape).radius) for zone in zones][2] == (f"fence item {number}", 90.0)
+    violation = fence_problem(fences[2:], GeoOrigin(36.6, -84.3), 0.0, 0.0)
+    assert violation == ("inside an exclusion circle of radius 90 m", number)
+    # A fence file is written from 0, as a vehicle stores the fence.
+    assert [line.split()[0] for line in fence_text(Mission(None, (), fences)).splitlines()[1:]] == ["0", "1", "2"]
 
 
 def test_a_polygon_with_too_few_corners_is_refused() -> None:

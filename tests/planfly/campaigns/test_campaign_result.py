@@ -18,7 +18,7 @@ from planfly.campaigns.campaign_result import (
     make_goal,
     winds_command_line,
 )
-from planfly.campaigns.find_winds import WindsGoal
+from planfly.campaigns.find_winds import WindsGoal, make_winds_goal
 from planfly.campaigns.flight_row import STATION_COUNT
 from planfly.campaigns.tables import CAMPAIGN_DATABASE, read_table
 from planfly.cli import build_parser
@@ -58,16 +58,16 @@ def test_a_campaigns_line_is_read_as_the_same_options(words: str) -> None:
 def test_a_searchs_line_is_read_as_the_same_options(words: str) -> None:
     parse = build_parser().parse_args
     asked = parse(["winds", "jacksboro-air", *shlex.split(words)])
-    goal = WindsGoal(asked.prove, asked.confidence, asked.directions, asked.most, asked.flights or 5000)
+    goal = asked_winds(asked)
     again = parse(shlex.split(winds_command_line(asked.target, goal, repeated_options(asked)))[1:])
-    assert (again.prove, again.confidence, again.directions, again.most) == (
-        asked.prove,
-        asked.confidence,
-        asked.directions,
-        asked.most,
-    )
-    assert (again.flights or 5000) == goal.flights
+    assert asked_winds(again) == goal
     assert repeated_options(again) == repeated_options(asked)
+
+
+def asked_winds(args: argparse.Namespace) -> WindsGoal:
+    """The goal of the options given, with the defaults."""
+    requested = {"target": args.prove, **{name: getattr(args, name) for name in ("confidence", "directions", "most")}}
+    return make_winds_goal(requested | {"flights": args.flights}, Path("none"), resume=False)
 
 
 def repeated_options(args: argparse.Namespace) -> dict[str, object]:

@@ -24,7 +24,7 @@ from planfly.campaigns.find_winds import (
     WindsResult,
     _Search,
     find_winds,
-    flight_limit,
+    make_winds_goal,
     open_winds_store,
 )
 from planfly.campaigns.flight_requests import FlyOne
@@ -330,12 +330,17 @@ def test_a_flight_that_did_not_go_on_to_its_end_states_no_margin(
 
 
 @pytest.mark.usefixtures("here")
-def test_a_search_that_is_gone_on_with_keeps_its_number_of_flights(wind_base: CampaignBase, tmp_path: Path) -> None:
-    assert flight_limit(None, tmp_path, resume=False) == flight_limit(None, tmp_path, resume=True) == 5000
-    searched(wind_base, tmp_path, replace(GOAL, flights=31))
-    assert flight_limit(None, tmp_path, resume=True) == 31
-    assert flight_limit(48, tmp_path, resume=True) == 48
-    assert flight_limit(None, tmp_path, resume=False) == 5000
+def test_a_search_that_is_gone_on_with_keeps_its_goal(wind_base: CampaignBase, tmp_path: Path) -> None:
+    """GOAL is 0.9 with 95 % confidence, in 4 directions up to 20 m/s."""
+    default, kept = WindsGoal(0.99, 0.95, 16, 20.0, 5000), replace(GOAL, most=17.0, flights=31)
+    nothing = dict.fromkeys(("target", "confidence", "directions", "most", "flights"))
+    for resume in (False, True):
+        assert make_winds_goal(nothing, tmp_path, resume=resume) == default
+    searched(wind_base, tmp_path, kept)
+    assert make_winds_goal(nothing, tmp_path, resume=True) == kept
+    assert make_winds_goal(nothing, tmp_path, resume=False) == default
+    for name, value in (("flights", 48), ("target", 0.8), ("most", 9.0), ("directions", 8), ("confidence", 0.9)):
+        assert make_winds_goal(nothing | {name: value}, tmp_path, resume=True) == replace(kept, **{name: value})
 
 
 @pytest.mark.usefixtures("here")

@@ -138,7 +138,7 @@ def test_a_leg_through_the_missions_own_fence_is_not_flyable(
     file, log = tmp_path / "m.waypoints", tmp_path / "flight.mcap"
     file.write_text(FENCED.format(lon=lon), encoding="utf-8")
     assert main(["check", str(file)]) == code
-    assert ("fence item 0 (exclusion) violated (100.0 m inside)" in capsys.readouterr().out) == (code == 4)
+    assert ("fence item 3 (exclusion) violated (100.0 m inside)" in capsys.readouterr().out) == (code == 4)
     assert main(["fly", str(file), "--log", str(log)]) == code
     capsys.readouterr()
     assert main(["check", str(log)]) == code

@@ -56,6 +56,9 @@ def test_a_front_without_choices_says_so(tmp_path: Path, capsys: pytest.CaptureF
     for written in (answer, folder / "front.json"):
         document = json.loads(written.read_text(encoding="utf-8"))
         assert (document["asked"], len(document["plans"])) == (10, 1)
+    (failure,) = json.loads(answer.read_text(encoding="utf-8"))["plans"][0]["expected_failures"]
+    assert failure.startswith("flights are expected to fail: the limits of the scenario are looser than")
+    assert f"  note    plan 1: {failure}\n" in text
 
 
 @pytest.mark.parametrize(

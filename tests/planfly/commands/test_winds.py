@@ -69,7 +69,8 @@ def test_a_short_mission_has_its_chart_stopped_or_not(
     shutil.copy(out / WINDS_DATABASE, again)
     with closing(sqlite3.connect(again / WINDS_DATABASE)) as connection, connection:
         connection.execute("DELETE FROM flights WHERE flight IN (1, 4) OR flight > 5")
-    assert answered(capsys, 3, *line, "--flights", "8", "--out", str(again), "--resume") == answer
+    # Neither the goal nor the flights' options are stated again.
+    assert answered(capsys, 3, *line[:2], "--workers", "1", "--out", str(again), "--resume") == answer
     assert table(again / WINDS_DATABASE) == table(out / WINDS_DATABASE)
 
 

@@ -309,8 +309,11 @@ def test_a_waypoint_is_dragged_judged_flown_and_undone(page: Browser) -> None:
     page.wait_for("['ok', 'fail', 'open'].includes(" + STATE.format("flown") + ")")
     assert saved(page) != before
     page.value("document.activeElement.blur()")
+    page.mouse("mouseMoved", x + 1.0, y)
+    page.wait_for("!document.getElementById('hint').hidden")
     key(page, "z", 90, control=True)
     page.wait_for("document.getElementById('undo').disabled")
+    assert page.value("document.getElementById('hint').hidden")
     assert parse_mission(saved(page), "m.waypoints") == parse_mission(before, "m.waypoints")
     assert page.problems == []
 

@@ -139,7 +139,7 @@ def test_what_is_taken() -> None:
     )
     assert (args.prove, args.flights, args.refly) == (0.5, 10_000_000, 0)
     args = build_parser().parse_args(["winds", "x", "--directions", "72", "--most", "40"])
-    assert (args.directions, args.most, args.prove) == (72, 40.0, 0.99)
+    assert (args.directions, args.most, args.prove) == (72, 40.0, None)
 
 
 def test_a_call_states_the_keywords_that_the_options_name() -> None:

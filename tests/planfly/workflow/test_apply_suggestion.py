@@ -9,7 +9,7 @@ import pytest
 from flight.mission.edits import movable_indices
 from flight.mission.items import Command, Frame, Mission, MissionItem
 from logs.verdict.findings import Finding, make_finding
-from logs.verdict.places import Change, Place, Suggestion
+from logs.verdict.places import Change, ItemMove, Place, Suggestion
 from logs.verdict.wording import suggestion_text
 from planfly.workflow.apply_suggestion import apply_suggestion, item_moves
 from planfly.workflow.mission_context import JudgedMission, MissionContext
@@ -151,6 +151,16 @@ def test_raises_of_neighbouring_legs_combine_by_the_larger() -> None:
     for suggestion in (tuple(changes), tuple(reversed(changes))):
         moves = item_moves(context, judged.mission, apply_suggestion(context, judged, finding, suggestion))
         assert {move.item: move.up for move in moves} == pytest.approx({2: 30.0, 3: 50.0, 4: 50.0}, abs=0.01)
+
+
+def test_only_the_items_of_stated_moves_are_moved() -> None:
+    """Leg 1 leads from item 2 to item 3."""
+    context, judged = judged_mission()
+    finding = make_finding("clearance", Place("leg", 1), ok=False, reason="")
+    for stated, expected in (((), {2: 30.0, 3: 30.0}), ((ItemMove(3, 0.0, 0.0, 30.0),), {3: 30.0})):
+        change = Change("height", Place("leg", 1), None, 30.0, "m", moves=stated)
+        moves = item_moves(context, judged.mission, apply_suggestion(context, judged, finding, (change,)))
+        assert {move.item: move.up for move in moves} == pytest.approx(expected, abs=0.01)
 
 
 @pytest.mark.parametrize(

@@ -99,7 +99,8 @@ def test_fences_join_the_missions_own_and_each_other(mission: Path, capsys: pyte
     assert "the mission's own fence of 1 item applies in addition to the named fence" in capsys.readouterr().out
     found = json.loads(Path("v.json").read_text(encoding="utf-8"))["findings"]
     failed = [item["where"] for item in found if item["rule"] == "fence" and item["ok"] is False]
-    assert failed == ["mill (exclusion)", "fence item 1 (exclusion)"]
+    # The mission's own fence is its item 3, and that of the file its item 0.
+    assert failed == ["mill (exclusion)", "fence item 0 (exclusion)"]
 
 
 def test_a_flight_keeps_the_fence_in_its_log_and_a_log_takes_another(mission: Path) -> None:

@@ -176,7 +176,7 @@ def test_items_that_state_heights_above_home_as_amsl_are_offered_the_other_frame
     judged = judge_mission_geometry(setup_of(*lines, home="36.5 -84.2 100"))
     (finding, *_) = [finding for finding in judged.failed if finding.rule == "clearance"]
     first = "read the altitudes of the items below ground as heights above home (frame 3 instead of 0)"
-    assert finding.suggestion.startswith(f"{first}, or raise both ends of leg 0")
+    assert finding.suggestion.startswith(f"{first}, or raise waypoint 1 (item 2) by 50 m (move item 2 up by 50 m)")
     # Below the ground in both frames, the item is raised.
     lines[1] = wp(0, 2500, -20.0, frame=0)
     judged = judge_mission_geometry(setup_of(*lines, home="36.5 -84.2 100"))
@@ -253,8 +253,10 @@ class Flights:
 def trials_of(
     monkeypatch: pytest.MonkeyPatch, findings: list[Finding], fails: Callable[[float], list[Finding]]
 ) -> tuple[SuggestionTrials, Flights]:
+    """Trials of whole suggestions: no parts of their moves are tried."""
     flights = Flights(fails)
     monkeypatch.setattr(suggestion_trials, "Trial", flights)
+    monkeypatch.setattr(suggestion_trials, "_MAX_TRIED_PARTS", 0)
     judged = replace(SESSION.judged, verdict=verdict_of(*findings))
     return SuggestionTrials(CONTEXT, judged), flights
 
@@ -266,6 +268,93 @@ def test_a_step_that_is_too_small_in_flight_is_enlarged_by_what_is_missing(monke
     [tried] = tried_suggestions(trials.find_passing())
     assert tried.suggestions == (higher(1, 23.0),)
     assert flights.count == 2
+
+
+@pytest.mark.parametrize(
+    ("enough", "moved"),
+    [({1}, {1}), ({7}, {7}), ({2, 6}, {2, 6}), ({1, 2, 7}, {1, 2, 7}), ({1, 2, 6, 7}, {1, 2, 6, 7}), (set(), {1})],
+)
+def test_the_smallest_part_of_the_moves_that_passes_is_suggested(
+    enough: set[int], moved: set[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Raising legs 1 and 6 moves waypoints 1, 2, 6 and 7; the flight passes if all waypoints of `enough` are raised."""
+    altitudes = SESSION.judged.setup.route.positions[:, 2]
+    flown: list[int] = []
+
+    class RaisedTrial:
+        def __init__(self, setup: FlightSetup, *_: Any) -> None:
+            raised = {k for k, up in enumerate(setup.route.positions[:, 2] - altitudes) if up > 1.0}
+            flown.append(len(raised))
+            self.setup, self.requirements, self.geometry_verdict = setup, SESSION.judged.requirements, verdict_of()
+            self.flight_verdict = verdict_of() if raised and enough <= raised else verdict_of(low(1))
+
+    monkeypatch.setattr(suggestion_trials, "Trial", RaisedTrial)
+    judged = replace(SESSION.judged, verdict=verdict_of(low(1, (*higher(1, 12.0), *higher(6, 12.0)))))
+    (trial,) = SuggestionTrials(CONTEXT, judged).find_passing()
+    items = SESSION.judged.setup.route.items
+    assert {move.item for change in trial.suggestion for move in change.moves} == {items[k] for k in moved}
+    assert {change.wanted for change in trial.suggestion} == {12.0}
+    # The whole suggestion is tried first, after the unchanged mission, and then single items before pairs.
+    assert flown[:2] == [0, 4]
+    assert flown[2:] == sorted(flown[2:])
+    if len(moved) < 4:
+        assert [change.place.index for change in trial.suggestion] == sorted(moved)
+        change = trial.suggestion[0]
+        assert f"(item {items[min(moved)]}) by 12 m (move item" in suggestion_text((change,))
+
+
+def test_one_end_of_a_leg_is_raised_if_that_is_enough() -> None:
+    """From 80 m down to 20 m above ground where 30 m are required: 10 m are missing at the end, and 1 m is added."""
+    lines = [wp(0, 500, 80.0), wp(0, 2500, 80.0), wp(0, 4500, 20.0)]
+    judged = judge_mission_geometry(setup_of(*lines, home="36.5 -84.2 100"))
+    (finding,) = [finding for finding in judged.failed if finding.rule == "clearance"]
+    assert finding.suggestion == "raise waypoint 2 (item 3) by 11 m (move item 3 up by 11 m)"
+
+
+def test_a_distance_from_a_missile_is_enlarged_by_what_is_missing() -> None:
+    """40 m that still lack 10 m become 40 m and once and a half of 10 m and 2 m; 10.4 m add 17.6 m, rounded."""
+    place = Place("missile", 0, name="sa")
+
+    def near(missing: float) -> Finding:
+        change = Change("distance", place, None, missing, "m")
+        return replace(make_finding("threat", place, ok=False, reason=""), suggestions=((change,),))
+
+    for missing, wanted in ((10.0, 57.0), (10.4, 58.0), (0.0, 42.0)):
+        larger = suggestion_trials._larger_suggestion(near(40.0), near(40.0).suggestions[0], verdict_of(near(missing)))
+        assert larger == (Change("distance", place, None, wanted, "m"),)
+    # Another missile's distance is no part of it.
+    other = replace(near(10.0), place=Place("missile", 1, name="sb"))
+    assert suggestion_trials._larger_suggestion(near(40.0), near(40.0).suggestions[0], verdict_of(other)) is None
+
+
+@pytest.mark.parametrize(
+    ("distance", "wanted"),
+    # The navigation error of 4.5 m less 1.3 m is 3.2 m, and 1.5 times 3.2 m and 2 m are 6.8 m, rounded up to 7 m.
+    [(1.3, 19.0), (3.5, 16.0), (4.5, None), (9.0, None)],
+)
+def test_a_distance_from_a_zone_is_enlarged_to_the_navigation_error(distance: float, wanted: float | None) -> None:
+    """Zone 1 is passed at its own distance, also if zone 0 is nearer."""
+    place = Place("exclusion", 1, name="town")
+    suggestion = (Change("north", place, None, 12.0, "m"),)
+    finding = replace(make_finding("fence", place, ok=False, reason=""), suggestions=(suggestion,))
+    values = {"navigation error": 4.5, "distance to zone 0": 0.5, "distance to zone 1": distance}
+    facts = [Fact(name, value, "m") for name, value in values.items()]
+    passed = make_finding("fence", FLIGHT, ok=True, reason="", facts=facts)
+    larger = suggestion_trials._larger_suggestion(finding, suggestion, verdict_of(passed))
+    assert larger == (None if wanted is None else (replace(suggestion[0], wanted=wanted),))
+
+
+def test_one_end_of_a_leg_is_moved_past_a_zone_if_that_is_enough() -> None:
+    """The zone reaches 40 m west of item 3, 2000 m behind item 2, which stays."""
+    corners = [[-40.0, 2400.0], [300.0, 2400.0], [300.0, 2700.0], [-40.0, 2700.0]]
+    zone = {"name": "town", "kind": "exclusion", "polygon_m": corners}
+    lines = [wp(-3000, 500, 80.0), wp(0, 500, 80.0), wp(0, 2500, 80.0), wp(-3000, 2500, 80.0)]
+    judged = judge_mission_geometry(setup_of(*lines, home="36.5 -84.2 100", zones=[zone]))
+    (finding,) = judged.failed
+    (west,) = [way[-1] for way in finding.suggestions if way[-1].what == "west"]
+    assert [move.item for move in west.moves] == [3]
+    assert west.moves[0].east == pytest.approx(-west.wanted, abs=0.1)
+    assert west.wanted > 40.0
 
 
 def test_no_larger_step_shortens_a_flight_to_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -483,8 +572,8 @@ def test_a_low_return_is_offered_the_parameter_of_its_altitude_or_a_higher_start
     (finding,) = [finding for finding in judge_mission_geometry(low_return()).failed if finding.rule == "clearance"]
     (end,), (start,) = finding.suggestions
     assert (end.what, end.place, end.parameter, end.current) == ("parameter", FLIGHT, "RTL_ALTITUDE", 100.0)
-    # In steps of 5 m, with the margin of 1.2 m, and the enlargement of steps.
-    assert end.wanted in (115.0, 120.0)
+    # 1.2 m more than the required 130 m are kept: twice 131.2 m less 150 m is 112.4 m.  The grid cuts the top.
+    assert end.wanted in (112.0, 113.0)
     assert (start.what, start.place) == ("height", Place("waypoint", 1, 2))
     assert 10.0 <= start.wanted <= 22.0
     assert f"set RTL_ALTITUDE to {end.wanted:g} m instead of 100 m" in finding.suggestion
@@ -492,11 +581,12 @@ def test_a_low_return_is_offered_the_parameter_of_its_altitude_or_a_higher_start
         f"raise waypoint 1 (item 2) by {start.wanted:.0f} m (move item 2 up by {start.wanted:.0f} m)"
         in finding.suggestion
     )
-    # It passes with the parameter, and with its margin.
-    passing = judge_mission_geometry(low_return(rtl_altitude=end.wanted))
-    assert not passing.failed
-    margins = [other.margin for other in passing.findings if other.rule == "clearance" and other.place.to_item == 3]
-    assert all(margin is not None and margin >= 1.2 for margin in margins)
+    # It passes with the parameter, and with its margin; 1 m less has no such margin.
+    for altitude, has_margin in ((end.wanted, True), (end.wanted - 1.0, False)):
+        judged = judge_mission_geometry(low_return(rtl_altitude=altitude))
+        margins = [other.margin for other in judged.findings if other.rule == "clearance" and other.place.to_item == 3]
+        assert all(margin is not None and margin >= 1.2 for margin in margins) is has_margin
+        assert not (has_margin and judged.failed)
 
 
 def test_a_return_that_keeps_its_altitude_is_offered_a_higher_start_only() -> None:

@@ -63,6 +63,22 @@ def test_a_zone_passed_by_less_than_navigation_may_be_off_is_luck(nav: Any, away
         assert reason.endswith("; that is less than the navigation error of 4.5 m") is luck
 
 
+def test_each_zone_that_is_passed_within_the_navigation_error_is_named() -> None:
+    """Four zones 3, 4.4, 4.6 and 4.2 m from the path; three standard deviations of 1.5 m are 4.5 m."""
+    zones = []
+    for number, (side, away) in enumerate(((1, 3.0), (-1, 4.4), (1, 4.6), (-1, 4.2))):
+        south, edge, end = 200.0 + 400.0 * number, side * away, side * 400.0
+        corners = [(edge, south), (end, south), (end, south + 200.0), (edge, south + 200.0)]
+        zones.append(Zone(f"z{number}", "exclusion", make_polygon([corners[::side]])))
+    setup = replace(within_zones(*zones), nav="gnss")
+    for verdict in (judge_geometry(setup), judge(setup, fly_path(setup))):
+        note = "passes 3.0 m from a zone's limit, less than the navigation error (2 other zones, too)"
+        assert note in verdict.headline
+        reason = of(verdict, "fence", FLIGHT).reason
+        others = "z3 (exclusion), 4.2 m away and z1 (exclusion), 4.4 m away"
+        assert reason.endswith(f"; that is less than the navigation error of 4.5 m; so are {others}")
+
+
 def test_the_headline_of_a_flight_states_the_flown_depth() -> None:
     """The planned path is 10 m inside; the flight is 4 m to the west, so 6 m inside."""
     setup = within_zones(Zone("yard", "exclusion", OVER))

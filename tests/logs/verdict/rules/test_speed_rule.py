@@ -13,6 +13,7 @@ from flight.autopilots.px4.parameters import Px4Parameters
 from flight.simulation.setup import FlightSetup
 from logs.verdict.judge_flight import judge_geometry
 from tests.logs.verdict.judging import ROUTE, failing, judge, leg, of
+from tests.mission_lines import setup_of, wp
 from tests.synthetic import (
     envelope,
     fly_path,
@@ -210,3 +211,31 @@ def test_the_speed_that_is_demanded_is_judged_not_the_command(speed: float, dema
         assert item.planned == pytest.approx(flown * factor, abs=1e-6)
         assert item.reason.startswith(f"the mission commands {speed:g} m/s; ")
         assert item.ok
+
+
+@pytest.mark.parametrize(
+    ("lines", "stated", "airspeed", "source", "flown"),
+    [
+        ((), 25.0, 25.0, "the scenario or --airspeed sets 25 m/s", 22.0),
+        ((), None, 25.0, "the aircraft's cruise speed is 25 m/s", 22.0),
+        ((), 8.0, 8.0, "the scenario or --airspeed sets 8 m/s", 9.0),
+        (("3 178 0 30 -1 0 0 0 0",), 25.0, 25.0, "item 2 commands 30 m/s", 22.0),
+        (("3 178 0 30 -1 0 0 0 0",), 15.0, 15.0, "item 2 commands 30 m/s", 15.0),
+    ],
+)
+def test_what_sets_an_airspeed_beyond_the_limits_is_named_and_the_flown_one_is_stated(
+    lines: tuple[str, ...], stated: float | None, airspeed: float, source: str, flown: float
+) -> None:
+    """AIRSPEED_MIN is 9 m/s, AIRSPEED_MAX 22 m/s, to which `Plane::calc_airspeed_errors` limits every demand."""
+    tables = {} if stated is None else {"flight": {"airspeed_mps": stated}}
+    setup = setup_of(wp(0, 500, 80.0), *lines, wp(0, 2500, 80.0), home="36.5 -84.2 100", **tables)
+    route = setup.route if lines else setup.route.with_fields(airspeed=airspeed)
+    setup = replace(
+        setup,
+        route=route,
+        limits=replace(setup.limits, airspeed=airspeed),
+        autopilot=ArduPlane(ArduPilotParameters.defaults().changed(AIRSPEED_MIN=9.0, AIRSPEED_MAX=22.0)),
+    )
+    reason = of(judge_geometry(setup), "speed", leg(0)).reason
+    limits = "AIRSPEED_MIN 9 to AIRSPEED_MAX 22 m/s"
+    assert f"{source}; ArduPlane accepts {limits}, and flies {flown:g} m/s" in reason
