@@ -69,8 +69,7 @@ def add_aircraft_parser(command_line: LineParser) -> None:
             dest="logs",
             metavar="LOG",
             nargs="+",
-            help="flight logs from which to identify the aircraft (.BIN, .tlog, .ulg or a table of columns); requires"
-            " planfly[identification]",
+            help="its flight logs (.BIN, .tlog, .ulg or a table of columns); requires planfly[identification]",
         ),
         file_completer("bin", "BIN", "tlog", "ulg", "toml", "csv", "mat", "parquet", "h5"),
     )
@@ -83,9 +82,7 @@ def add_aircraft_parser(command_line: LineParser) -> None:
         complete_aircraft,
     )
     with_completer(
-        log_group.add_argument(
-            "--check", metavar="LOG", help="with --identify: another log, on which the result is tested"
-        ),
+        log_group.add_argument("--check", metavar="LOG", help="with --identify: another log that tests the result"),
         file_completer("bin", "BIN", "tlog", "ulg", "toml", "csv", "mat", "parquet", "h5"),
     )
     log_group.add_argument(
@@ -186,7 +183,7 @@ def _make_folder(args: argparse.Namespace) -> int:
         raise PlanflyError(message, field="--new", value=args.folder)
     for field, is_given, reason in (
         ("--out", args.out is not None, "--new names the folder to make"),
-        ("--motor-braking", args.motor_braking, "it is an option of each flight"),
+        ("--motor-braking", args.motor_braking, "it is an option for flights"),
     ):
         if is_given:
             raise PlanflyError(f"--new cannot be combined with {field}: {reason}", field=field)
@@ -242,7 +239,7 @@ def _identify(args: argparse.Namespace) -> int:
     for field, is_given, reason_text in (
         ("--params", args.params is not None, "the parameters come from the logs"),
         ("--from", args.source is not None, "--base names the aircraft to start from"),
-        ("--motor-braking", args.motor_braking, "it is an option of each flight"),
+        ("--motor-braking", args.motor_braking, "it is an option for flights"),
     ):
         if is_given:
             raise PlanflyError(f"--identify cannot be combined with {field}: {reason_text}", field=field)

@@ -72,16 +72,11 @@ def add_plan_parser(command_line: LineParser) -> None:
     add_flights_option(planning_group)
     replanning_group = parser.add_group("planning again in flight")
     with_completer(
-        replanning_group.add_argument(
-            "--from", dest="old", metavar="PLAN.json", help="plan that is being flown and is to be changed"
-        ),
+        replanning_group.add_argument("--from", dest="old", metavar="PLAN.json", help="plan to change in flight"),
         file_completer("json"),
     )
     replanning_group.add_argument(
-        "--at-leg",
-        metavar="K",
-        type=number_parser("at_leg"),
-        help="number of the leg to be flown next; earlier legs are kept",
+        "--at-leg", metavar="K", type=number_parser("at_leg"), help="number of the next leg; earlier legs are kept"
     )
     replanning_group.add_argument(
         "--add-threat",

@@ -69,15 +69,12 @@ def add_replay_parser(command_line: LineParser) -> None:
         help="play X times as fast as real time (default: 1 on a terminal and in Foxglove; for a film, the speed that"
         " makes it 20 s long; otherwise at once)",
     )
-    part_group.add_argument(
-        "--at-once", action="store_true", help="print the whole timeline at once instead of playing it"
-    )
+    part_group.add_argument("--at-once", action="store_true", help="print the whole timeline without playing it")
     output_group = parser.add_group("other outputs")
     output_group.add_argument(
         "--movie",
         metavar="FILE|DIR",
-        help="draw the flight as a film: FILE.gif, FILE.mp4 (requires ffmpeg or planfly[films]), or a folder DIR of PNG"
-        " frames",
+        help="write a film: FILE.gif, FILE.mp4 (requires ffmpeg or planfly[films]), or a folder DIR of PNG frames",
     )
     output_group.add_argument(
         "--foxglove",
@@ -93,9 +90,7 @@ def add_replay_parser(command_line: LineParser) -> None:
         help="port for --foxglove (default: 8765); 0 stands for any free port",
     )
     output_group.add_argument(
-        "--allow-origin",
-        metavar="URL,URL",
-        help="origins of web pages (https://HOST) that may connect to --foxglove, too",
+        "--allow-origin", metavar="URL,URL", help="web pages (https://HOST) that may also connect to --foxglove"
     )
     output_group.add_argument(
         "--wait",
