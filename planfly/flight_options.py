@@ -419,7 +419,7 @@ def apply_options(
     table = new_scenario.spec.wind
     if table.forecast is not None and new_scenario.spec.at is None:
         raise ArgumentError.of_argument(
-            "at", None, "missing: a forecast needs the time of take-off, as in 2026-05-01T10:00+02:00", shown=""
+            "at", None, "missing; a forecast needs the time of take-off, such as 2026-05-01T10:00+02:00", shown=""
         )
     return new_scenario
 
@@ -445,7 +445,7 @@ def _check_aircraft_options(scenario: Scenario, options: FlightOptions) -> None:
         raise ArgumentError.of_argument("aircraft", name, str(error)) from error
     # Scenarios refuse what is not a number.
     if isinstance(airspeed, float | int) and not aircraft.airspeed_min <= airspeed <= aircraft.airspeed_max:
-        allowed = f"{aircraft.name} flies {aircraft.airspeed_min:g}..{aircraft.airspeed_max:g} m/s"
+        allowed = f"allowed {aircraft.airspeed_min:g}..{aircraft.airspeed_max:g} m/s for {aircraft.name}"
         raise ArgumentError.of_argument("airspeed", airspeed, allowed, shown=f"{airspeed:g}")
 
 

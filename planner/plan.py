@@ -19,7 +19,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from planner.procedures import DepartureAndApproach, DepartureAndApproachFile, departure_and_approach_json
 from world.arrays import Floats
 from world.errors import ArgumentError, MissionError
-from world.files import read_small_file
+from world.files import json_value, read_small_file
 from world.html_table import html_table
 from world.scenario import Scenario, scenario_from_spec, with_amsl_endpoints
 from world.scenario_file import first_fault
@@ -431,8 +431,8 @@ def parse_plan(
     Raises MissionError (or the scenario's own errors) with one line: file, field, value, allowed values.
     """
     try:
-        data = json.loads(text, parse_constant=_reject_constant)
-    except (ValueError, RecursionError) as error:
+        data = json_value(text, parse_constant=_reject_constant)
+    except ValueError as error:
         raise MissionError(f"{source}: not valid JSON: {error}", file=source) from error
     try:
         plan_file = _PlanFile.model_validate(data)

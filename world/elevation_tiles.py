@@ -60,7 +60,9 @@ def _virtual_files(path: Path) -> list[Path]:
         raise TerrainError(f"{path}: cannot be read: {error}", file=path) from error
     # Entities could name other files, or expand a small file without limit.
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
-        raise TerrainError(f"{path}: a document type is declared: not allowed in a virtual raster", file=path)
+        raise TerrainError(
+            f"{path}: declares a document type (DOCTYPE), which is not allowed in a virtual raster", file=path
+        )
     try:
         root = ElementTree.fromstring(text)  # entities, which could expand, were refused above
     except ElementTree.ParseError as error:

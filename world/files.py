@@ -167,6 +167,20 @@ def toml_table(text: str) -> dict[str, Any]:
         raise ValueError("tables or arrays are nested too deeply") from None
 
 
+def json_value(text: str | bytes, **options: Any) -> Any:
+    """Parse a JSON text with the options of `json.loads`, and return its value.
+
+    Raises ValueError for invalid JSON, and for brackets that are nested too deeply.
+
+    >>> json_value('{"a": [1]}')
+    {'a': [1]}
+    """
+    try:
+        return json.loads(text, **options)
+    except RecursionError:
+        raise ValueError("brackets are nested too deeply") from None
+
+
 def toml_text(table: Mapping[str, Any]) -> str:
     """Format a table as TOML text, which `toml_table` reads.
 

@@ -184,7 +184,7 @@ def open_raster(path: str, base: Path | None = None, datum: StatedDatum | None =
         return replace(raster, datum=_determine_datum(raster, datum))
     if path.startswith("/vsi") or "://" in path:
         allowed = "only local files are read, not URLs or virtual file systems"
-        raise TerrainError(f"{path}: terrain path: {allowed}", file=path, allowed=allowed)
+        raise TerrainError(f"{path}: {allowed}", file=path, allowed=allowed)
     file = Path(path) if base is None else base / path
     files = tile_files(file) if file.exists() else None
     if files is not None:

@@ -169,7 +169,8 @@ class ZoneTable(ScenarioTable):
         shapes = ("polygon_m", "polygon_deg", "rings_m", "rings_deg", "radius_m")
         stated_keys = [key for key in shapes if getattr(self, key) is not None]
         if len(stated_keys) != 1:
-            raise ValueError(f"polygon_m: give one of {', '.join(shapes)}, not {len(stated_keys)}")
+            given_text = " and ".join(stated_keys) if stated_keys else "none of them"
+            raise ValueError(f"polygon_m: a zone needs exactly one of {', '.join(shapes)}; it has {given_text}")
         corners = sum(map(len, self.rings_m or self.rings_deg or ()))
         if corners > MAX_CORNERS:
             raise ValueError(f"{stated_keys[0]}: {corners:,} corners: at most {MAX_CORNERS:,} are allowed in one zone")
@@ -279,7 +280,7 @@ class AreaTable(ScenarioTable):
             min_value, max_value = getattr(self, key)
             if not max_value - min_value >= 100.0:
                 raise ValueError(
-                    f"{key}: [{min_value:g}, {max_value:g}]: the second must exceed the first by at least 100"
+                    f"{key}: [{min_value:g}, {max_value:g}]: the second value must exceed the first by at least 100 m"
                 )
         if (
             self.ceiling_amsl_m is not None

@@ -173,8 +173,8 @@ def cut_from_server(server: str, box: Box, out: Path, cache: Path, progress: Cut
     fetched_box = Box(box.south - 0.001, box.west - 0.001, box.north + 0.001, box.east + 0.001)
     degrees = degree_corners(fetched_box)
     if len(degrees) > MAX_FETCHED:
-        allowed = f"at most {MAX_FETCHED} are fetched; choose a smaller area"
-        raise TerrainError(f"{server}: {len(degrees)} tiles: {allowed}", file=server, allowed=allowed)
+        allowed = f"at most {MAX_FETCHED} tiles are fetched; choose a smaller area"
+        raise TerrainError(f"{server}: the area needs {len(degrees)} tiles: {allowed}", file=server, allowed=allowed)
     remote_files = {}
     for index, degree in enumerate(degrees):
         name = tile_name(*degree)
@@ -183,7 +183,9 @@ def cut_from_server(server: str, box: Box, out: Path, cache: Path, progress: Cut
     remotes = {degree: remote for degree, remote in remote_files.items() if remote is not None}
     if not remotes:
         raise TerrainError(
-            f"{server}: the server has no tile for this area: open sea, or not a server of Copernicus GLO-30 tiles",
+            f"{server}: the server has no tile for this area. Either the area is open sea, or the server has no"
+            " Copernicus"
+            " GLO-30 tiles",
             file=server,
         )
     fetched_bytes = 0

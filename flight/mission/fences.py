@@ -230,7 +230,8 @@ def with_fences(mission: Mission, scenario: Scenario, passes: PassTest) -> tuple
             f" and {len(omitted_names) - _MAX_NAMES} more" if len(omitted_names) > _MAX_NAMES else ""
         )
         notes.append(
-            f"omitted from the fence, because the mission passes above or below: {names}. A fence has "
+            f"the mission passes above or below {names}, so the fence omits"
+            f" {'them' if len(omitted_names) > 1 else 'it'}. A fence has "
             "no height limits, so an autopilot would refuse or abort the mission"
         )
     notes += zone_notes

@@ -321,7 +321,7 @@ def make_itinerary(mission: Mission, *, resets_jump_counters: bool = False) -> I
     if steps.endless is not None:
         name = command_name(mission.items[steps.index[steps.endless]].command)
         builder.notes.add(
-            f"{name} repeats indefinitely: its items are flown once more, and the simulated flight ends there",
+            f"{name} repeats indefinitely; the simulated flight flies its items once more and then ends",
             steps.endless,
         )
     _add_command_limits(mission, steps, builder)
@@ -774,7 +774,8 @@ class _ItineraryBuilder:
             item = replace(item, lat_deg=self.stops[-1].lat_deg, lon_deg=self.stops[-1].lon_deg, alt=alt)
         elif not item.has_position:
             self.add_open_item(
-                f"{name} without a position: not flown by planfly; the autopilot uses the current position", item.seq
+                f"{name} without a position: the autopilot would use its current position; planfly does not fly it",
+                item.seq,
             )
             return
         if item.command == Command.NAV_WAYPOINT:
@@ -881,7 +882,7 @@ class _ItineraryBuilder:
             # The airspeed is unchanged.
             self.min_ground_speed = 0.0 if math.isnan(speed) else speed
             notes.add(
-                f"DO_CHANGE_SPEED of ground speed: sets MIN_GROUNDSPEED to {self.min_ground_speed:g} m/s", item.seq
+                f"DO_CHANGE_SPEED of the ground speed sets MIN_GROUNDSPEED to {self.min_ground_speed:g} m/s", item.seq
             )
         elif speed == -2.0:
             self.airspeed = math.nan

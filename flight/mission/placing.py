@@ -533,7 +533,8 @@ class _AltitudeConverter:
             )
             return 0.0
         self.notes.add(
-            f"home has no altitude: the ground at {home.lat_deg:.7f}, {home.lon_deg:.7f} is used, {ground:.1f} m AMSL"
+            "home has no altitude, so the altitude of the ground there is used:"
+            f" {ground:.1f} m AMSL at {home.lat_deg:.7f}, {home.lon_deg:.7f}"
         )
         return ground
 

@@ -249,12 +249,12 @@ def _note_landing_ground(mission: Mission, route: Route, scenario: Scenario) -> 
     if not any(math.isnan(slope) for slope in slopes):
         along, across = (_slope_text(slope) for slope in slopes)
         ground = (
-            f"Over {length:.0f} m around the landing point the ground {along} in the landing direction, and {across} to"
+            f"Over {length:.0f} m around the landing point the ground {along} in the landing direction and {across} to"
             " the right"
         )
         if along == across == _LEVEL_TEXT:
             ground = f"Over {length:.0f} m around the landing point the ground {_LEVEL_TEXT}"
         if max(abs(slope) for slope in slopes) > STEEPEST_STRIP_SLOPE:
-            ground += f" (planfly plan accepts slopes of up to {STEEPEST_STRIP_SLOPE:.0%})"
+            ground += f" (planfly plan accepts landing slopes up to {STEEPEST_STRIP_SLOPE:.0%})"
     strip_text = "Touchdown and roll-out are not judged, because the scenario has no [landing]"
-    yield f"item {last_item}: lands on course {round(math.degrees(course)) % 360}°{wind}. {ground}. {strip_text}"
+    yield f"item {last_item}: landing on course {round(math.degrees(course)) % 360}°{wind}. {ground}. {strip_text}"

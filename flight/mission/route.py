@@ -367,12 +367,12 @@ def with_end_courses(route: Route, scenario: Scenario, limits: Limits) -> Route:
     >>> scenario = replace(load_scenario("tight"), start_course=0.0)  # north, and the route goes east
     >>> limits = SimpleNamespace(turn_radius=lambda *_: 110.0)  # all that is asked of the aircraft's limits
     >>> ends = np.array([scenario.start, scenario.destination])
-    >>> route = Route(route_points(ends, 25.0, item=[1, 2]), "no TAKEOFF")
+    >>> route = Route(route_points(ends, 25.0, item=[1, 2]), "no take-off item")
     >>> longer = with_end_courses(route, scenario, limits)
     >>> longer.positions.round().tolist()
     [[0.0, -210.0, 75.0], [0.0, 0.0, 75.0], [2600.0, 0.0, 75.0]]
     >>> longer.started
-    "no TAKEOFF; on the scenario's start course, from a lead-in leg of 210 m"
+    "no take-off item; on the scenario's start course, from a lead-in leg of 210 m"
     """
     ends, courses = route.positions[[0, -1]], leg_courses(route.positions)
     lead_in = lead_out = None
@@ -468,7 +468,7 @@ def make_route(
     >>> route.positions.round().tolist()
     [[0.0, 0.0, 700.0], [0.0, 1110.0, 700.0], [0.0, 2219.0, 700.0]]
     >>> route.started
-    'no TAKEOFF: the flight starts in the air, trimmed, at the first position, item 1: 36.5... course 0 degrees'
+    'no take-off item, so the flight starts in the air, trimmed, at the first position (item 1): 36.5... 0 degrees'
     """
     return route_through_stops(place_stops(mission, origin, terrain), default_airspeed, fly_over, limits, rules)
 
@@ -855,11 +855,14 @@ def _start_text(itinerary: Itinerary, first_stop: RoutePoint, origin: GeoOrigin,
         lat, lon = (float(value) for value in to_geo(origin, waypoints[0, 0], waypoints[0, 1]))
     start_place = f"{lat:.7f}, {lon:.7f}, {waypoints[0, 2]:.1f} m AMSL, on course {course:.0f} degrees"
     item = itinerary.takeoff
-    name = "no TAKEOFF" if item is None else f"{command_name(item.command)} (item {item.seq})"
-    start_text = f"{name}: the flight starts in the air, trimmed,"
+    start_text = "the flight starts in the air, trimmed,"
+    if item is not None:
+        start_text = f"{command_name(item.command)} (item {item.seq}) is not flown from the ground: {start_text}"
+    else:
+        start_text = f"no take-off item, so {start_text}"
     if first_stop.loiter is not None:
         return f"{start_text} on the loiter of item {first_stop.item}: {start_place}"
     if item is not None:
-        place_name = "home" if itinerary.has_home else "the first position, as there is no home,"
+        place_name = "home" if itinerary.has_home else "the first position (there is no home)"
         return f"{start_text} over {place_name} at this item's altitude: {start_place}"
-    return f"{start_text} at the first position, item {first_stop.item}: {start_place}"
+    return f"{start_text} at the first position (item {first_stop.item}): {start_place}"

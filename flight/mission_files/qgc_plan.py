@@ -32,6 +32,7 @@ from flight.mission.items import (
     round_to_grid,
 )
 from world.errors import MissionError
+from world.files import json_value
 from world.scenario_file import first_fault
 from world.wording import count_text
 
@@ -395,10 +396,10 @@ def _check_vehicle(kind: int | None, source: str) -> None:
     """
     for kinds, name in _OTHER_VEHICLES:
         if kind in kinds:
-            allowed = f"{name}: planfly flies fixed-wing aircraft (1)"
+            allowed = f"{name}; planfly flies only fixed-wing aircraft (vehicleType 1)"
             raise MissionError.at(source, "mission.vehicleType", kind, allowed)
     if kind is not None and kind not in _FIXED_WING_TYPES:
-        allowed = "not a fixed-wing aircraft: expected 1 (MAV_TYPE_FIXED_WING)"
+        allowed = "not a fixed-wing aircraft; expected 1 (MAV_TYPE_FIXED_WING)"
         raise MissionError.at(source, "mission.vehicleType", kind, allowed)
 
 
@@ -412,7 +413,7 @@ def _autopilot_name(firmware: int | None, source: str) -> str:
     if firmware is None or firmware in _UNNAMED_FIRMWARES:
         return ""
     if firmware not in _FIRMWARES:
-        allowed = "another autopilot (MAV_AUTOPILOT): expected 3 (ArduPilot), 12 (PX4) or 0 (not stated)"
+        allowed = "not an autopilot that planfly simulates; expected 3 (ArduPilot), 12 (PX4) or 0 (not stated)"
         raise MissionError.at(source, "mission.firmwareType", firmware, allowed)
     return _FIRMWARES[firmware]
 
@@ -424,8 +425,8 @@ def parse_plan_file(text: str, source: str) -> Mission:
     names. A null is read as NaN. Raises MissionError with file, field, value and allowed values.
     """
     try:
-        data = json.loads(text.removeprefix("\ufeff"), parse_constant=_refuse_constant)
-    except (ValueError, RecursionError) as error:
+        data = json_value(text.removeprefix("\ufeff"), parse_constant=_refuse_constant)
+    except ValueError as error:
         raise MissionError(f"{source}: not valid JSON: {str(error).splitlines()[0]}", file=source) from error
     warnings, plans = _expand_complex_items(data, source)
     try:

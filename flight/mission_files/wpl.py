@@ -216,7 +216,7 @@ def _collect_warnings(locations: list[TextLine], items: list[MissionItem], *, ha
         # A fence or rally file may have a home line, as Mission Planner writes it, or none, as MAVProxy does.
         return warnings
     if not has_current:
-        warnings.append("no current item: flown from the first item")
+        warnings.append("no item is marked as current, so the mission is flown from the first item")
     first = items[0]
     if len(body) == len(items):
         warnings.append(

@@ -36,6 +36,7 @@ from logs.recording.setup_schema import (
 )
 from planner.plan import Plan, parse_plan, plan_json
 from world.errors import LogError, ParameterError, PlanflyError
+from world.files import json_value
 from world.forecast.forecast import ForecastFacts
 from world.forecast.wind_field import MAX_FIELD_NUMBERS, WindField
 from world.frames import MAX_TERMS, PolyMap
@@ -423,7 +424,9 @@ def unpack_setup(attachments: dict[str, bytes], source: str) -> StoredSetup:
         raise LogError(**first_fault(error).at(source, SETUP_FILE)) from error
     for name, digest in file.sha256.items():
         if name not in attachments:
-            raise LogError(f"{source}: {name}: missing; {SETUP_FILE} lists it", file=source, field=name)
+            raise LogError(
+                f"{source}: {name}: missing, although {SETUP_FILE} lists this attachment", file=source, field=name
+            )
         if hashlib.sha256(attachments[name]).hexdigest() != digest:
             message = f"{source}: {name}: altered: its SHA-256 is not the one in {SETUP_FILE}"
             raise LogError(message, file=source, field=name)
@@ -497,8 +500,8 @@ def _read_scenario(attachments: dict[str, bytes], source: str, terrain: Terrain 
     """Rebuild the scenario with the terrain from the log; raise LogError if it is invalid."""
     file_name = f"{source}: {SCENARIO_FILE}"
     try:
-        spec = json.loads(_decode_text(attachments, SCENARIO_FILE, source))
-    except (ValueError, RecursionError) as error:
+        spec = json_value(_decode_text(attachments, SCENARIO_FILE, source))
+    except ValueError as error:
         raise LogError(f"{file_name}: not valid JSON: {error}", file=file_name) from error
     _check_terrain_is_stored(spec, terrain, file_name)
     try:
@@ -514,8 +517,8 @@ def _read_plan(attachments: dict[str, bytes], source: str, terrain: Terrain | No
     file_name = f"{source}: {PLAN_FILE}"
     text = _decode_text(attachments, PLAN_FILE, source)
     try:
-        data = json.loads(text)
-    except (ValueError, RecursionError) as error:
+        data = json_value(text)
+    except ValueError as error:
         raise LogError(f"{file_name}: not valid JSON: {error}", file=file_name) from error
     _check_terrain_is_stored(data.get("scenario") if isinstance(data, dict) else None, terrain, file_name)
     try:

@@ -238,10 +238,10 @@ def corridor_line(setup: FlightSetup, findings: Sequence[Finding]) -> str:
     wider_text = ""
     if wider:
         legs_text = count_text(len(wider), "leg")
-        wider_text = f"; up to {max(wider):.0f} m along {legs_text} with turns or loiters that need more"
+        wider_text = f". Along {legs_text} it is up to {max(wider):.0f} m, because turns or loiters need more"
     line = (
-        f"Corridor: {half_width:.0f} m to either side of the legs, {origin}{wider_text}"
-        " (set [limits] corridor_m to change it)"
+        f"Corridor: {half_width:.0f} m to either side of the legs, {origin}{wider_text}."
+        " To change it, set [limits] corridor_m"
     )
     closest_legs = min_leg_spacing(setup.route.positions)
     if closest_legs is None or closest_legs[0] >= half_width:
@@ -249,7 +249,7 @@ def corridor_line(setup: FlightSetup, findings: Sequence[Finding]) -> str:
     spacing, leg = closest_legs
     first, second = setup.route.leg_numbers[leg], setup.route.leg_numbers[leg + 2]
     return (
-        f"{line}; the corridor is wider than the {spacing:.0f} m between legs {first} and {second}, so a flight within"
+        f"{line}. The corridor is wider than the {spacing:.0f} m between legs {first} and {second}, so a flight within"
         " the corridor may not have followed the lines"
     )
 

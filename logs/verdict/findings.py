@@ -197,12 +197,12 @@ class Finding:
 
     @property
     def place_and_value(self) -> str:
-        """Text of the place with the value, if there is one, such as "leg 4 (12.3 m)".
+        """Text of the place with the value, if there is one, such as "leg 4: 12.3 m".
 
         A finding without a margin did not fail because of its value; its brief reason then replaces the value.
         """
         value = self.compared_texts()[0] if self.margin is not None else shorten_statement(self.brief)
-        return self.where + (f" ({value})" if value else "")
+        return self.where + (f": {value}" if value else "")
 
     @property
     def suggestion(self) -> str:
@@ -341,12 +341,12 @@ def worst_first_key(finding: Finding) -> tuple[int, float]:
 
 
 def finding_reason(faults: Sequence[Message], facts: Sequence[str] = ()) -> str:
-    """Return a finding's reason: its faults with its facts in brackets, or only its facts without a fault.
+    """Return a finding's reason: its faults and then its facts as details, or only its facts without a fault.
 
     >>> finding_reason([message("overshoots its arc by 8 m")], ["turns 62.0°", "radius 76 m"])
-    'overshoots its arc by 8 m (turns 62.0°; radius 76 m)'
+    'overshoots its arc by 8 m. Details: turns 62.0°; radius 76 m'
     """
     facts_text = "; ".join(facts)
     if not faults:
         return facts_text
-    return "; ".join(fault.text for fault in faults) + (f" ({facts_text})" if facts_text else "")
+    return "; ".join(fault.text for fault in faults) + (f". Details: {facts_text}" if facts_text else "")

@@ -16,6 +16,7 @@ from logs.verdict.rules.registry import mission_findings, run_rules, with_sugges
 from logs.verdict.summary import headline, setup_notes, summary_lines, undecided_text
 from logs.verdict.verdict import Verdict
 from planner.plan import Plan, Violation
+from world.wording import count_text
 
 
 def judge_geometry(setup: FlightSetup, requirements: RouteRequirements | None = None) -> Verdict:
@@ -125,12 +126,12 @@ def judge_plan_only(plan: Plan, conditions: Conditions | None = None) -> Verdict
     >>> import numpy as np
     >>> from planner.plan import Certificate
     >>> from world.scenario import load_scenario
-    >>> problems = ("leg 2: climbs 16.6°; at most 13.7° are allowed",)
+    >>> problems = ("leg 2: climbs at 16.6°; at most 13.7° are allowed",)
     >>> certificate = Certificate(0.1, math.inf, -0.05, 12.0, 100.0, 50.0, problems)
     >>> way, none = np.zeros((2, 3)), np.zeros((0, 3))
     >>> plan = Plan(load_scenario("tight"), way, np.array([0, 2, 0, 0]), np.zeros(4), certificate, 1, "umda", 1, none)
     >>> print(judge_plan_only(plan).headline)
-    not flyable: no feasible plan was found: slope (the plan is too steep: smallest margin -2.86 deg, 2 violations)
+    not flyable: no feasible plan was found: slope (the plan is too steep; smallest margin -2.86 deg, 2 violations)
     """
     margins = (
         ("turn", plan.certificate.turn, Violation.TURN, "deg", 180.0 / math.pi),
@@ -148,7 +149,7 @@ def judge_plan_only(plan: Plan, conditions: Conditions | None = None) -> Verdict
         if missing_length > 0.0 and margin >= 0.0:
             reason = f"a leg is {missing_length:.0f} m too short for its turns"
         if is_exceeded:
-            reason = f"{_EXCEEDED_TEXTS[rule]}: {reason}" + (f", {count} violations" if count else "")
+            reason = f"{_EXCEEDED_TEXTS[rule]}; {reason}" + (f", {count_text(count, 'violation')}" if count else "")
         findings.append(
             make_finding(
                 rule,

@@ -37,8 +37,8 @@ _LONGEST_SHORT_PART = 2
 _NEAR_MISS_PLACES = {"threat": "outside a missile's range", "fence": "from a zone's limit"}
 # Introductions of the lines on the other levels.
 _LEVEL_TITLES = {
-    "geometry": "By geometry only",
-    "airframe": "UAV alone (planfly's guidance, exact navigation)",
+    "geometry": "Geometry only (no flight)",
+    "airframe": "Without the autopilot (planfly's guidance, exact navigation)",
 }
 
 
@@ -83,7 +83,7 @@ def headline(findings: Sequence[Finding], flyable: bool, setup_notes: Sequence[s
     text = (
         "not flyable: "
         + ", ".join(_headline_phrase(item) for item in named_findings)
-        + (f", +{unnamed_count} more" if unnamed_count else "")
+        + (f" and {unnamed_count} more" if unnamed_count else "")
     )
     return "; ".join([text, *setup_notes])
 
@@ -337,7 +337,7 @@ def summary_lines(
     if level == "flown":
         lines += [line] if (line := corridor_line(setup, findings)) else []
     if level == "geometric":
-        lines.append("Level: geometric, from the route and the aircraft's envelope, without a flight")
+        lines.append("Level: geometric (judged by the route and the aircraft's envelope, without a flight)")
     for answer in other_answers:
         agreement = f"; {_agreement_text(answer)}" if level == "flown" else ""
         if answer.name == "airframe" and failed_at_take_off(findings):
@@ -476,7 +476,7 @@ def _parameter_lines(setup: FlightSetup, *, is_flown: bool) -> list[str]:
     ]
     unnamed_count = len(parameters.unused) - len(unused_names)
     notes = (
-        f"; not used: {', '.join(unused_names)}{f', +{unnamed_count} more' if unnamed_count else ''}"
+        f"; not used: {', '.join(unused_names)}{f' and {unnamed_count} more' if unnamed_count else ''}"
         if unused_names
         else ""
     )
@@ -530,6 +530,6 @@ def _agreement_text(other_level: LevelAnswer) -> str:
         is_geometry = other_level.name == "geometry"
         return "flight and geometry agree on every finding that both judge" if is_geometry else "both flights agree"
     rest_text = (
-        f", +{len(disagreements) - _MAX_NAMED_FINDINGS} more" if len(disagreements) > _MAX_NAMED_FINDINGS else ""
+        f"; and {len(disagreements) - _MAX_NAMED_FINDINGS} more" if len(disagreements) > _MAX_NAMED_FINDINGS else ""
     )
     return "; ".join(map(disagreement_text, disagreements[:_MAX_NAMED_FINDINGS])) + rest_text

@@ -262,7 +262,7 @@ def suggestion_text(suggestion: Suggestion) -> str:
     'lengthen leg 1 from 150 m to 260 m and leg 2 from 150 m to 260 m'
     >>> moves = (ItemMove(3, 0.0, 412.0, 0.0),)
     >>> suggestion_text((Change("north", Place("exclusion", 0, name="town"), None, 40.0, "m", moves=moves),))
-    'pass town 40 m further north, with a move of 412 m (move item 3 north by 412 m)'
+    'pass town 40 m further north, with a move of 412 m: move item 3 north by 412 m'
     """
     if all(change.what == "terrain height" for change in suggestion):
         text = _terrain_height_text(suggestion)
@@ -277,8 +277,8 @@ def suggestion_text(suggestion: Suggestion) -> str:
         text = f"{text}, with a move of {distance:.0f} m"
     notes = [f"move {moves_text(moves)}"] if moves else []
     notes += [
-        f"later in the flight {state}: {', '.join(texts)}"
-        for state, fails in (("fails", True), ("undecided", False))
+        f"{_join_with_and(texts)} then {verbs[len(texts) > 1]} later in the flight"
+        for verbs, fails in ((("fails", "fail"), True), (("is undecided", "are undecided"), False))
         if (
             texts := [
                 noun_with_place(RULE_NOUNS.get(item.rule, item.rule), item.place)
@@ -288,8 +288,8 @@ def suggestion_text(suggestion: Suggestion) -> str:
         )
     ]
     if any(change.not_flown for change in suggestion):
-        notes.append(f"not tried by flight: the flight ended before this {suggestion[-1].place.kind}")
-    return f"{text} ({'; '.join(notes)})" if notes else text
+        notes.append(f"not tried in flight, because the flight ended before this {suggestion[-1].place.kind}")
+    return f"{text}: {'; '.join(notes)}" if notes else text
 
 
 def without_trial(suggestion: Suggestion) -> Suggestion:
@@ -371,9 +371,9 @@ def suggestions_text(suggestions: tuple[Suggestion, ...]) -> str:
 
     >>> slower = Change("airspeed", Place("leg", 1), 25.0, 20.5, "m/s")
     >>> suggestions_text(((Change("length", Place("leg", 1), 300.0, 400.0, "m"),), (slower,)))
-    'lengthen leg 1 from 300 m to 400 m, or fly leg 1 at 20.5 m/s instead of 25 m/s'
+    'lengthen leg 1 from 300 m to 400 m; or fly leg 1 at 20.5 m/s instead of 25 m/s'
     """
-    return ", or ".join(map(suggestion_text, suggestions))
+    return "; or ".join(map(suggestion_text, suggestions))
 
 
 # How each level judges, as a phrase after "passes" or "fails".

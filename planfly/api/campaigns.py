@@ -226,7 +226,7 @@ def continued_goal(
 def _report_flight_count(goal: Goal, folder: Path) -> None:
     """Report the number of flights of a resumed campaign if the user stated none, and where it is from."""
     stored_count = read_stored_settings(folder / CAMPAIGN_DATABASE).get("flights")
-    origin = "the number of the resumed campaign" if goal.flights == stored_count else "the default"
+    origin = "as in the resumed campaign" if goal.flights == stored_count else "the default"
     report_line(f"number of flights: {'at most ' if goal.stops else ''}{goal.flights:,}, {origin}")
 
 
@@ -236,7 +236,8 @@ def _warn_of_too_few_flights(goal: Goal) -> None:
     if estimator.estimate(best).answer == "undecided":
         needed_text = count_text(estimator.deciding_flights(best) or MAX_DECIDING_FLIGHTS, "flight")
         report_line(
-            f"warning: {count_text(goal.flights, 'flight')} cannot show P >= {goal.target}, even if all are flyable;"
+            f"warning: {count_text(goal.flights, 'flight')} cannot show a probability of at least {goal.target},"
+            " even if all are flyable;"
             f" that needs {needed_text} without a failure"
         )
 

@@ -66,7 +66,7 @@ def terrain(
             check_output_file(target, overwrite=True, source=Path(source_name))
             return cut_from_files(Path(source_name), area, target)
         if not is_address(source_name):
-            allowed = "expected a folder, or its http or https address without a query"
+            allowed = "expected a folder, or an http or https address without a query"
             raise ArgumentError.of_argument("source", source_name, allowed, shown=ascii(source_name))
         with tempfile.TemporaryDirectory() as fallback:
             return cut_from_server(source_name, area, target, _find_cache_folder(Path(fallback)), advance, sea=sea)

@@ -57,7 +57,7 @@ LOG_SUFFIXES = (".csv", ".parquet", ".tlog", ".ulg")
 # Suffixes of files that contain the fence of a mission.
 _FENCE_SUFFIXES = (".plan", ".fence")
 # Names of contents in messages, keyed by the kind of the file.
-_CONTENT_NAMES = {"fence": "fence items", "rally": "rally points"}
+_CONTENT_NAMES = {"fence": "fence item", "rally": "rally point"}
 # Suffixes of files that contain the items of a mission.
 _MISSION_SUFFIXES = tuple(suffix for suffix, kind in KINDS.items() if kind not in _CONTENT_NAMES)
 
@@ -413,15 +413,15 @@ def _make_target_content(source: _SourceContent, target: Path) -> tuple[str | by
         count = len(mission.fences if kind == "fence" else mission.rally)
         if not count:
             raise MissionError(
-                f"{mission.source}: contains no {_CONTENT_NAMES[kind]} to write to {target}", file=mission.source
+                f"{mission.source}: contains no {_CONTENT_NAMES[kind]}s to write to {target}", file=mission.source
             )
-        return mission_text(mission, kind), f"{count} {_CONTENT_NAMES[kind]}"
+        return mission_text(mission, kind), count_text(count, _CONTENT_NAMES[kind])
     extra = ""
     if kind == "plan" and (mission.fences or mission.rally):
         extra = f", {count_text(len(mission.fences), 'fence item')}, {count_text(len(mission.rally), 'rally point')}"
     if kind == "plan":
         airspeed, origin = _find_cruise_speed(source)
-        mission, extra = replace(mission, cruise_speed=airspeed), f"{extra}, cruiseSpeed {airspeed:.0f} m/s: {origin}"
+        mission, extra = replace(mission, cruise_speed=airspeed), f"{extra}, cruiseSpeed {airspeed:.0f} m/s {origin}"
     return mission_text(mission, kind), f"{count_text(len(mission.items), 'item')}{extra}"
 
 

@@ -154,6 +154,6 @@ def _parse_time(name: str, text: str) -> datetime:
     except ValueError:
         time = None
     if time is None or time.tzinfo is None:
-        allowed = "expected a time in ISO 8601 with its offset from UTC, as in 2026-05-01T10:00+02:00"
+        allowed = "expected a time in ISO 8601 format with its offset from UTC, such as 2026-05-01T10:00+02:00"
         raise ArgumentError.of_argument(name, text, allowed)
     return time.astimezone(UTC)

@@ -38,7 +38,7 @@ def replay_interval(log: FlightLog, start: float | None, end: float | None) -> t
     check_arguments(start=start, end=end)
     start_time = start if start is not None else float(log.track.time[0])
     end_time = log.end_time if end is None else min(end, log.end_time)
-    end_text = f"the log ends at {log.end_time:.1f} s"
+    end_text = f"after the end of the log at {log.end_time:.1f} s"
     # The user may have meant the port of a ground station.
     if end is not None and end > log.end_time and end in _PORTS:
         allowed = f"{end_text}; to name a port, add its address: `end` 127.0.0.1:{end:g}"

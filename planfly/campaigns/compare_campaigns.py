@@ -217,28 +217,33 @@ def _disagreement_notes(difference: ProportionDifference, *, is_paired: bool) ->
 def comparison_lines(comparison: CampaignComparison) -> list[str]:
     """Return the lines of a comparison for a terminal: answer, both campaigns, rules, inputs and notes."""
     difference, (low, high), p_value = comparison.difference
-    percent = f"{100.0 * DEFAULT_CONFIDENCE:g} %"
+    interval_name = f"{100.0 * DEFAULT_CONFIDENCE:g} % interval"
     answers = {
         "more likely": "flights of the second campaign are more likely to be flyable",
         "less likely": "flights of the second campaign are less likely to be flyable",
         "no difference shown": "the flights show no difference",
     }
-    lines = [f"{answers[comparison.answer]}: {difference:+.4f} ({low:+.4f} to {high:+.4f} at {percent})"]
+    lines = [
+        f"{answers[comparison.answer]}: the probability differs by {difference:+.4f}"
+        f" ({interval_name}: {low:+.4f} to {high:+.4f})"
+    ]
     for title, campaign in (("first ", comparison.first), ("second", comparison.second)):
         lines.append(
             f"  {title}  {campaign.name}: {campaign.tally.flyable} of {count_text(campaign.tally.flown, 'flight')}"
-            f" flyable, P = {campaign.tally.share:.4f} ({campaign.interval.low:.4f} to {campaign.interval.high:.4f}"
-            f" at {percent})"
+            f" flyable, probability {campaign.tally.share:.4f} ({interval_name}: {campaign.interval.low:.4f} to"
+            f" {campaign.interval.high:.4f})"
         )
     lines.append(
-        f"  paired  {count_text(comparison.pairs, 'flight')} with the same draws: {comparison.only_first} flyable only"
-        f" in the first, {comparison.only_second} only in the second (McNemar's exact test: p = {p_value:.2g})"
+        f"  paired  {count_text(comparison.pairs, 'pair')} of flights with the same draws:"
+        f" {comparison.only_first} flyable"
+        f" only in the first campaign, {comparison.only_second} only in the second (McNemar's exact test:"
+        f" p = {p_value:.2g})"
         if comparison.pairs
         else f"  paired  no: the draws of the campaigns differ (Fisher's exact test: p = {p_value:.2g}). Campaigns with"
         " the same --seed and --spread are compared in pairs, which shows smaller differences"
     )
     lines += [
-        f"  fails   {RULE_WORDS[rule].title}: {_change_text(first, second, comparison)}"
+        f"  fails   {RULE_WORDS[rule].title} {_change_text(first, second, comparison)}"
         for rule, first, second in comparison.rules
     ]
     lines += [f"  differs {text}" for text in comparison.inputs] or ["  differs no input; planfly's code may differ"]
@@ -254,5 +259,6 @@ def _change_text(first: int, second: int, comparison: CampaignComparison) -> str
     change = 100.0 * (second / second_count - first / first_count)
     word = "more often" if change > 0.0 else "less often" if change < 0.0 else "as often"
     return (
-        f"{word}: {count_text(first, 'flight')} of the first, {second} of the second ({change:+.1f} percentage points)"
+        f"{word} in the second campaign: {second} of {second_count} flights, and {first} of {first_count} in the first"
+        f" ({change:+.1f} percentage points)"
     )

@@ -588,7 +588,7 @@ class _ProgressReport:
         settled_count, total = search.goal.directions - len(search.open_directions), search.goal.directions
         remark = (
             f"{settled_count} of {total} directions settled, {count_text(flight_count, 'flight')},"
-            f" {60.0 * flights_per_second:.0f} a minute"
+            f" {60.0 * flights_per_second:.0f} flights a minute"
         )
         if remaining > 0 and flights_per_second > 0.0:
             remark += f", {remaining / flights_per_second:.0f} s left at least"

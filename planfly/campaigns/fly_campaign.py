@@ -181,7 +181,7 @@ class _ProgressReport:
         total = self._min_total_flights(tally)
         seconds_left = (total - tally.flown) / flights_per_second if flights_per_second > 0.0 else 0.0
         remark = (
-            f"{count_text(tally.flown, 'flight')}, P {tally.share:.4f} ({estimate.lower:.4f} to {estimate.upper:.4f}),"
-            f" {60.0 * flights_per_second:.0f} a minute, {seconds_left:.0f} s left"
+            f"{count_text(tally.flown, 'flight')}, probability {tally.share:.4f} ({estimate.lower:.4f} to"
+            f" {estimate.upper:.4f}), {60.0 * flights_per_second:.0f} flights a minute, {seconds_left:.0f} s left"
         )
         self._advance(float(tally.flown), float(total), remark)

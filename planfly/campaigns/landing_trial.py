@@ -40,8 +40,9 @@ def steep_landing_failures(plan: Plan, uav: Uav) -> tuple[str, ...]:
         return ()
     low, high = wilson(flyable_count, LANDING_COUNT)
     return (
-        f"only {flyable_count} of {LANDING_COUNT} simulated landings succeed (P between {low:.2f} and {high:.2f} at"
-        f" 95 %) on a final of {math.degrees(math.atan(descent.slope)):.1f}°. Use a strip or a landing course with a"
+        f"only {flyable_count} of {LANDING_COUNT} simulated landings succeed (95 % interval of the probability:"
+        f" {low:.2f} to {high:.2f}) on a final of {math.degrees(math.atan(descent.slope)):.1f}°. Use a strip or"
+        " a landing course with a"
         f" clear final of at most {math.degrees(STEEP_FINAL_RAD):.0f}°, or fly in less wind or turbulence",
     )
 

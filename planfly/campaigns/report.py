@@ -545,7 +545,8 @@ def _lines_without_failures(winds: WindsResult) -> list[str]:
     probability_text = f"{lower_bound(Tally(min(counts), 0), confidence):.3g}"
     return [
         f"in {len(counts)} of {count_text(len(winds.boundaries), 'direction')} no flight failed: at least"
-        f" {count_text(min_count, 'flight')} in {max_speed:g} m/s from each of them show P >= {probability_text}"
+        f" {count_text(min_count, 'flight')} in {max_speed:g} m/s from each of them show a probability of at"
+        f" least {probability_text}"
     ]
 
 
@@ -562,7 +563,7 @@ def _flown_bound_lines(winds: WindsResult) -> list[str]:
         for is_estimated, bounds in zip(winds.estimated, winds.flown_bounds, strict=True)
     ]
     counts = winds.flight_counts()
-    lines = ["directions without a boundary, by their own flights, which do not prove it:"]
+    lines = ["directions in which the boundary is not proven, with the wind speed that their own flights suggest:"]
     for text, group in groupby(range(len(texts)), key=lambda number: texts[number]):
         if text is not None:
             numbers = list(group)
@@ -601,14 +602,16 @@ def _boundary_lines(winds: WindsResult) -> list[str]:
         if highest_text != lowest_text:
             best_text = f"; highest: {highest_text} from {highest.from_deg:g}°"
         return [
-            f"by the best estimate, flyable with P >= {target:g} in wind up to {lowest_text} from the worst direction,"
+            f"by the best estimate, flyable with a probability of at least {target:g} in wind up to"
+            f" {lowest_text} from the worst direction,"
             f" {lowest.from_deg:g}° ({_interval_text(lowest.low, lowest.high, max_speed)} m/s at {percent}){best_text}"
         ]
     if highest.boundary < CALM_MPS:
         basis = "" if winds.fails_in_calm_air else "by the best estimate, "
-        return [f"{basis}not flyable with P >= {target:g} even in calm air"]
+        return [f"{basis}not flyable with a probability of at least {target:g} even in calm air"]
     return [
-        f"by the best estimate, not flyable with P >= {target:g} even in light wind from {lowest.from_deg:g}°;"
+        f"by the best estimate, not flyable with a probability of at least {target:g} even in light wind from"
+        f" {lowest.from_deg:g}°;"
         f" from {highest.from_deg:g}°, flyable in wind up to {highest_text}"
     ]
 
@@ -672,7 +675,7 @@ def winds_suite(name: str, winds: WindsResult) -> JunitSuite:
         if reason:
             case = case._replace(result="skipped", message=f"not judged: {reason}")
         elif direction.boundary < CALM_MPS:
-            message = f"not flyable with P >= {winds.goal.target:g} even in calm air"
+            message = f"not flyable with a probability of at least {winds.goal.target:g} even in calm air"
             case = case._replace(result="failure", message=message)
         else:
             case = case._replace(text=f"wind up to {_speed_text(direction.boundary, winds.goal.most)}")

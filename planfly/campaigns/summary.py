@@ -451,18 +451,24 @@ def campaign_lines(summary: CampaignSummary) -> list[str]:
     estimate, goal = summary.estimate, summary.goal
     tally, confidence_text = estimate.tally, f"{100.0 * goal.confidence:g} %"
     share_text = (
-        f"P = {tally.share:.4f}"
+        f"a share of {tally.share:.4f}"
         if not tally.undecided
-        else f"P from {tally.share:.4f} to {(tally.flyable + tally.undecided) / tally.flown:.4f}"
+        else f"a share of {tally.share:.4f} to {(tally.flyable + tally.undecided) / tally.flown:.4f}"
     )
     target = summary.goal.target
-    texts = {"reached": f"P >= {target}", "missed": f"P < {target}", "undecided": f"P >= {target} is undecided"}
+    texts = {
+        "reached": f"the probability of a flyable flight is at least {target}",
+        "missed": f"the probability of a flyable flight is below {target}",
+        "undecided": f"it is undecided whether the probability of a flyable flight is at least {target}",
+    }
     answer_text = texts.get(summary.estimate.answer, "no target is set (--prove P or --at-least P)")
     lines = [
         f"{answer_text}: {_flyable_text(tally)}, {share_text}"
         + ("; return not judged" if summary.unjudged_return else ""),
-        f"  P at least {estimate.lower:.4f}, at most {estimate.upper:.4f} (each at {confidence_text}; {goal.method})",
-        f"  two-sided interval of P at {confidence_text}: {estimate.interval.low:.4f} to {estimate.interval.high:.4f}",
+        f"  probability at least {estimate.lower:.4f} and at most {estimate.upper:.4f} (each with {confidence_text}"
+        f" confidence; {goal.method})",
+        f"  two-sided {confidence_text} interval of the probability: {estimate.interval.low:.4f} to"
+        f" {estimate.interval.high:.4f}",
         *_deciding_flights_lines(summary),
         *(f"  {line}" for line in flown_lines(summary.conditions)),
         *([f"  Not judged: return ({summary.unjudged_return})"] if summary.unjudged_return else []),
@@ -490,7 +496,7 @@ def undecided_lines(summary: CampaignSummary) -> list[str]:
     if not tally.undecided:
         return []
     flights_text = f"{tally.undecided} of {count_text(tally.flown, 'flight')}"
-    return [f"  Not judged: {flights_text}; first reason: {summary.undecided_text}"]
+    return [f"  Not judged in full: {flights_text}; the first for this reason: {summary.undecided_text}"]
 
 
 def deciding_lines(summary: CampaignSummary) -> list[str]:

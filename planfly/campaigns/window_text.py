@@ -18,7 +18,7 @@ def answer_line(result: WindowResult) -> str:
     """
     goal, departure = result.goal, result.asked
     windows = ", ".join(_window_text(*window) for window in result.windows)
-    open_text = f"take-off windows: {windows} UTC" if windows else "no take-off time is open"
+    open_text = f"take-off windows (UTC): {windows}" if windows else "no take-off time is flyable"
     if departure is None:
         unknown_text = ", but not judged in full" if windows and result.is_go is None else ""
         return f"{open_text}{unknown_text}{_best_text(result)}"

@@ -57,7 +57,7 @@ def add_aircraft_parser(command_line: LineParser) -> None:
     new_group.add_argument("--new", dest="folder", metavar="FOLDER", help="folder to make; it must not exist yet")
     with_completer(
         new_group.add_argument(
-            "--from", dest="source", metavar="NAME", help="with --new: the aircraft to start from (default: aerosonde)"
+            "--from", dest="source", metavar="NAME", help="with --new: the aircraft to copy (default: aerosonde)"
         ),
         complete_aircraft,
     )
@@ -69,7 +69,7 @@ def add_aircraft_parser(command_line: LineParser) -> None:
             dest="logs",
             metavar="LOG",
             nargs="+",
-            help="logs to identify from (.BIN, .tlog, .ulg or a table of columns); requires planfly[identification]",
+            help="its flight logs (.BIN, .tlog, .ulg or a table of columns); requires planfly[identification]",
         ),
         file_completer("bin", "BIN", "tlog", "ulg", "toml", "csv", "mat", "parquet", "h5"),
     )
@@ -77,19 +77,19 @@ def add_aircraft_parser(command_line: LineParser) -> None:
         log_group.add_argument(
             "--base",
             metavar="NAME",
-            help="with --identify: the known aircraft that is most similar (default: aerosonde)",
+            help="with --identify: the known aircraft that is most similar to it (default: aerosonde)",
         ),
         complete_aircraft,
     )
     with_completer(
-        log_group.add_argument("--check", metavar="LOG", help="with --identify: another log, to test the result"),
+        log_group.add_argument("--check", metavar="LOG", help="with --identify: another log that tests the result"),
         file_completer("bin", "BIN", "tlog", "ulg", "toml", "csv", "mat", "parquet", "h5"),
     )
     log_group.add_argument(
         "--until",
         metavar="S",
         type=number_parser("until"),
-        help="with --identify: use only the log before this time, s; 'planfly predict' can then be tested on the rest",
+        help="with --identify: use the log only up to this time, s; then 'planfly predict' can be tested on the rest",
     )
     add_result_options(
         parser,
@@ -104,11 +104,11 @@ def _add_data_sheet_options(parser: CommandParser) -> None:
     numbers = {
         "mass": ("KG", "mass, 0.5 to 25 kg"),
         "span": ("M", "wing span, m"),
-        "area": ("M2", "wing area, m2 (default: the area that carries the mass at the stall speed)"),
-        "cruise": ("M/S", "cruise airspeed"),
-        "stall": ("M/S", "minimum airspeed of level flight"),
-        "top": ("M/S", "airspeed of fastest level flight (default: 1.65 times the cruise airspeed)"),
-        "bank": ("DEG", "steepest bank in turns, degrees (default: 35)"),
+        "area": ("M2", "wing area, m2 (default: the area that lifts the mass at the stall speed)"),
+        "cruise": ("M/S", "cruise airspeed, m/s"),
+        "stall": ("M/S", "minimum airspeed of level flight, m/s"),
+        "top": ("M/S", "maximum airspeed of level flight, m/s (default: 1.65 times the cruise airspeed)"),
+        "bank": ("DEG", "maximum bank in turns, degrees (default: 35)"),
         "climb": (
             "DEG",
             "steepest climb at the cruise airspeed, degrees (default: 12, or the climb that fits the top speed)",
@@ -118,13 +118,17 @@ def _add_data_sheet_options(parser: CommandParser) -> None:
     }
     for name, (unit, text) in numbers.items():
         group.add_argument(f"--{name}", metavar=unit, type=float, help=text)
-    group.add_argument("--battery", metavar="V,AH", help="battery, such as 14.8V,5Ah")
+    group.add_argument("--battery", metavar="V,AH", help="voltage and capacity of the battery, such as 14.8V,5Ah")
     group.add_argument("--prop", metavar="DxP", help="diameter and pitch of the propeller, inches, such as 12x6")
-    group.add_argument("--layout", choices=("tail", "wing", "vtail"), help="(default: tail)")
+    group.add_argument(
+        "--layout",
+        choices=("tail", "wing", "vtail"),
+        help="layout of the airframe: a tail, a flying wing or a V-tail (default: tail)",
+    )
     group.add_argument(
         "--params",
         metavar="FILE",
-        help="parameter file of ArduPlane or PX4; the airspeeds and limits that it states are used",
+        help="parameter file of ArduPlane or PX4, whose airspeeds and limits the aircraft gets",
     )
 
 
@@ -179,7 +183,7 @@ def _make_folder(args: argparse.Namespace) -> int:
         raise PlanflyError(message, field="--new", value=args.folder)
     for field, is_given, reason in (
         ("--out", args.out is not None, "--new names the folder to make"),
-        ("--motor-braking", args.motor_braking, "it is an option of each flight"),
+        ("--motor-braking", args.motor_braking, "it is an option for flights"),
     ):
         if is_given:
             raise PlanflyError(f"--new cannot be combined with {field}: {reason}", field=field)
@@ -235,7 +239,7 @@ def _identify(args: argparse.Namespace) -> int:
     for field, is_given, reason_text in (
         ("--params", args.params is not None, "the parameters come from the logs"),
         ("--from", args.source is not None, "--base names the aircraft to start from"),
-        ("--motor-braking", args.motor_braking, "it is an option of each flight"),
+        ("--motor-braking", args.motor_braking, "it is an option for flights"),
     ):
         if is_given:
             raise PlanflyError(f"--identify cannot be combined with {field}: {reason_text}", field=field)

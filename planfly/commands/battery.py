@@ -31,11 +31,11 @@ def add_battery_parser(command_line: LineParser) -> None:
         (
             "specific_energy",
             "WH/KG",
-            "energy per battery mass: the aircraft becomes heavier with a larger battery (default: its"
-            " mass stays the same)",
+            "energy per battery mass, so that a larger battery makes the aircraft heavier (default: the"
+            " aircraft's mass stays the same)",
         ),
-        ("every", "S", "interval along the flight between the starts of two returns, s (default: 10)"),
-        ("confidence", "C", "confidence level of the interval of the capacity (default: 0.95)"),
+        ("every", "S", "time between the starts of two simulated returns along the flight, s (default: 10)"),
+        ("confidence", "C", "confidence level of the interval for the battery's capacity (default: 0.95)"),
     ):
         group.add_argument(f"--{name.replace('_', '-')}", metavar=unit, type=number_parser(name), help=text)
     group.add_argument(

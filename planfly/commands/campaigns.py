@@ -61,14 +61,14 @@ def add_campaign_parser(command_line: LineParser) -> None:
         "--flights",
         metavar="N",
         type=number_parser("flights"),
-        help="number of flights (default: 300); with --prove, the maximum (default: 5000); with --resume, the default "
-        "is the number of the resumed campaign",
+        help="number of flights (default: 300), or with --prove the maximum number (default: 5000). With --resume the "
+        "default is the number of the resumed campaign",
     )
     parser.add_argument(
         "--confidence",
         metavar="C",
         type=number_parser("confidence"),
-        help="confidence level of each bound (default: 0.95, or with --resume the previous value)",
+        help="confidence level of each bound of the probability (default: 0.95, or with --resume the previous value)",
     )
     parser.add_argument(
         "--refly",
@@ -91,7 +91,7 @@ def add_winds_parser(command_line: LineParser) -> None:
         "--prove",
         metavar="P",
         type=number_parser("prove"),
-        help="probability of a flyable flight that is to be proved (default: 0.99; with --resume, its earlier value)",
+        help="required probability that a flight is flyable (default: 0.99; with --resume, its earlier value)",
     )
     parser.add_argument(
         "--confidence",
@@ -125,8 +125,8 @@ def _add_shared_options(parser: CommandParser) -> None:
     parser.add_argument(
         "--resume",
         action="store_true",
-        help="continue the campaign in --out with the options of its flights; an option that contradicts them is "
-        "refused",
+        help="continue the campaign in --out with the options of its earlier flights; an option that contradicts them "
+        "is refused",
     )
     add_result_options(
         parser,
@@ -153,7 +153,7 @@ def add_flights_options(parser: CommandParser) -> None:
         parser.add_argument(
             "--spread",
             metavar="FILE",
-            help="TOML file of dispersions, which states how flights vary (default: planfly's own)",
+            help="TOML file that states how the flights vary, their dispersions (default: planfly's own dispersions)",
         ),
         file_completer("toml"),
     )
@@ -172,7 +172,7 @@ def add_flights_options(parser: CommandParser) -> None:
     parser.add_argument(
         "--scheduler",
         metavar="ADDRESS",
-        help="fly on a running dask cluster: tls://HOST:PORT; requires planfly[cluster]",
+        help="address of a running dask cluster that simulates the flights: tls://HOST:PORT; requires planfly[cluster]",
     )
 
 

@@ -71,8 +71,8 @@ def add_check_parser(command_line: LineParser) -> None:
         dest="autopilots",
         metavar="AUTOPILOT,...",
         type=parse_autopilots,
-        help="fly a mission with several simulated autopilots, and print one table with a column for each: "
-        + ", ".join(CHOICES["autopilot"]),
+        help="fly a mission with each of several simulated autopilots, and print a table with a column for each. "
+        "Choose from: " + ", ".join(CHOICES["autopilot"]),
     )
     group.add_argument(
         "--geometry",

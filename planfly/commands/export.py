@@ -36,9 +36,9 @@ def add_export_parser(command_line: LineParser) -> None:
         "files",
         metavar="FILE",
         nargs="+",
-        help="files to write: .waypoints, .plan, .fence, .rally, .kml, .gpx, .parm (parameters for take-off, "
-        "landing and returns);"
-        " from a log also .csv, .parquet (extra planfly[tables]), .tlog (MAVLink; extra planfly[live]), .ulg (PX4)",
+        help="files to write: .waypoints, .plan, .fence, .rally, .kml, .gpx or .parm (parameters for take-off, "
+        "landing and returns). A flight log can also be written as .csv, .parquet (requires planfly[tables]), .tlog"
+        " (MAVLink; requires planfly[live]) or .ulg (PX4)",
     )
     with_completer(
         parser.add_argument(
@@ -50,16 +50,18 @@ def add_export_parser(command_line: LineParser) -> None:
     )
     group = parser.add_group("autopilot of a .plan or .parm (default: the source's)")
     group.add_argument(
-        "--autopilot", choices=CHOICES["autopilot"], help="autopilot that the .plan (firmwareType) or .parm is for"
+        "--autopilot",
+        choices=CHOICES["autopilot"],
+        help="autopilot for which the .plan (its firmwareType) or .parm is written",
     )
     option = group.add_argument(
-        "--params", metavar="FILE", help="parameter file of the autopilot; a .parm contains its values"
+        "--params", metavar="FILE", help="parameter file of the autopilot, whose values a .parm contains"
     )
     with_completer(option, file_completer("param", "parm", "params"))
     aircraft_option = group.add_argument(
         "--aircraft",
         metavar="AIRCRAFT",
-        help="aircraft of the mission: a .plan contains its cruise speed, and a .parm its parameters"
+        help="aircraft of the mission: its cruise speed is written to a .plan, and its parameters to a .parm"
         " (default: aerosonde)",
     )
     with_completer(aircraft_option, complete_aircraft)

@@ -42,7 +42,7 @@ def add_fly_parser(command_line: LineParser) -> None:
     log_group.add_argument(
         "--log",
         metavar="FILE",
-        help="file for the flight log (default: runs/<mission>-fly-seed<N>/flight.mcap, overwritten)",
+        help="file for the flight log (default: runs/<mission>-fly-seed<N>/flight.mcap; an existing one is replaced)",
     )
     add_log_rate_option(log_group)
     add_result_options(parser, junit=True)

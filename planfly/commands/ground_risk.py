@@ -29,7 +29,9 @@ def add_ground_risk_parser(command_line: LineParser) -> None:
     group = parser.add_group("the ground risk")
     with_completer(
         group.add_argument(
-            "--population", metavar="FILE", help="GeoTIFF of the population, such as GHS-POP or WorldPop"
+            "--population",
+            metavar="FILE",
+            help="GeoTIFF of the population density or count, such as GHS-POP or WorldPop",
         ),
         file_completer("tif", "tiff"),
     )
@@ -41,18 +43,18 @@ def add_ground_risk_parser(command_line: LineParser) -> None:
     group.add_argument(
         "--controlled",
         action="store_true",
-        help="the ground below is a controlled area: only people who are involved in the flight are there",
+        help="the ground below is a controlled area, where nobody is except people involved in the flight",
     )
     for name, unit, text in (
-        ("max_speed", "M/S", "highest speed of the aircraft (default: the highest airspeed of its model)"),
+        ("max_speed", "M/S", "maximum speed of the aircraft, m/s (default: the highest airspeed of its model)"),
         ("probability", "P", "fraction of the flights that stay inside the flight geography (default: 0.95)"),
-        ("every", "S", "interval along the flight between the starts of two returns, s (default: 10)"),
+        ("every", "S", "time between the starts of two simulated returns along the flight, s (default: 10)"),
     ):
         group.add_argument(f"--{name.replace('_', '-')}", metavar=unit, type=number_parser(name), help=text)
     group.add_argument(
         "--glide",
         action="store_true",
-        help="make the ground risk buffer wide enough for glides after an engine failure, too",
+        help="also make the ground risk buffer wide enough for glides after an engine failure",
     )
     group.add_argument(
         "--flights",
@@ -62,7 +64,8 @@ def add_ground_risk_parser(command_line: LineParser) -> None:
     )
     add_result_options(
         parser,
-        "folder for the page, report.html, the volumes as KML and GeoJSON, their map and the table (default: none)",
+        "folder for the files: a page (report.html), the volumes as KML and GeoJSON, a map and a table (default: no"
+        " files)",
     )
 
 

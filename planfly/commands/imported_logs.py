@@ -37,8 +37,9 @@ def add_import_log_parser(command_line: LineParser) -> None:
         parser.add_argument(
             "log",
             metavar=LOGS,
-            help="a log of ArduPilot, of a ground station (.tlog; extra planfly[live]), of PX4 (.ulg; extra"
-            " planfly[px4-logs]), a track, or a table of columns (extra planfly[data-logs])",
+            help="a log of ArduPilot (.BIN), of a ground station (.tlog; requires planfly[live]) or of PX4 (.ulg;"
+            " requires planfly[px4-logs]), a track (.gpx, .igc, .kml, .kmz), or a table of columns (requires"
+            " planfly[data-logs])",
         ),
         file_completer(*IMPORTED_LOG_SUFFIXES),
     )
@@ -49,8 +50,8 @@ def add_import_log_parser(command_line: LineParser) -> None:
             dest="files",
             metavar="FILE",
             nargs="+",
-            help="guess a table of columns for these CSV, MAT, Parquet or HDF5 files from names and values, and"
-            " write it to LOG for you to check; requires planfly[data-logs]",
+            help="guess the columns of these CSV, MAT, Parquet or HDF5 files from their names and values, and write"
+            " them to LOG as a table of columns for you to check; requires planfly[data-logs]",
         ),
         file_completer("csv", "mat", "parquet", "h5", "hdf5"),
     )
@@ -123,7 +124,9 @@ def add_refly_parser(command_line: LineParser) -> None:
     )
     with_completer(
         parser.add_argument(
-            "--aircraft", metavar="AIRCRAFT", help="aircraft that flies it again (default: the aircraft of the log)"
+            "--aircraft",
+            metavar="AIRCRAFT",
+            help="aircraft that flies the mission again (default: the aircraft of the log)",
         ),
         complete_aircraft,
     )

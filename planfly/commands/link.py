@@ -36,13 +36,13 @@ def add_link_parser(command_line: LineParser) -> None:
     for name, unit, text in (
         ("frequency", "MHZ", "frequency, MHz"),
         ("power", "DBM", "output power of the transmitter, dBm"),
-        ("sensitivity", "DBM", "power at which the receiver still works, dBm"),
+        ("sensitivity", "DBM", "lowest received power at which the receiver works, dBm"),
         ("antenna", "M", "height of the station's antenna above ground, m (default: 3)"),
         ("station_gain", "DBI", "gain of the station's antenna, dBi (default: 0)"),
         ("aircraft_gain", "DBI", "gain of the aircraft's antenna, dBi (default: 0)"),
         ("cable_loss", "DB", "losses of cables and connectors at both ends, dB (default: 0)"),
         ("fade_margin", "DB", "required margin of the received power above the sensitivity, dB (default: 10)"),
-        ("max_outage", "S", "longest time below the fade margin that is accepted, s (default: 0)"),
+        ("max_outage", "S", "longest accepted time with less than the fade margin, s (default: 0)"),
     ):
         group.add_argument(f"--{name.replace('_', '-')}", metavar=unit, type=number_parser(name), help=text)
     group.add_argument(
@@ -54,8 +54,8 @@ def add_link_parser(command_line: LineParser) -> None:
     group.add_argument(
         "--use",
         choices=CHOICES["use"],
-        help="kind of link: telemetry (to the ground station) or control (from the remote control); the autopilot"
-        " reacts differently to the loss of each (default: telemetry)",
+        help="kind of link: telemetry (to the ground station) or control (from the remote control). It decides how the"
+        " autopilot reacts when the link is lost (default: telemetry)",
     )
     add_imported_log_options(parser)
     add_world_options(parser)
@@ -65,7 +65,8 @@ def add_link_parser(command_line: LineParser) -> None:
     )
     add_result_options(
         parser,
-        "folder for pictures of the link over time and on the map, and for the coverage as a GeoTIFF (default: none)",
+        "folder for the files: pictures of the link margin over time and on a map, and the coverage as a GeoTIFF"
+        " (default: no files)",
     )
 
 

@@ -19,7 +19,9 @@ def add_new_parser(command_line: LineParser) -> None:
         "planfly new ./site --from 46.52,8.01 --to 46.60,8.12 --terrain dem.tif",
         "planfly new ./site --from 46.52,8.01 --to 46.60,8.12 --aircraft x8 --height 100",
     )
-    parser.add_argument("folder", metavar="FOLDER", help="folder for the scenario file, which gets the folder's name")
+    parser.add_argument(
+        "folder", metavar="FOLDER", help="folder to make for the scenario file; the file gets the folder's name"
+    )
     route_group = parser.add_group("route")
     for option, keyword in (("--from", "start"), ("--to", "destination")):
         route_group.add_argument(
@@ -35,7 +37,7 @@ def add_new_parser(command_line: LineParser) -> None:
         metavar="M",
         type=number_parser("height"),
         default=120.0,
-        help="height of both ends above ground, m (default: 120)",
+        help="height of start and destination above ground, m (default: 120)",
     )
     add_terrain_option(parser.add_group("where it flies"))
     flight_group = parser.add_group("aircraft and autopilot")

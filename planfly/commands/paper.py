@@ -32,7 +32,7 @@ def add_paper_parser(command_line: LineParser) -> None:
         metavar="N",
         type=number_parser("runs"),
         default=15,
-        help="runs of each problem, with seeds 1 to N (default: 15)",
+        help="number of runs of each problem, with seeds 1 to N (default: 15)",
     )
     parser.add_argument(
         "--algorithm",
@@ -40,7 +40,9 @@ def add_paper_parser(command_line: LineParser) -> None:
         default="umda",
         help="algorithm to compare with the two baselines (default: umda, the paper's)",
     )
-    parser.add_argument("--jobs", metavar="N", type=number_parser("jobs"), help="processes (default: one per core)")
+    parser.add_argument(
+        "--jobs", metavar="N", type=number_parser("jobs"), help="number of processes (default: one per core)"
+    )
     add_result_options(parser, "folder for tables and figures (default: runs/paper; an existing one is replaced)")
 
 

@@ -49,34 +49,34 @@ def add_plan_parser(command_line: LineParser) -> None:
         "--seed", metavar="N", type=number_parser("seed"), help="seed of the planner (default: the scenario's, or 1)"
     )
     planning_group.add_argument(
-        "--algorithm", metavar="A", help="algorithm of the planner instead of the scenario's (see below)"
+        "--algorithm", metavar="A", help="algorithm of the planner, listed below (default: the scenario's)"
     )
     planning_group.add_argument(
         "--budget",
         metavar="N|Xs",
         type=parse_budget,
-        help="stop after N evaluations or X seconds with the best plan so far (as Ctrl-C does); a plan under a budget "
-        "in seconds may differ from run to run",
+        help="stop after N evaluations, or after X seconds (such as 10s), and keep the best plan so far, as Ctrl-C "
+        "does. With a budget in seconds, the plan may differ from run to run",
     )
     planning_group.add_argument(
         "--front",
         metavar="N",
         type=number_parser("front"),
         help=(
-            "plan up to N alternatives (2 to 100), none of which is better than another in all four objectives:"
+            "plan up to N alternatives (2 to 100). None of them is better than another in all four objectives:"
             " length, exposure to radars, height above ground, and energy (or time with [planner] "
-            'objective = "time"). --out is then a folder with plan-1.json ..., front.csv, front.json '
-            "and pictures (default: runs/<name>-seed<N>-front; an existing one is replaced)"
+            'objective = "time"). --out is then a folder with plan-1.json, plan-2.json and so on, front.csv, '
+            "front.json and pictures (default: runs/<name>-seed<N>-front; an existing one is replaced)"
         ),
     )
     add_flights_option(planning_group)
     replanning_group = parser.add_group("planning again in flight")
     with_completer(
-        replanning_group.add_argument("--from", dest="old", metavar="PLAN.json", help="plan that is being flown"),
+        replanning_group.add_argument("--from", dest="old", metavar="PLAN.json", help="plan to change in flight"),
         file_completer("json"),
     )
     replanning_group.add_argument(
-        "--at-leg", metavar="K", type=number_parser("at_leg"), help="leg that is flown next; earlier legs are kept"
+        "--at-leg", metavar="K", type=number_parser("at_leg"), help="number of the next leg; earlier legs are kept"
     )
     replanning_group.add_argument(
         "--add-threat",
@@ -84,7 +84,7 @@ def add_plan_parser(command_line: LineParser) -> None:
         metavar="EAST,NORTH,KILL,DETECTION",
         type=parse_threat,
         action="append",
-        help="a new threat: east, north, kill radius and detection radius, m; repeatable",
+        help="a new threat: position east and north, kill radius and detection radius, all in m; repeatable",
     )
     add_aircraft_and_wind_options(parser)
     add_autopilot_options(parser)

@@ -30,24 +30,26 @@ def add_predict_parser(command_line: LineParser) -> None:
         "planfly predict flight.columns.toml --aircraft ./mine --out predicted",
     )
     with_completer(
-        parser.add_argument("log", metavar=LOGS, help="a log, or a flight log written by 'planfly import'"),
+        parser.add_argument(
+            "log", metavar=LOGS, help="a log of an autopilot, or a flight log written by 'planfly import'"
+        ),
         file_completer("mcap", *IMPORTED_LOG_SUFFIXES),
     )
     group = parser.add_group("prediction: --aircraft is required")
     group.add_argument(
         "--by",
         choices=("controls", "mission"),
-        help="controls follows the logged controls over windows of 2 s; mission flies the mission with the simulated"
-        " autopilot in the logged wind (default: controls, if the log has them)",
+        help="what the predicted flight follows: the logged controls, in windows of 2 s (controls), or the mission,"
+        " with the simulated autopilot in the logged wind (mission) (default: controls, if the log has them)",
     )
     group.add_argument(
         "--from",
         dest="start",
         metavar="S",
         type=number_parser("start"),
-        help="with --by controls: start of the prediction, in seconds from the start of the log; the log before it only"
-        " sets the width of the bands (default: the end of the part from which the aircraft was identified, or the"
-        " middle of the log)",
+        help="with --by controls: time at which the prediction starts, in seconds from the start of the log. The log"
+        " before this time only sets the width of the bands (default: the end of the part from which the aircraft was"
+        " identified, or the middle of the log)",
     )
     add_imported_log_options(parser)
     add_world_options(parser)

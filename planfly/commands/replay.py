@@ -53,44 +53,44 @@ def add_replay_parser(command_line: LineParser) -> None:
     add_log_argument(parser)
     part_group = parser.add_group("part and speed")
     part_group.add_argument(
-        "--from", dest="start", metavar="S", type=number_parser("start"), help="start at this time of the flight, s"
+        "--from", dest="start", metavar="S", type=number_parser("start"), help="flight time at which to start, s"
     )
     part_group.add_argument(
         "--to",
         metavar="S|IP:PORT,...",
         type=parse_time_or_stations,
-        help="a number: stop at this flight time, s; an address: stream the log to ground stations there (needs "
+        help="flight time at which to stop, s; or addresses of ground stations to which the log is streamed (requires "
         "planfly[live])",
     )
     part_group.add_argument(
         "--speed",
         metavar="X",
         type=number_parser("speed"),
-        help="play X times as fast as real time (default: 1 on a terminal and in Foxglove; as fast as needed for a"
-        " film of 20 s; otherwise at once)",
+        help="play X times as fast as real time (default: 1 on a terminal and in Foxglove; for a film, the speed that"
+        " makes it 20 s long; otherwise at once)",
     )
-    part_group.add_argument("--at-once", action="store_true", help="print the timeline at once, also on a terminal")
+    part_group.add_argument("--at-once", action="store_true", help="print the whole timeline without playing it")
     output_group = parser.add_group("other outputs")
     output_group.add_argument(
         "--movie",
         metavar="FILE|DIR",
-        help="draw the flight as FILE.gif, FILE.mp4 (by ffmpeg, or the extra planfly[films]), or DIR for PNG frames",
+        help="write a film: FILE.gif, FILE.mp4 (requires ffmpeg or planfly[films]), or a folder DIR of PNG frames",
     )
     output_group.add_argument(
         "--foxglove",
         action="store_true",
-        help="play the flight to Foxglove on this machine over WebSocket; requires the extra planfly[foxglove], and"
-        " a viewer that speaks foxglove.sdk.v1 (Foxglove since 2025, Lichtblick after 1.21)",
+        help="play the flight in Foxglove on this machine, over WebSocket; requires planfly[foxglove] and a viewer that"
+        " supports the protocol foxglove.sdk.v1 (Foxglove since 2025, Lichtblick after 1.21)",
     )
     output_group.add_argument(
         "--port",
         metavar="N",
         type=number_parser("port"),
         default=8765,
-        help="port of --foxglove (default: 8765; 0: any free port)",
+        help="port for --foxglove (default: 8765); 0 stands for any free port",
     )
     output_group.add_argument(
-        "--allow-origin", metavar="URL,URL", help="web pages that may also connect to --foxglove (https://HOST)"
+        "--allow-origin", metavar="URL,URL", help="web pages (https://HOST) that may also connect to --foxglove"
     )
     output_group.add_argument(
         "--wait",

@@ -45,24 +45,24 @@ def add_returns_parser(command_line: LineParser) -> None:
         metavar="S",
         type=number_parser("every"),
         default=1.0,
-        help="interval along the flight between the starts of two returns, s (default: 1)",
+        help="time between the starts of two simulated returns along the flight, s (default: 1)",
     )
     group.add_argument(
         "--suggest",
         action="store_true",
-        help="find the lowest RTL_ALTITUDE (PX4: RTL_RETURN_ALT), a climb before the turn, or the fewest rally points "
-        "that make all returns safe",
+        help="look for changes that make all returns safe: the lowest sufficient RTL_ALTITUDE (PX4: RTL_RETURN_ALT), a "
+        "climb before the turn, or the fewest rally points",
     )
     add_sitl_option(
         group,
-        "also fly the worst returns with ArduPlane itself, and compare them with the simulated returns: PATH is its"
-        " program, built for software in the loop (requires planfly[live])",
+        "also fly the worst returns with ArduPlane itself, and compare them with the simulated returns. PATH is its"
+        " executable, built for software in the loop (requires planfly[live])",
     )
     group.add_argument(
         "--points",
         metavar="N",
         type=number_parser("points"),
-        help="number of the worst returns that the program flies, spaced far apart (default: 3)",
+        help="with --sitl: number of the worst returns to fly, chosen far apart (default: 3)",
     )
     add_imported_log_options(parser)
     add_world_options(parser)

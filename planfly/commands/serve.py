@@ -50,7 +50,7 @@ def add_serve_parser(command_line: LineParser) -> None:
         metavar="X",
         type=number_parser("served_speed"),
         default=1.0,
-        help="fly at X times real time, 0.1 to 100 (default: 1)",
+        help="fly X times as fast as real time, 0.1 to 100 (default: 1)",
     )
     parser.add_argument(
         "--log", metavar="DIR", default="runs/serve", help="folder of the flight logs (default: runs/serve)"

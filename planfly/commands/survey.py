@@ -39,16 +39,16 @@ def add_survey_parser(command_line: LineParser) -> None:
         metavar="WxH,FOCAL",
         type=parse_camera,
         help=(
-            "camera, which looks straight down: width and height of its sensor (across and along the track) and "
-            "focal length, mm; then, if required, the overlaps along and across the lines, percent. Examples: "
+            "camera, which looks straight down: the size of its sensor across and along the track, and its focal "
+            "length, all in mm. The required overlaps along and across the lines may follow, in percent. Examples: "
             "23.5x15.6,16 and 23.5x15.6,16,75,60 (default: the camera of a .plan)"
         ),
     )
     group.add_argument(
         "--suggest",
         action="store_true",
-        help="look for a change that makes all lines usable: the distance between photos, the height, turn-arounds, "
-        "the order or course of the lines, a parameter or the airspeed; each change is flown",
+        help="look for a change that makes all lines usable. Tried are the distance between photos, the height, "
+        "turn-arounds, the order and course of the lines, parameters and the airspeed, each in a simulated flight",
     )
     add_world_options(parser)
     add_aircraft_and_wind_options(parser)

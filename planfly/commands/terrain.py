@@ -25,11 +25,16 @@ def add_terrain_parser(command_line: LineParser) -> None:
     area_group = parser.add_group("the area")
     with_completer(
         area_group.add_argument(
-            "--around", metavar="MISSION", help="mission (.waypoints or .plan) whose positions lie in the area"
+            "--around", metavar="MISSION", help="mission (.waypoints or .plan) that the area has to contain"
         ),
         file_completer(*MISSION_SUFFIXES),
     )
-    area_group.add_argument("--box", metavar="S,W,N,E", type=parse_area, help="edges of the area, degrees")
+    area_group.add_argument(
+        "--box",
+        metavar="S,W,N,E",
+        type=parse_area,
+        help="southern, western, northern and eastern edge of the area, degrees",
+    )
     area_group.add_argument(
         "--margin",
         metavar="KM",
@@ -42,7 +47,7 @@ def add_terrain_parser(command_line: LineParser) -> None:
         "--source",
         metavar="DIR|URL",
         help="a folder of tiles, an elevation file, or a server of the Copernicus DEM's GLO-30 tiles (default: the "
-        "public server in Amazon's registry of open data; fetched parts are kept)",
+        "public server in Amazon's registry of open data). Fetched parts of tiles are kept for later runs",
     )
     tile_group.add_argument(
         "--sea",

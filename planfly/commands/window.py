@@ -24,25 +24,25 @@ def add_window_parser(command_line: LineParser) -> None:
         extra="campaigns",
     )
     add_flights_options(parser)
-    group = parser.add_group("the departures")
+    group = parser.add_group("the take-off times")
     for option, keyword, text in (
         ("--from", "earliest", "first time of take-off (default: the time of --at)"),
         ("--to", "latest", "last time of take-off (default: 24 hours later, or the end of the forecast)"),
     ):
         group.add_argument(option, dest=keyword, metavar="TIME", help=text)
         parser.alias_keyword(keyword, option)
-    group.add_argument("--every", metavar="STEP", help="time between two departures, such as 30min or 1h (default: 1h)")
+    group.add_argument("--every", metavar="STEP", help="time between two take-offs, such as 30min or 1h (default: 1h)")
     group.add_argument(
         "--probability",
         metavar="P",
         type=number_parser("probability"),
-        help="a departure is open if its flights are flyable with at least this probability (default: 0.9)",
+        help="required probability that a flight with this take-off time is flyable (default: 0.9)",
     )
     group.add_argument(
         "--flights",
         metavar="N",
         type=number_parser("window_flights"),
-        help="number of flights of each departure, 10 to 10,000 (default: 40)",
+        help="number of flights for each take-off time, 10 to 10,000 (default: 40)",
     )
     add_result_options(parser, "folder for the page (report.html) and the chart (window.png) (default: no files)")
 

@@ -72,7 +72,7 @@ def _loose_limits_text(plan: Plan, uav: Uav) -> str:
         if min(certificate.turn, certificate.available_length, certificate.slope) < 0.0:
             return (
                 f"{claim}: the limits of the scenario are looser than the limits of {owner}"
-                f" ({certificate.problems[0]})."
+                f". The first problem is {certificate.problems[0]}."
                 ' To plan within both, write "aircraft" instead of the numbers in [limits]'
             )
     return ""

@@ -108,7 +108,7 @@ def overlap_lines(measure: OverlapMeasure | None, *, is_flown: bool = True) -> t
     for number, (check, (name, spacing)) in enumerate(zip((FRONT_OVERLAP, SIDE_OVERLAP), needs, strict=True)):
         if check in faults and spacing is not None and spacing >= 1.0:
             texts[number] += (
-                f": {name} must be at most {math.floor(spacing)} m apart, because the lowest photos are taken"
+                f". The {name} must be at most {math.floor(spacing)} m apart, because the lowest photos are taken"
                 f" {measure.min_height:.0f} m above ground"
             )
     if measure.unusable_fraction > MIN_STATED_FRACTION:

@@ -108,7 +108,7 @@ def parse_autopilots(text: str) -> list[str]:
     names = [name.strip() for name in text.split(",")]
     for name in names:
         if name not in CHOICES["autopilot"]:
-            raise argparse.ArgumentTypeError(f"{name!r}: expected {', '.join(CHOICES['autopilot'])}")
+            raise argparse.ArgumentTypeError(f"{name!r}: expected one or more of {', '.join(CHOICES['autopilot'])}")
     return names
 
 

@@ -71,11 +71,11 @@ def _dispersed_lines(result: "CampaignResult", answer: "DispersedFlights") -> li
     requirement_text = "" if answer.holds else "; a probability of 0.95 is required"
     lines = [
         f"flights   the plan succeeds in {answer.flyable} of {answer.flights} flights with the default dispersions"
-        f" (P between {low:.2f} and {high:.2f} at 95 %){requirement_text}",
+        f" (95 % interval of the probability: {low:.2f} to {high:.2f}){requirement_text}",
         *undecided_lines(result.summary),
         *failure_lines(result.summary.by_rule, result.summary.mission_fault),
         *deciding_lines(result.summary),
     ]
     if answer.remedies:
-        lines.append(f"  raises P  {'; '.join(answer.remedies)}")
+        lines.append(f"  would help  {'; '.join(answer.remedies)}")
     return lines

@@ -73,8 +73,8 @@ def add_json_and_quiet_options(group: OptionGroup, command: str) -> None:
     group.add_argument(
         "--json",
         metavar="FILE",
-        help="also write the answer as JSON to FILE. With - as FILE, the answer goes to standard output, and all other "
-        f"output to standard error. 'planfly help {command} --schema' prints the schema of the answer",
+        help="also write the result as JSON to FILE. If FILE is -, the result goes to standard output and all other "
+        f"output to standard error. 'planfly help {command} --schema' prints the JSON schema",
     )
     group.add_argument(
         "--quiet", action="store_true", help="print neither progress nor results; errors and the exit code remain"
@@ -129,8 +129,8 @@ def add_time_option(group: OptionGroup) -> None:
         "--at",
         metavar="TIME",
         help=(
-            "time of the flight in ISO 8601 format, START or START/END, as in 2026-05-01T10:00+02:00. Zones that are "
-            "inactive at this time are ignored, and a forecast is read from START on (default: all zones are active)"
+            "time of the flight in ISO 8601 format, START or START/END, such as 2026-05-01T10:00+02:00. Zones that "
+            "are inactive at this time are ignored. A forecast is read from START on (default: all zones are active)"
         ),
     )
 
@@ -150,7 +150,7 @@ def add_aircraft_and_wind_options(parser: CommandParser) -> None:
         "--airspeed",
         metavar="M/S",
         type=number_parser("airspeed"),
-        help="true airspeed until the mission sets another, m/s (default: the aircraft's cruise speed)",
+        help="true airspeed in m/s, until the mission sets another airspeed (default: the aircraft's cruise speed)",
     )
     group.add_argument(
         "--wind",
@@ -202,8 +202,8 @@ def add_autopilot_options(parser: CommandParser) -> OptionGroup:
         choices=CHOICES["autopilot"],
         help=(
             "simulated autopilot: ardupilot (ArduPlane, the default), px4 (PX4 for fixed wing) or planfly (planfly's "
-            "own guidance); a name without a number stands for the release that saved the parameter file, or else for "
-            "the newest"
+            "own guidance). A name without a release number stands for the release that saved the parameter file; "
+            "without a parameter file, for the newest release"
         ),
     )
     group.add_argument(
@@ -222,7 +222,7 @@ def add_steering_options(parser: CommandParser) -> OptionGroup:
     group.add_argument(
         "--nav",
         choices=CHOICES["nav"],
-        help="position error of the navigation on each axis: 0 (perfect), 0.05 m (rtk) or 1.5 m (gnss) (default: gnss "
+        help="position error of the navigation on each axis: perfect 0 m, rtk 0.05 m, gnss 1.5 m (default: gnss "
         "for autopilots, perfect for planfly's guidance)",
     )
     return group
@@ -239,8 +239,8 @@ def add_flight_options(parser: CommandParser) -> None:
     group = add_steering_options(parser)
     add_sitl_option(
         group,
-        "fly with ArduPlane or PX4 itself instead of the simulated autopilot: PATH is its program, built for software "
-        "in the loop (requires planfly[live])",
+        "fly with ArduPlane or PX4 itself instead of the simulated autopilot. PATH is its executable, built for "
+        "software in the loop (requires planfly[live])",
     )
     group.add_argument(
         "--engine",
@@ -254,8 +254,8 @@ def add_flight_options(parser: CommandParser) -> None:
     group.add_argument(
         "--levels",
         action="store_true",
-        help="fly the mission with planfly's own guidance, too, even if the flight passes, and compare the two flights "
-        "(default: only if the flight fails, to find the cause)",
+        help="also fly the mission with planfly's own guidance, and compare the two flights (default: only if the "
+        "flight fails, to find the cause)",
     )
     limits = parser.add_group("limits of the flight")
     limits.add_argument(
@@ -281,8 +281,8 @@ def add_flights_option(group: OptionGroup) -> None:
         metavar="N",
         type=number_parser("flights"),
         help="after planning, fly the plan N times with the default dispersions of 'planfly campaign'. The output "
-        "states the share of flyable flights, and changes that would raise it. The exit code is 4 if the whole "
-        "confidence interval of this share is below 0.95. 40 flights take about 20 s",
+        "states the share of flyable flights, and changes that would raise this share. The exit code is 4 if the "
+        "whole confidence interval of the share is below 0.95. 40 flights take about 20 s",
     )
 
 
@@ -313,7 +313,10 @@ def add_imported_log_options(parser: CommandParser) -> None:
         help="number of the flight in the log (default: the longest flight in AUTO mode)",
     )
     group.add_argument(
-        "--datum", choices=CHOICES["datum"], help="reference of the altitudes in the log, if the log does not state it"
+        "--datum",
+        choices=CHOICES["datum"],
+        help="what the altitudes in the log are above, if the log does not state it: mean sea level (amsl) or the "
+        "WGS 84 ellipsoid",
     )
 
 
@@ -343,13 +346,13 @@ def add_vehicle_link_options(parser: CommandParser, *, bind: str) -> None:
         "--bind", metavar="IP:PORT", default=bind, help=f"address at which the vehicle listens (default: {bind})"
     )
     group.add_argument(
-        "--allow", metavar="IP,IP", help="addresses of stations on other machines that may talk to the vehicle"
+        "--allow", metavar="IP,IP", help="IP addresses of other machines whose ground stations may talk to the vehicle"
     )
     group.add_argument(
         "--sign-key",
         metavar="FILE",
-        help="file with the MAVLink signing key, 64 hexadecimal digits or a passphrase; only its owner may"
-        " read it (mode 600)",
+        help="file with the MAVLink signing key: 64 hexadecimal digits or a passphrase. Only the file's owner may"
+        " have access to it (mode 600)",
     )
 
 

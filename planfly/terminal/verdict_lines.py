@@ -13,8 +13,11 @@ from planfly.workflow.suggestion_trials import has_geometric_suggestion
 
 # Maximum number of failed findings of a rule that are listed after the worst finding.
 _MAX_LISTED = 6
-# Sources of a limit that are named after the limit; limits from other sources are planfly's own.
-_LIMIT_SOURCES = ("scenario", "near the field", "aircraft", "autopilot", "mission")
+# Texts after a limit that name its source; limits from other sources are planfly's own.
+_LIMIT_SOURCE_TEXTS = {
+    "near the field": ", which applies near the field",
+    **{source: f", set by the {source}" for source in ("scenario", "aircraft", "autopilot", "mission")},
+}
 # Width of the column of rules, characters.
 _TITLE_WIDTH = 2 + max(len(rule.title) for rule in RULE_WORDS.values())
 
@@ -68,10 +71,10 @@ def _no_change_text(verdict: Verdict, setup: FlightSetup | None) -> str:
     if not is_judged or has_hint:
         return ""
     if verdict.level == "geometric":
-        return "no change that passes was found"
+        return "no change was found with which it would pass"
     if not any(level.name == "geometry" and not level.flyable and not level.undecided for level in verdict.levels):
         return ""
-    text = "no change that passes was found in simulated flights"
+    text = "no change was found with which a simulated flight would pass"
     if setup is not None and has_geometric_suggestion(setup):
         text += "; planfly check --geometry suggests changes for the planned route"
     return text
@@ -121,7 +124,7 @@ def _rule_summary(rule: RuleFindings) -> str:
         return rule.count_text
     relation = "furthest beyond its limit" if closest.ok is False else "closest to its limit"
     place_text = "" if closest.place.kind == "flight" else f"{relation} at {closest.where}: "
-    source_text = f", {closest.limit_source}" if closest.limit_source in _LIMIT_SOURCES else ""
+    source_text = _LIMIT_SOURCE_TEXTS.get(closest.limit_source, "")
     note = f"; {closest.tolerance_note}" if closest.tolerance_note else ""
     return f"{rule.count_text}; {place_text}{margin.quantity} {value} (limit {limit}{source_text}{note})"
 

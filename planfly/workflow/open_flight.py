@@ -300,13 +300,14 @@ def _capacity_notes(failsafes: Iterable[BatteryFailsafe], battery: float, volts:
 
     >>> import math
     >>> early = BatteryFailsafe("BATT_LOW_MAH", 800.0, 1200.0, False, math.nan, "BATT_CAPACITY", 2000.0)
-    >>> _capacity_notes([early], 59.2, 14.8)[0].partition("; ")[2]
-    'BATT_LOW_MAH 800 leaves the mission with 2800 mAh left'
+    >>> _capacity_notes([early], 59.2, 14.8)[0].partition(". ")[2]
+    'The failsafe BATT_LOW_MAH 800 ends the mission with 2800 mAh left'
     """
     charge = _MAH_PER_AH * battery / volts
     return tuple(
         f"{failsafe.capacity_parameter} {failsafe.capacity:g} mAh, but the aircraft's battery has {charge:.0f} mAh"
-        f" ({battery:g} Wh at {volts:g} V); {failsafe.parameter} {failsafe.threshold:g} leaves the mission with"
+        f" ({battery:g} Wh at {volts:g} V). The failsafe {failsafe.parameter} {failsafe.threshold:g} ends the"
+        " mission with"
         f" {max(0.0, charge - failsafe.used_charge):.0f} mAh left"
         for failsafe in failsafes
         if not failsafe.shares_charge and abs(failsafe.capacity - charge) > MAX_CAPACITY_DIFFERENCE * charge
@@ -322,14 +323,14 @@ def _speed_limit_notes(mission: Mission, limits: SpeedLimits | None, title: str)
     >>> from flight.mission.items import MissionItem
     >>> faster = MissionItem(2, 178, 2, (0.0, 60.0, -1.0, 0.0), 0.0, 0.0, 0.0)
     >>> _speed_limit_notes(Mission(None, (faster,)), SpeedLimits(9.0, 22.0, "MIN", "MAX"), "ArduPlane")
-    ('item 2: DO_CHANGE_SPEED to 60 m/s: outside MIN 9 to MAX 22 m/s, ArduPlane ignores it',)
+    ('item 2: DO_CHANGE_SPEED to 60 m/s is outside MIN 9 to MAX 22 m/s; ArduPlane ignores it',)
     """
     if limits is None:
         return ()
-    behaviour = "flies the nearest" if limits.nearest else "ignores it"
+    behaviour = "flies the nearest limit instead" if limits.nearest else "ignores it"
     range_text = f"outside {limits.min_name} {limits.min:g} to {limits.max_name} {limits.max:g} m/s"
     return tuple(
-        f"item {item.seq}: DO_CHANGE_SPEED to {item.params[1]:g} m/s: {range_text}, {title} {behaviour}"
+        f"item {item.seq}: DO_CHANGE_SPEED to {item.params[1]:g} m/s is {range_text}; {title} {behaviour}"
         for item in mission.items
         if item.command == Command.DO_CHANGE_SPEED
         and (limits.nearest or item.params[0] == 0.0)

@@ -157,7 +157,7 @@ def cruise_airspeed(scenario: Scenario, aircraft: Aircraft, autopilot: Autopilot
     else:
         airspeed, file, field = aircraft.airspeed, aircraft.name, "airspeed"
     if not aircraft.airspeed_min <= airspeed <= aircraft.airspeed_max:
-        allowed = f"{aircraft.name} flies {aircraft.airspeed_min:g}..{aircraft.airspeed_max:g} m/s"
+        allowed = f"allowed {aircraft.airspeed_min:g}..{aircraft.airspeed_max:g} m/s for {aircraft.name}"
         raise ScenarioError.at(file, field, airspeed, allowed, shown=f"{airspeed:g}")
     return airspeed
 

@@ -171,8 +171,8 @@ def _leg_length_margin(data: ProblemArrays, waypoints: Floats, problems: list[st
         min_margin = min(min_margin, margin)
         if margin < -_EPSILON:
             description = (
-                f"{length:.0f} m long, but its turns need {turns_length:.0f} m and settling another"
-                f" {settling_and_roll:.0f} m, including a plan's margins for the autopilot's turns"
+                f"{length:.0f} m long, but its turns need {turns_length:.0f} m and settling after them"
+                f" {settling_and_roll:.0f} m more, both with the plan's margin for the autopilot's turns"
             )
             faults.append((margin, f"leg {i}", description))
     problems += _summarise_faults(faults)
@@ -238,7 +238,8 @@ def _slope_fault_text(data: ProblemArrays, slope: float, climb: float, dive: flo
     )
     margins = f", including a plan's margins for gusts and the autopilot's {rate} rate" if math.isnan(stated) else ""
     return (
-        f"{verb} {math.degrees(abs(slope)):.1f}°{place_text}; at most {math.degrees(limit):.1f}° are allowed{margins}"
+        f"{verb} at {math.degrees(abs(slope)):.1f}°{place_text}; at most {math.degrees(limit):.1f}° are"
+        f" allowed{margins}"
     )
 
 

@@ -474,9 +474,9 @@ class Search:
         """
         if self.progress is not None:
             best_scores = self.archive.scores[0]
-            remark = f"length ratio {self.length_ratio():.4f}, kill exposure {best_scores[KILL]:.3g}"
+            remark = f"{self.length_ratio():.4f} times the straight line, kill exposure {best_scores[KILL]:.3g}"
             if self.shortest is not None:
-                remark = f"length ratio {self.length_ratio():.4f}, kill exposure 0"
+                remark = f"{self.length_ratio():.4f} times the straight line, kill exposure 0"
             is_infeasible = self.shortest is None and are_violated(best_scores)
             self.progress(
                 self.done, self.done + remaining_generations, "no feasible path yet" if is_infeasible else remark
@@ -486,7 +486,7 @@ class Search:
         """Report a path (w, 3) from outside the search's archive to `progress`, if it meets the goal."""
         if self.progress is not None and self.meets_goal(certificate):
             ratio = float(path_length(path)) / self._straight_length()
-            self.progress(self.done, self.done, f"length ratio {ratio:.4f}, kill exposure 0")
+            self.progress(self.done, self.done, f"{ratio:.4f} times the straight line, kill exposure 0")
 
     def best_certified(self) -> tuple[Floats, Certificate]:
         """Return the first path in the archive that is certified with the full kill margin, and its certificate.

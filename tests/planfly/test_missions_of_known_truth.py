@@ -264,7 +264,7 @@ FILE = """QGC WPL 110
         (500, ["--wind", "30,0"], 4, "the wind is too strong to hold the course of leg 0"),
         (500, ["--wind", "24,270"], 0, "flyable"),
         (500, ["--wind", "24,270", "--turbulence", "light"], 0, "flyable"),
-        (8800, [], 4, "40.0 m/s is above the fastest level flight"),
+        (8800, [], 4, "40.0 m/s TAS is above the maximum level speed"),
     ],
 )
 def test_what_cannot_be_flown_is_a_verdict_on_the_command_line_too(

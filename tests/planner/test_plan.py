@@ -164,7 +164,7 @@ def test_given_waypoints_near_a_missile_miss_a_margin_too() -> None:
     assert plan.unmet_margins == (f"leg 0 {line.format('12.0 m outside')}",)
     assert plan.failures == ()
     assert planfly.what_blocks(plan) == plan.unmet_margins
-    problem = "leg 1: climbs 5.7°; at most 4.5° are allowed"
+    problem = "leg 1: climbs at 5.7°; at most 4.5° are allowed"
     steep = replace(plan, certificate=replace(certificate, problems=(problem,)))
     assert steep.unmet_margins == (problem, *plan.unmet_margins)
     assert planfly.what_blocks(steep) == steep.unmet_margins

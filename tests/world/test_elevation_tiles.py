@@ -167,7 +167,7 @@ VIRTUAL = {
     "no XML": (b"II*\0", "not a virtual raster"),
     "another root": (b"<kml/>", "SourceFilename is missing"),
     "no source": (b"<VRTDataset/>", "SourceFilename is missing"),
-    "entities": (b'<!DOCTYPE a [<!ENTITY b "c">]><VRTDataset/>', "a document type is declared"),
+    "entities": (b'<!DOCTYPE a [<!ENTITY b "c">]><VRTDataset/>', "declares a document type"),
     "a warped one": (
         b'<VRTDataset subClass="VRTWarpedDataset"><SourceFilename>a.tif</SourceFilename></VRTDataset>',
         "VRTWarpedDataset computes pixels",

@@ -62,8 +62,14 @@ def test_what_a_table_holds() -> None:
 
 
 FAULTS = {
-    "no shape": (zone(""), "zones.0: polygon_m: give one of polygon_m, polygon_deg, rings_m, rings_deg, radius_m"),
-    "two shapes": (zone(f"{SQUARE}\nradius_m = 5\neast_m = 0\nnorth_m = 0"), "zones.0: polygon_m: give one of"),
+    "no shape": (
+        zone(""),
+        "zones.0: polygon_m: a zone needs exactly one of polygon_m, polygon_deg, rings_m, rings_deg, radius_m",
+    ),
+    "two shapes": (
+        zone(f"{SQUARE}\nradius_m = 5\neast_m = 0\nnorth_m = 0"),
+        "zones.0: polygon_m: a zone needs exactly one of",
+    ),
     "a centre alone": (
         zone(f"{SQUARE}\neast_m = 0"),
         "zones.0: radius_m: missing; a zone with a centre is a cylinder and needs a radius",
@@ -218,7 +224,7 @@ CASES: dict[str, tuple[str, str, str]] = {
     ),
     "a list for a number": ("amsl_m = 400", "amsl_m = [400]", "start.amsl_m: expected a number"),
     "span of three": ("[-5000, 5000]", "[-5000, 0, 5000]", "area.east_m: expected at most 2 values"),
-    "span upside down": ("[-5000, 5000]", "[5000, -5000]", "east_m: [5000, -5000]: the second must exceed"),
+    "span upside down": ("[-5000, 5000]", "[5000, -5000]", "east_m: [5000, -5000]: the second value must exceed"),
     "ceiling under floor": (
         "[start]",
         "ceiling_amsl_m = 300\nfloor_amsl_m = 300\n[start]",

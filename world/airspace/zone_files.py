@@ -17,7 +17,7 @@ from world.airspace.zone_entries import NO_BAND, PUBLISHED, UPSIDE_DOWN, zone_en
 from world.airspace.zone_suffixes import GEOPACKAGE, SUFFIXES
 from world.airspace.zones import are_holes_inside, repair_rings
 from world.errors import ScenarioError
-from world.files import missing_text
+from world.files import json_value, missing_text
 from world.scenario_file import checked_table
 from world.scenario_tables import MAX_ZONES, ZoneTable
 
@@ -41,8 +41,8 @@ def geojson_zones(text: str, source: str) -> Iterator[Found]:
     [('geometry (zone 1)', 'zone 1', 4)]
     """
     try:
-        data = json.loads(text, parse_constant=_reject_constant)
-    except (ValueError, RecursionError) as error:
+        data = json_value(text, parse_constant=_reject_constant)
+    except ValueError as error:
         raise ScenarioError(f"{source}: not valid JSON: {str(error).splitlines()[0]}", file=source) from error
     # The data of a large file takes several times its size: release the text, and each feature once it is converted.
     del text
@@ -170,7 +170,9 @@ def kml_zones(text: str, source: str) -> Iterator[Found]:
     """
     # Entities can read other files and expand a small file without limit; KML does not need them.
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
-        raise ScenarioError(f"{source}: a document type is declared: not allowed in a file of zones", file=source)
+        raise ScenarioError(
+            f"{source}: declares a document type (DOCTYPE), which is not allowed in a zone file", file=source
+        )
     try:
         root = ElementTree.fromstring(text)  # entities were refused above
     except (ElementTree.ParseError, ValueError) as error:

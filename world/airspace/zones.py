@@ -132,7 +132,7 @@ def make_polygon(rings: Sequence[Sequence[tuple[float, float]]]) -> Polygon:
 def _check_area(area: float) -> None:
     """Raise ValueError for an area below the minimum."""
     if not area >= MIN_AREA:
-        raise ValueError(f"nothing inside: {area:.3g} m2; at least {MIN_AREA:g} m2 are needed")
+        raise ValueError(f"encloses only {area:.3g} m2; at least {MIN_AREA:g} m2 are needed")
 
 
 def _clean_ring(ring: Sequence[tuple[float, float]]) -> Ring:

@@ -1,6 +1,5 @@
 """Read the forecast of Open-Meteo's API: hourly winds at heights above ground and on pressure levels, as JSON."""
 
-import json
 import re
 from collections.abc import Mapping
 from datetime import datetime, timedelta, timezone
@@ -11,7 +10,7 @@ import numpy as np
 
 from world.arrays import Floats
 from world.errors import ForecastError
-from world.files import read_small_file
+from world.files import json_value, read_small_file
 from world.forecast.forecast import Forecast
 from world.forecast.levels import LevelGroup, LevelKind, merge_levels
 from world.forecast.units import DIRECTION_UNITS, HEIGHT_UNITS, MAX_WIND_MPS, SPEED_UNITS, unit_factor
@@ -46,8 +45,8 @@ def read_open_meteo(path: Path, ground_amsl: float) -> Forecast:
     Raises ForecastError, in one line, for a file without the required variables.
     """
     try:
-        content = json.loads(read_small_file(path, MAX_BYTES, "forecast", ForecastError))
-    except (ValueError, RecursionError) as error:
+        content = json_value(read_small_file(path, MAX_BYTES, "forecast", ForecastError))
+    except ValueError as error:
         raise ForecastError(f"{path}: damaged or incomplete: not JSON: {str(error)[:100]}", file=str(path)) from error
     entries = content if isinstance(content, list) else [content]
     for entry in entries:
@@ -208,11 +207,11 @@ def _column(
         raise _fault(path, f"hourly_units.{name}", f"{units.get(name)!r}: allowed {', '.join(sorted(factors))}")
     values = hourly[name]
     if not isinstance(values, list) or len(values) != len(hourly["time"]):
-        raise _fault(path, f"hourly.{name}", f"allowed {len(hourly['time'])} values, one for each time")
+        raise _fault(path, f"hourly.{name}", f"expected {len(hourly['time'])} values, one for each time")
     values = values[:count]
     if not values:
         raise _fault(path, f"hourly.{name}", "no values")
     for k, value in enumerate(values):
         if isinstance(value, bool) or not isinstance(value, int | float) or not -_MAX_NUMBER < value < _MAX_NUMBER:
-            raise _fault(path, f"hourly.{name}", f"value {k + 1} is {str(value)[:40]}: a number is needed")
+            raise _fault(path, f"hourly.{name}", f"value number {k + 1} is {repr(value)[:40]}; expected a number")
     return np.array(values, dtype=np.float64) * factor

@@ -217,7 +217,7 @@ class _ForecastReader:
             if coordinate is None or (name != "valid_time" and coordinate.ndim == 0 and "step" in array.dims):
                 continue
             if coordinate.ndim > 1:
-                raise self._error(str(name), "several times of issue in one file: only one is allowed")
+                raise self._error(str(name), "the file has several issue times; only one is allowed")
             seconds = (coordinate.values.reshape(-1) - np.datetime64(0, "s")) / np.timedelta64(1, "s")
             if not np.isfinite(seconds).all() or (np.diff(seconds) <= 0.0).any():
                 raise self._error(str(name), "the times are not in ascending order")
@@ -283,7 +283,7 @@ class _ForecastReader:
             ("longitude", wrapped_longitudes, self.box.west, self.box.east),
         ):
             if len(values) < 2:
-                raise self._error(name, "one node: expected at least two nodes around the mission")
+                raise self._error(name, "only one grid node; expected at least two around the mission")
             if not np.isfinite(values).all() or (name == "latitude" and np.abs(values).max() > 90.0):
                 raise self._error(name, "expected numbers of degrees")
             steps = np.diff(values)
@@ -351,13 +351,13 @@ class _ForecastReader:
             if not partners and len(east) == len(north) == 1:
                 partners = list(north)
             if not partners:
-                raise self._error(name, "its northward wind is missing")
+                raise self._error(name, "the northward wind that belongs to it is missing")
             partner = north.pop(partners[0])
             if set(partner.dims) != set(array.dims):
                 raise self._error(str(partner.name), f"its dimensions differ from those of {name}")
             yield array, partner
         if north:
-            raise self._error(next(iter(north)), "its eastward wind is missing")
+            raise self._error(next(iter(north)), "the eastward wind that belongs to it is missing")
 
     def _level_of(self, array: Any, name: Any) -> tuple[LevelKind, str | None, Floats] | None:
         """Return the kind of a variable's levels, their dimension, and their values; None without levels.
@@ -411,7 +411,9 @@ class _ForecastReader:
         """
         level = self._level_of(east, east.name)
         if level is None:
-            raise self._error(str(east.name), "its level is not stated: pressure, height above ground or altitude")
+            raise self._error(
+                str(east.name), "its level is not stated; expected a pressure, a height above ground or an altitude"
+            )
         kind, dim, values = level
         components = []
         for array in (east, north):

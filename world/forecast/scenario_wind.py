@@ -108,8 +108,8 @@ def forecast_wind(
             file,
             "time",
             f"take-off {departure:%Y-%m-%d %H:%M} UTC",
-            f"the forecast has no time between {before:%Y-%m-%d %H:%M} and {after:%Y-%m-%d %H:%M} UTC:"
-            f" allowed steps up to {LONGEST_STEP.total_seconds() / 3600.0:.0f} h",
+            f"the forecast has no time between {before:%Y-%m-%d %H:%M} and {after:%Y-%m-%d %H:%M} UTC;"
+            f" steps of at most {LONGEST_STEP.total_seconds() / 3600.0:.0f} h are allowed",
         )
     latitudes, longitudes = to_geo(site.origin, [point[0] for point in site.ends], [point[1] for point in site.ends])
     altitudes = np.array([float(point[2]) for point in site.ends])
@@ -166,7 +166,9 @@ def check_coverage(wind: Wind, file: str, latitudes: Floats, longitudes: Floats,
         k = int(np.argmax(above))
         top = float(altitudes[k] - above[k])
         shown = f"the mission flies at {altitudes[k]:.0f} m AMSL"
-        raise ForecastError.at(file, "levels", shown, f"the forecast's highest level is at {top:.0f} m AMSL there")
+        raise ForecastError.at(
+            file, "levels", shown, f"this is above the forecast's highest level, {top:.0f} m AMSL there"
+        )
     if below.max() > 0.0:
         k = int(np.argmax(below))
         bottom = float(altitudes[k] + below[k]) + MAX_DEPTH_BELOW_LEVELS_M
@@ -191,11 +193,15 @@ def _check_places(facts: ForecastFacts, file: str, latitudes: Floats, longitudes
         east_distance = (near - west) * 111_000.0 * math.cos(math.radians(south))
         distances = np.hypot((latitudes - south) * 111_000.0, east_distance)
         is_outside = distances > PLACE_RADIUS_M
-        allowed = f"within {PLACE_RADIUS_M / 1000.0:.0f} km of the forecast's only place, {south:.3f}, {west:.3f}"
+        allowed = (
+            f"it must be within {PLACE_RADIUS_M / 1000.0:.0f} km of the forecast's only place, {south:.3f}, {west:.3f}"
+        )
     else:
         beyond = np.maximum.reduce([south - latitudes, latitudes - north, west - near, near - east])
         is_outside = beyond > _BOX_TOLERANCE_DEG
-        allowed = f"the forecast's box is {south:.3f} to {north:.3f}, {west:.3f} to {east:.3f}"
+        allowed = (
+            f"outside the forecast's area, latitude {south:.3f} to {north:.3f}, longitude {west:.3f} to {east:.3f}"
+        )
     if is_outside.any():
         k = int(np.argmax(is_outside))
         shown = f"the mission is at {latitudes[k]:.3f}, {longitudes[k]:.3f}"

@@ -113,7 +113,7 @@ def _judged_lines(
     by_start = {legs.stretch.start: legs for legs in flown_stretches}
     lines = []
     for stretch in imported_log.stretches:
-        name = stretch.mode or "the flight"
+        name = f"the flight in {stretch.mode}" if stretch.mode else "the flight"
         time_text = f"{name} from {stretch.start:.1f} s to {stretch.end:.1f} s"
         time_text += "" if stretch.mode else " (the log contains no modes)"
         legs = by_start.get(stretch.start)
@@ -124,7 +124,7 @@ def _judged_lines(
         partial_text = f", leg {last} in part" if legs.partial else ""
         start_time = float(legs.aligned.track.time[0])
         lines.append(
-            f"Judged: {time_text}, legs {first} to {last}{partial_text}; leg {first} begins at {start_time:.1f} s"
+            f"Judged: {time_text}, on legs {first} to {last}{partial_text}; leg {first} begins at {start_time:.1f} s"
         )
     return lines
 

@@ -66,17 +66,18 @@ def missing_home_text(setup: FlightSetup) -> str:
     """State that the return after the last item cannot be judged without a home; "" if none is missing."""
     if setup.mission.home is not None or not judges_return_after_last_item(setup):
         return ""
-    return f"the mission has no home, to which {setup.autopilot.title} returns by itself after the last item"
+    return f"{setup.autopilot.title} returns to home by itself after the last item, but the mission has no home"
 
 
 def judged_return_text(setup: FlightSetup) -> str:
     """Explain why a return after the last item is judged, and how to avoid this return."""
-    remedy = "a landing or NAV_LOITER_UNLIM at the end prevents it"
+    remedy = "A landing or NAV_LOITER_UNLIM at the end of the mission prevents this return"
     if setup.scenario.external:
-        return f"{setup.autopilot.title} returns by itself after the last item; {remedy}"
+        return f"After the last item {setup.autopilot.title} returns to launch by itself. {remedy}"
     return (
-        f"the mission ends {_distance_to_destination(setup):.1f} m from the scenario's destination, more than"
-        f" {FINAL_WAYPOINT_TOLERANCE_M:.0f} m, so the return after it is judged; {remedy}"
+        "The return is judged, because the mission does not end at the scenario's destination: it ends"
+        f" {_distance_to_destination(setup):.1f} m from it, and at most {FINAL_WAYPOINT_TOLERANCE_M:.0f} m are allowed."
+        f" {remedy}"
     )
 
 

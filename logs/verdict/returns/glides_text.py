@@ -83,7 +83,7 @@ def glide_range_text(glide_range: GlideRange, glides: Glides) -> str:
         else f"{glide_range.first:.0f} to {glide_range.last:.0f} s"
     )
     return (
-        f"failure at {time_text}:"
+        f"engine failure at {time_text}:"
         f" {_range_reach_text(glide_range, glides)}{_own_return_text(glide_range.lowest_glide, glides)}"
     )
 

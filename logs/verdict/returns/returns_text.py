@@ -122,7 +122,7 @@ def measured_text(ret: SimulatedReturn, limit: float, scenario: Scenario) -> str
     """
     east, north, _ = ret.lowest_position
     position_text = f"{east:.0f} m east, {north:.0f} m north"
-    parts = [f"to {ret.target.name}", outcome_text(ret, limit)]
+    parts = [f"leads to {ret.target.name} and {outcome_text(ret, limit)}"]
     if ret.kind == "ground":
         parts[-1] += f" at {position_text}"
     elif math.isfinite(ret.clearance):
@@ -309,13 +309,14 @@ def range_text(return_range: ReturnRange, returns: Returns, scenario: Scenario) 
     worst_text, start_text = (
         ("", "") if return_range.count == 1 else ("worst ", f", started at {worst_return.time:.0f} s,")
     )
+    start_name = "return started" if return_range.count == 1 else "returns started"
     judgement = (
         "not judged"
         if worst_return.kind in UNJUDGED
         else ("safe" if worst_return.safe else "unsafe" if worst_return.kind in UNSAFE else "too low")
     )
     return (
-        f"started at {time_text}: {judgement}; the {worst_text}return to {worst_return.target.name}"
+        f"{start_name} at {time_text}: {judgement}; the {worst_text}return to {worst_return.target.name}"
         f"{reason}{start_text} {_range_outcome_text(worst_return, returns, scenario)}"
     )
 
@@ -378,7 +379,7 @@ def _range_outcome_text(worst_return: SimulatedReturn, returns: Returns, scenari
         height_text += " (taking off or landing: the flight itself is below the required height)"
     elif worst_return.starts_too_low:
         height_text += " (the flight itself is below the required height where this return begins)"
-    energy_text = "" if math.isnan(worst_return.energy_left) else f", {energy_left_text(worst_return.energy_left)}"
+    energy_text = "" if math.isnan(worst_return.energy_left) else f", with {energy_left_text(worst_return.energy_left)}"
     sphere_text = (
         ""
         if math.isinf(worst_return.sphere_distance)

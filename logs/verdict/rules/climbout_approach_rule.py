@@ -82,13 +82,13 @@ class _Obstacles(NamedTuple):
 
         subject: name of the path.
         origin: text on the place from which `distance` is measured, such as "from home".
-        condition: clause on the slope at which the path is flown; "" for none.
+        condition: words on the slope at which the path is flown; "" for none.
         """
         if self.entered_hazard:
             return message(f"{subject} enters {self.entered_hazard}")
         return message(
             f"{subject} hits the ground",
-            f" {self.distance:.0f} m {origin}, where it is {-self.clearance:.0f} m below the surface{condition}",
+            f"{condition}: {self.distance:.0f} m {origin} it is {-self.clearance:.0f} m below the surface",
         )
 
 
@@ -304,7 +304,7 @@ def _air_start_finding(place: Place, obstacles: _Obstacles) -> Finding:
         ok = True
     else:
         subject = f"the flight starts in the air, but a straight climb from home to {_item_text(place)}"
-        fault = obstacles.obstacle_message(subject, "from home", ", even at the steepest climb")
+        fault = obstacles.obstacle_message(subject, "from home", " even at the steepest climb")
         return _path_finding("climbout", place, obstacles, ok=None, outcome=fault, check=GROUND_PATH)
     return _path_finding("climbout", place, obstacles, ok, message(reason), check)
 
@@ -334,9 +334,9 @@ def _launch_finding(
         return _path_finding("climbout", place, obstacles, ok=None, outcome=reason)
     is_certain, end_height = certain_slope == steepest.slope, start[2] - start[1]
     if not obstacles.is_clear:
-        fault = obstacles.obstacle_message(subject, "from home", ", even at the steepest climb")
+        fault = obstacles.obstacle_message(subject, "from home", " even at the steepest climb")
         climb_text = _climb_text(steepest, launch, item_text, end_height)
-        text = f"{fault.text} ({climb_text}){_clear_courses_text(requirements, *start)}"
+        text = f"{fault.text}. {climb_text}. {_clear_courses_text(requirements, *start)}"
         fault = replace(fault, text=text)
         return _path_finding(
             "climbout", place, obstacles, False if is_certain else None, fault, "" if is_certain else GROUND_PATH
@@ -351,7 +351,7 @@ def _launch_finding(
         fault = min_obstacles.obstacle_message(subject, "from home")
         climb_text = _climb_text(gentlest, launch, item_text, end_height)
         limit_text = "" if is_certain else _certain_climb_text(steepest.slope, certain_slope)
-        fault = replace(fault, text=f"{fault.text} ({climb_text}{limit_text})")
+        fault = replace(fault, text=f"{fault.text}. {climb_text}{limit_text}")
         return _path_finding("climbout", place, obstacles, ok=None, outcome=fault, check=GROUND_PATH)
     return _path_finding(
         "climbout",
@@ -368,12 +368,12 @@ def _climb_text(climb: _Climb, launch: _Launch, item_text: str, end_height: floa
     item_text: name of the item at the end of the leg.
     end_height: height above home at which the take-off ends, m.
     """
-    text = f"climb angle {_degrees_text(climb.slope)}"
+    text = f"The climb angle is {_degrees_text(climb.slope)}"
     # The take-off holds its course until it has reached its height.
     if climb.length > launch.leg_length:
         text += (
-            f"; the climb ends {end_height:.0f} m above home after {climb.length:.0f} m, beyond {item_text}, which is"
-            f" {launch.leg_length:.0f} m from home"
+            f", and the climb ends {end_height:.0f} m above home after {climb.length:.0f} m. {item_text.capitalize()}"
+            f" is only {launch.leg_length:.0f} m from home"
         )
     return text
 
@@ -381,7 +381,7 @@ def _climb_text(climb: _Climb, launch: _Launch, item_text: str, end_height: floa
 def _certain_climb_text(max_slope: float, certain_slope: float) -> str:
     """Return a clause that compares the nominal and the certain maximum climb slope, m per m."""
     certain_text = _degrees_text(max(0.0, certain_slope))
-    return f"; the steepest climb is {_degrees_text(max_slope)}, but only {certain_text} is certain for this aircraft"
+    return f". The steepest climb is {_degrees_text(max_slope)}, but only {certain_text} is certain for this aircraft"
 
 
 def _degrees_text(slope: float) -> str:
@@ -411,7 +411,7 @@ def _clear_courses_text(
     courses = list(range(0, 360, _COURSE_STEP_DEG))
     is_course_clear = [is_clear(math.radians(course)) for course in courses]
     if not any(is_course_clear):
-        return "; no launch course is clear of obstacles"
+        return "No launch course is clear of obstacles"
     # Begin after a course with obstacles, so that no range is cut at north.
     start = is_course_clear.index(False) if False in is_course_clear else 0
     courses_from_start = [
@@ -424,8 +424,8 @@ def _clear_courses_text(
     ]
     widest_range = max(ranges, key=len)
     if len(widest_range) == 1:
-        return f"; a launch course of {widest_range[0]:03d}° would be clear of obstacles"
-    return f"; a launch course of {widest_range[0]:03d}° to {widest_range[-1]:03d}° would be clear of obstacles"
+        return f"A launch course of {widest_range[0]:03d}° would be clear of obstacles"
+    return f"A launch course of {widest_range[0]:03d}° to {widest_range[-1]:03d}° would be clear of obstacles"
 
 
 # ----------------------------------------------------------------------

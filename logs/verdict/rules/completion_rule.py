@@ -29,7 +29,7 @@ def completion_findings(
         ending_place = ""
         if aligned is not None and not aligned.passed[-1]:
             row = len(aligned.track) - 1
-            ending_place = f" on {place_text(requirements.leg(aligned.leg_at(row)))} {aligned.position_text(row)}"
+            ending_place = f" on {place_text(requirements.leg(aligned.leg_at(row)))}, {aligned.position_text(row)}"
         faults.append(message(f"the flight ended early: {end_reason}", ending_place))
     if not log_complete:
         faults.append(message("the log is damaged or unfinished"))

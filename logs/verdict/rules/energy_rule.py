@@ -168,9 +168,9 @@ def _endless_jump_faults(requirements: RouteRequirements, usable_energy: float, 
         first_energy = sum(energies[:start])
     repeats = math.floor((usable_energy / energy_ratio - first_energy) / round_energy)
     if repeats < 0:
-        return [message(f"{fault}, but the energy does not last for one round")]
+        return [message(f"{fault}, but the usable energy of {usable_energy:.0f} Wh does not last for one round")]
     rounds_text = count_text(repeats + 1, "round")
-    fault = f"{fault}. Each round uses {round_energy:.1f} Wh, so the energy lasts for only {rounds_text}"
+    fault = f"{fault}. Each round uses {round_energy:.1f} of {usable_energy:.0f} usable Wh, enough for {rounds_text}"
     return [message(f"{fault}. Set its repeat count to {repeats}")]
 
 
@@ -308,9 +308,13 @@ def _used_text(requirements: RouteRequirements, energy_used: float, max_current:
             f"{fraction:.1%} of the fuel used ({energy_used:.0f} Wh of {capacity:.0f} Wh of heat)"
             f"{': the tank is empty' if is_empty else ''}; without a battery, no current is judged"
         )
+    jump_text = "" if requirements.setup.route.endless_jump is None else " with one repetition of the jump"
     current_text = f", peak current {max_current:.1f} A" if math.isfinite(max_current) else ""
     capacity_text = quantity_text(capacity, "Wh")
-    return f"{energy_used:.1f} Wh of {capacity_text} used{current_text}{': the battery is empty' if is_empty else ''}"
+    return (
+        f"{energy_used:.1f} Wh of {capacity_text}"
+        f" used{jump_text}{current_text}{': the battery is empty' if is_empty else ''}"
+    )
 
 
 RULE = Rule(

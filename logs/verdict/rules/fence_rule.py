@@ -191,8 +191,8 @@ def _zone_finding(
         faults.append(
             message(
                 f"{visit.depth:.1f} m {side_text}",
-                f", {visit.violation_time:.1f} s in all"
-                + (f" ({visit.entries} times)" if visit.entries > 1 else "")
+                f" for {visit.violation_time:.1f} s in all"
+                + (f", in {visit.entries} visits" if visit.entries > 1 else "")
                 + f". The {subject} {entry_text} at {_event_text(requirements, visit, 'entry')}, is {deepest_text} at"
                 f" {visit.at_time:.1f} s, and {exit_text} at {visit.exit_time:.1f} s",
             )
@@ -247,7 +247,7 @@ def _event_text(requirements: RouteRequirements, visit: Record, event: str) -> s
     """
     leg = place_text(requirements.leg(int(visit[f"{event}_leg"])))
     time, east, north, up = (visit[f"{event}_{name}"] for name in ("time", "east", "north", "up"))
-    return f"{time:.1f} s, east {east:.0f} m, north {north:.0f} m, {up:.0f} m AMSL ({leg})"
+    return f"{time:.1f} s on {leg}, east {east:.0f} m, north {north:.0f} m, {up:.0f} m AMSL"
 
 
 RULE = Rule(

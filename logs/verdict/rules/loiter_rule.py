@@ -189,13 +189,13 @@ def _loiter_finding(
     faults = _small_radius_faults(requirements, circle, min_radius) if is_known else []
     undecided_texts = [fault.text for fault in faults if _may_pass(requirements, circle)]
     faults = [] if undecided_texts else faults
-    facts = [*undecided_texts, f"{_planned_laps_text(requirements, circle)} with a radius of {circle.radius:.0f} m"]
+    facts = [*undecided_texts, f"{_planned_laps_text(requirements, circle)}, with a radius of {circle.radius:.0f} m"]
     hazards_text, parameter_name = "", requirements.setup.autopilot.loiters.radius_name
     if uses_parameter and faults and math.isfinite(min_radius):
         # If the parameter makes the loiter too tight, the autopilot flies it wider, as at the end of a return.
         bank = _held_bank(requirements, circle, min_radius, corner_findings)
         if bank <= requirements.limits.max_bank + BANK_TOLERANCE_RAD + 1e-9:
-            facts.append(f"flown wider, because the bank limit requires {min_radius:.0f} m, more than {parameter_name}")
+            facts.append(f"flown wider than {parameter_name}: the bank limit requires a radius of {min_radius:.0f} m")
             faults = []
             hazards_text = "" if aligned is not None else _hazards_text(requirements, circle, min_radius)
         else:
@@ -432,7 +432,7 @@ def _small_radius_faults(requirements: RouteRequirements, circle: LoiterCircle, 
     need_text = f"at {speed:.0f} m/s and {bank_text} the aircraft needs {min_radius:.0f} m"
     if not math.isfinite(min_radius):
         need_text = f"at {speed:.0f} m/s the circle cannot be flown"
-    return [message(f"radius {circle.radius:.0f} m; {need_text} in this wind")]
+    return [message(f"the radius is {circle.radius:.0f} m, but {need_text} in this wind")]
 
 
 def _corner_text(place: Place) -> str:

@@ -104,7 +104,7 @@ def _universal_findings(remarks_by_check: list[list[_Remark]]) -> list[Finding]:
             continue
         _, item, reason = failures[0]
         fault = reason if isinstance(reason, Message) else message(reason)
-        more_text = f" (+{len(failures) - 1} more)" if len(failures) > 1 else ""
+        more_text = f" (and {len(failures) - 1} more)" if len(failures) > 1 else ""
         findings.append(
             make_finding(
                 "mission",
@@ -131,12 +131,12 @@ def _check_finding(check: str, remarks: list[_Remark], refuses: bool) -> Finding
     sorted_remarks.sort(key=lambda remark: {False: 0, None: 1, True: 2}[remark[0]])
     ok, item, reason = sorted_remarks[0] if sorted_remarks else (True, None, "no objections")
     first_message = reason if isinstance(reason, Message) else message(reason)
-    more_text = f" (+{len(sorted_remarks) - 1} more)" if len(sorted_remarks) > 1 else ""
+    more_text = f" (and {len(sorted_remarks) - 1} more)" if len(sorted_remarks) > 1 else ""
     return make_finding(
         "mission",
         Place("mission", item=item),
         ok=ok,
-        reason=f"{first_message.text}{more_text} (PX4 function {check})",
+        reason=f"{first_message.text}{more_text} (see PX4's function {check})",
         faults=[first_message],
         source="PX4",
         method="mission items",
@@ -153,7 +153,7 @@ def _arduplane_refusal_findings(setup: FlightSetup) -> list[Finding]:
     ]
     if not refused_items or setup.autopilot.checks.dialect != "ardupilot":
         return []
-    more_text = f" (+{len(refused_items) - 1} more)" if len(refused_items) > 1 else ""
+    more_text = f" (and {len(refused_items) - 1} more)" if len(refused_items) > 1 else ""
     fault = message(
         f"ArduPlane does not support {command_name(refused_items[0].command)}", f"{more_text}; PX4 accepts it"
     )
@@ -162,7 +162,7 @@ def _arduplane_refusal_findings(setup: FlightSetup) -> list[Finding]:
             "mission",
             Place("mission", item=refused_items[0].seq),
             ok=False,
-            reason=f"{fault.text} (ArduPlane function mavlink_int_to_mission_cmd)",
+            reason=f"{fault.text} (see ArduPlane's function mavlink_int_to_mission_cmd)",
             faults=[fault],
             source="ArduPlane",
             method="mission items",
@@ -183,7 +183,7 @@ def _unjoined_finding(setup: FlightSetup) -> Finding:
         reason = f"no tangent joins its circle to the circle of item {first_stop.circle}"
     else:
         reason = f"lies inside the circle of item {first_stop.circle}"
-    more_text = f" (+{len(other_stops)} more)" if other_stops else ""
+    more_text = f" (and {len(other_stops)} more)" if other_stops else ""
     fault = message(
         reason,
         f": {autopilot} flies {('it anyway' if first_stop.is_circle else 'there')}, on a path that is not judged"
@@ -229,7 +229,7 @@ def _unreached_findings(setup: FlightSetup) -> list[Finding]:
     if not unreached:
         return []
     is_waiting_end, first = end.command in _WAITING_ENDS, unreached[0]
-    more_text = f" (+{len(unreached) - 1} more)" if len(unreached) > 1 else ""
+    more_text = f" (and {len(unreached) - 1} more)" if len(unreached) > 1 else ""
     end_text = f": {command_name(end.command)} (item {end.seq}) ends the mission"
     end_text += " until someone sets the next item" if is_waiting_end else ""
     item_text = f"item {first.seq}: " if is_waiting_end else ""

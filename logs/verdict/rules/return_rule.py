@@ -110,23 +110,25 @@ def _automatic_return_findings(requirements: RouteRequirements, end: ReturnStart
     if reason := missing_home_text(setup):
         return [make_finding("return", end_waypoint, ok=None, reason=reason, check=NO_HOME)]
     ok: bool | None = None
-    check, brief, text = "", "the flight did not reach the end of the mission", ""
+    check, brief = "", "the flight did not reach the end of the mission"
+    text = brief
     if end is not None:
         world = make_return_world(setup)
         returns = judge_returns(world, end, 1.0)
         # The first ending is the one by RTL_AUTOLAND; the others are those of failsafes.
         simulated = returns.each[0] if returns.each else None
         if simulated is None or simulated.target.landing is not None:
-            brief, text = "the return after the last item is not judged", f": {headline(returns)}"
+            brief = "the return after the last item is not judged"
+            text = f"{brief}: {headline(returns)}"
         else:
-            brief = f"the return after the last item {outcome_text(simulated, world.limit)}"
-            text = f": {measured_text(simulated, world.limit, setup.scenario)}"
+            brief = f"return after the last item ({outcome_text(simulated, world.limit)})"
+            text = f"the return after the last item {measured_text(simulated, world.limit, setup.scenario)}"
             # The clearance and energy rules already report missing terrain data and an empty battery.
             is_reported = simulated.kind == "used" or (simulated.kind == "unknown" and setup.scenario.terrain is None)
             ok = simulated.safe or is_reported or (None if simulated.kind in UNJUDGED else False)
-            text += "" if ok else f"; {judged_return_text(setup)}"
+            text += "" if ok else f". {judged_return_text(setup)}"
         check = UNKNOWN_RETURN if ok is None else ""
-    fault = message(brief, text)
+    fault = Message(text, brief)
     return [
         make_finding(
             "return",
@@ -255,7 +257,7 @@ def _rtl_findings(requirements: RouteRequirements, ok: bool | None, outcome: str
         return []
     name = f"{Command.NAV_RETURN_TO_LAUNCH.name}: "
     note_text = next((note.partition(name)[2] for note in route.notes if name in note), "")
-    reason = f"the simulated {requirements.setup.autopilot.title} returns {note_text}; {outcome}"
+    reason = f"the simulated {requirements.setup.autopilot.title} {note_text or 'returns'}; {outcome}"
     unknown_reason = next((note.partition(": ")[2] for note in route.notes if RTL_NOT_CONTINUED_TEXT in note), "")
     faults = []
     if unknown_reason and requirements.setup.imported_log is None:

@@ -239,11 +239,11 @@ def _steep_ground(requirements: RouteRequirements, leg: int, measure: SlopeMeasu
 
 def _steep_ground_message(requirements: RouteRequirements, leg: int, ground: _SteepGround) -> Message:
     """State that a leg follows ground steeper than its slope limit, and how low the aircraft would get."""
-    limit_text = f"{ground.name} permits a climb of {math.degrees(ground.limit):.1f}°"
+    limit_text = f"{ground.name} allows only a climb of {math.degrees(ground.limit):.1f}°"
     if not ground.name:
         limit_text = _limit_text(requirements, leg, ground.limit, ground.source)
     brief = (
-        f"leg {requirements.leg(leg).number} follows the ground up {math.degrees(ground.slope):.1f}°"
+        f"leg {requirements.leg(leg).number} follows ground that rises at {math.degrees(ground.slope):.1f}°"
         f" for {_distance_text(ground.length)}"
     )
     explanation = f"; {limit_text}, so the aircraft would fly up to {ground.excess:.0f} m too low over the ground"
@@ -268,7 +268,8 @@ def _uncertainty_text(requirements: RouteRequirements, leg: int) -> str:
     angles = abs(planned_slope), limit, _limit_deviation(requirements, leg, limit, certain_limit), certain_limit
     slope, limit_deg, deviation_deg, certain_deg = (math.degrees(angle) for angle in angles)
     return (
-        f"{verb} {slope:.1f}°; the limit according to {envelope.source} is {limit_deg:.1f}° ± {deviation_deg:.1f}°, so"
+        f"{verb} at {slope:.1f}°; the limit according to {envelope.source} is {limit_deg:.1f}° ±"
+        f" {deviation_deg:.1f}°, so"
         f" only {certain_deg:.1f}° is certain"
     )
 
@@ -330,7 +331,7 @@ def _steep_arc_faults(requirements: RouteRequirements, leg: int, measure: SlopeM
     verb = "climbs" if arc.tangent > 0.0 else "descends"
     slopes = " and ".join(f"{math.degrees(abs(float(requirements.slopes[k]))):.1f}°" for k in (leg, corner))
     first, second = requirements.leg(leg).number, requirements.leg(corner).number
-    arc_text = f"the arc at {place_text(place)} {verb} {slope:.1f}° for {length:.0f} m"
+    arc_text = f"the arc at {place_text(place)} {verb} at {slope:.1f}° for {length:.0f} m"
     side = "below" if arc.tangent > 0.0 else "above"
     limit = (
         f"; the aircraft can fly at most {math.degrees(math.atan(arc.limit)):.1f}° there, and would end"
@@ -360,7 +361,7 @@ def _steep_leg_message(requirements: RouteRequirements, leg: int, limit: float, 
     """State that the planned slope of a leg exceeds its limit (rad)."""
     planned_slope = float(requirements.slopes[leg])
     verb = "climbs" if planned_slope >= 0.0 else "descends"
-    slope_text = f"{math.degrees(abs(planned_slope)):.1f}° for {_distance_text(float(requirements.runs[leg]))}"
+    slope_text = f"at {math.degrees(abs(planned_slope)):.1f}° for {_distance_text(float(requirements.runs[leg]))}"
     if requirements.runs[leg] < MIN_LEG_LENGTH_M:
         height = abs(float(requirements.points[leg + 1, 2] - requirements.points[leg, 2]))
         slope_text = f"{round(height, 1):g} m vertically, {math.degrees(abs(planned_slope)):.1f}°"
@@ -406,13 +407,13 @@ def _limit_text(requirements: RouteRequirements, leg: int, limit: float, source:
     altitude = float(max(requirements.points[leg, 2], requirements.points[leg + 1, 2]))
     condition = f"at {speed:.0f} m/s and {altitude:.0f} m AMSL"
     if limit <= 0.0:
-        return f"{condition} the aircraft cannot fly steadily on this course"
+        return f"the aircraft cannot fly steadily on this course {condition}"
     wind = requirements.wind_on(leg)
     tailwind, crosswind = wind.components_on_course(float(requirements.courses[leg]), altitude)
     if math.hypot(tailwind, crosswind) < CALM_WIND_MPS:
-        return f"{condition} the aircraft's limit is {math.degrees(limit):.1f}° in calm air"
+        return f"the aircraft's limit is {math.degrees(limit):.1f}° {condition}, in calm air"
     wind_text = _wind_text(tailwind, crosswind)
-    return f"{condition} the aircraft's limit is {math.degrees(limit):.1f}° in this {wind_text}"
+    return f"the aircraft's limit is {math.degrees(limit):.1f}° {condition}, with {wind_text}"
 
 
 def _wind_text(tailwind: float, crosswind: float) -> str:
@@ -431,12 +432,12 @@ def _distance_text(distance: float) -> str:
 
 
 def _throttle_text(requirements: RouteRequirements, name: str) -> str:
-    """Describe a throttle limit: "throttle at full", or "throttle at its limit" and the parameter.
+    """Describe a throttle limit: "full throttle", or "throttle at its limit" and the parameter.
 
     name: "full" or "idle".
     """
     limit_name = requirements.setup.autopilot.speeds.max_throttle_name
-    return f"throttle at its limit {limit_name}" if name == "full" and limit_name else f"throttle at {name}"
+    return f"throttle at its limit {limit_name}" if name == "full" and limit_name else f"{name} throttle"
 
 
 def _throttle_times(measure: SlopeMeasure) -> tuple[tuple[str, float, float, str], ...]:
@@ -575,10 +576,12 @@ def _rate_limit_faults(requirements: RouteRequirements, leg: int, measure: Slope
         return []
     speed = float(requirements.route.leg_airspeeds[leg])
     altitude = float(requirements.points[leg : leg + 2, 2].mean())
-    text = f"{name} permits a {'climb' if sign > 0.0 else 'descent'} of {math.degrees(slope):.1f}° at {speed:.1f} m/s"
+    text = (
+        f"{name} allows only a {'climb' if sign > 0.0 else 'descent'} of {math.degrees(slope):.1f}° at {speed:.1f} m/s"
+    )
     tailwind, crosswind = requirements.wind_on(leg).components_on_course(float(requirements.courses[leg]), altitude)
     if math.hypot(tailwind, crosswind) >= CALM_WIND_MPS:
-        text += f" in this {_wind_text(tailwind, crosswind)}"
+        text += f", with {_wind_text(tailwind, crosswind)}"
     return [message(text)]
 
 

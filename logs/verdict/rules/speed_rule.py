@@ -135,11 +135,11 @@ def _command_text(demanded: float, commanded: float, min_speed: float, max_speed
     demanded: airspeed as the mission states it, m/s: true airspeed, or equivalent airspeed for some autopilots.
     commanded: the commanded airspeed as true airspeed, m/s; the text states it only if it differs.
     """
-    true_speed_text = "" if demanded == commanded else f" of equivalent airspeed, {commanded:.1f} m/s of true airspeed,"
+    kind_text = "TAS" if demanded == commanded else f"EAS ({commanded:.1f} m/s TAS)"
     if not (math.isfinite(min_speed) and math.isfinite(max_speed)):
-        return f"{demanded:.1f} m/s{true_speed_text} is commanded, but no level flight is known"
-    level_text = f"level flight is possible from {min_speed:.1f} to {max_speed:.1f} m/s"
-    return f"{demanded:.1f} m/s{true_speed_text} is commanded; {level_text}"
+        return f"{demanded:.1f} m/s {kind_text} is commanded, but no level flight is known"
+    level_text = f"level flight is possible from {min_speed:.1f} to {max_speed:.1f} m/s TAS"
+    return f"{demanded:.1f} m/s {kind_text} is commanded; {level_text}"
 
 
 class _HeldSpeed(NamedTuple):
@@ -202,8 +202,8 @@ def _uncertainty_text(requirements: RouteRequirements, leg: int, commanded: floa
     altitudes = requirements.points[leg : leg + 2, 2].tolist()
     if commanded <= min(certain_envelope.level_speeds(altitude)[1] for altitude in altitudes):
         return ""
-    limit_text = f"the fastest level flight according to {envelope.source} is {max_speed:.1f} m/s"
-    return f"{commanded:.1f} m/s is commanded; {limit_text} ± {envelope.fastest_sd:.1f} m/s"
+    limit_text = f"the maximum level speed according to {envelope.source} is {max_speed:.1f} m/s TAS"
+    return f"{commanded:.1f} m/s TAS is commanded; {limit_text} ± {envelope.fastest_sd:.1f} m/s"
 
 
 def _speed_range_notes(requirements: RouteRequirements, leg: int) -> list[str]:
@@ -319,12 +319,14 @@ def _level_speed_range(
         faults.append(message(f"the aircraft cannot fly level at {max_altitude:.0f} m AMSL"))
     if commanded < min_speed:
         slow_text = (
-            f"{commanded:.1f} m/s is below the slowest level flight, {min_speed:.1f} m/s at {max_altitude:.0f} m AMSL"
+            f"{commanded:.1f} m/s TAS is below the minimum level speed, {min_speed:.1f} m/s TAS at"
+            f" {max_altitude:.0f} m AMSL"
         )
         faults.append(message(slow_text))
     if commanded > max_speed:
         fast_text = (
-            f"{commanded:.1f} m/s is above the fastest level flight, {max_speed:.1f} m/s at {max_altitude:.0f} m AMSL"
+            f"{commanded:.1f} m/s TAS is above the maximum level speed, {max_speed:.1f} m/s TAS at"
+            f" {max_altitude:.0f} m AMSL"
         )
         faults.append(message(fast_text))
     return min_speed, max_speed, faults

@@ -139,9 +139,9 @@ def overlap_text(measure: OverlapMeasure, check: str) -> str:
         )
     if overlap is None:
         return ""
-    gap_text = f", a gap of {gap:.0f} m between the photos," if gap >= _MIN_STATED_GAP_M else ""
-    text = f"{check} {100.0 * overlap:.0f} %{gap_text} at the lowest ({lines_text})"
-    return text if required is None else f"{text}, {100.0 * required:.0f} % required"
+    gap_text = f", with a gap of {gap:.0f} m between the photos" if gap >= _MIN_STATED_GAP_M else ""
+    text = f"lowest {check} {100.0 * overlap:.0f} %{gap_text} ({lines_text})"
+    return text if required is None else f"{text}; {100.0 * required:.0f} % is required"
 
 
 def _unflyable_turnaround_findings(requirements: RouteRequirements, survey: Survey) -> list[Finding]:

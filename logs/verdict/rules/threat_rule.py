@@ -186,7 +186,7 @@ def _sphere_finding(
     if flown_visit is not None and not is_missing:
         facts += (
             f"; the flight was inside for {flown_visit.time_inside:.1f} s (exposure {flown_visit.exposure:.3g} s)."
-            f" It came within {flown_visit.closest:.0f} m of the center"
+            f" It came within {flown_visit.closest:.0f} m of the missile site or radar"
         )
         facts += f" at {flown_visit.closest_time:.1f} s{nearest_place}"
     flown_time = None if flown_visit is None else flown_visit.time_inside

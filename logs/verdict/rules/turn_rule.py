@@ -197,7 +197,7 @@ def _sharp_turn_message(
             f"; at {speed:.0f} m/s and {bank_text} the smallest turn radius on these courses"
             f" in this wind is {requirements.min_radius[waypoint]:.0f} m",
         )
-    length_text = "no leg would be long enough"
+    length_text = "no leg would be long enough for the turn"
     if requirements.length_after[waypoint] < MAX_FLY_BY_OFFSET_RADII * radius:
         length_text = f"the turn takes {requirements.length_after[waypoint]:.0f} m of each leg"
         if requirements.setup.route.fly_over[waypoint]:
@@ -211,7 +211,8 @@ def _sharp_turn_message(
     )
     return message(
         f"{turn_text}, but {room_text}",
-        f" next to the neighbouring turns; {length_text} at {speed:.0f} m/s and {bank_text} (radius {radius:.0f} m)",
+        f" beside the neighbouring turns. At {speed:.0f} m/s and {bank_text} the radius is {radius:.0f} m, and"
+        f" {length_text}",
     )
 
 

@@ -192,7 +192,7 @@ export class Panel {
   finding(one, flown, planned) {
     const { rev } = this.now, from = planned || one, suggestions = from.suggestions.map((each, which) => element("li", {},
       each.apply ? element("button", { type: "button", class: "apply", onclick: () => this.app.commit({ kind: "apply", rev, finding: from.number, which, flown: flown && !planned }) }, "Apply") : element("span", { class: "hand" }, "by hand"),
-      element("span", {}, planned && each.apply ? `${each.text} (${this.flight.early ? "not tried by flight: the flight ended before it" : "by geometry, not flown"})` : each.text)));
+      element("span", {}, planned && each.apply ? `${each.text} (${this.flight.early ? "not tried in flight, because the flight ended before it" : "by geometry, not flown"})` : each.text)));
     const whole = ["flight", "mission", "plan"].includes(one.kind) && !/\d/.test(one.where);
     const place = whole ? "" : one.index === null ? element("b", {}, one.where) : element("button", { type: "button", class: "place", title: "Show it on the map", onclick: () => this.app.goTo(one) }, one.where);
     return element("li", { "data-state": one.state },

@@ -68,8 +68,8 @@ def test_what_the_mission_passes_is_left_out_and_named() -> None:
     mission, notes = with_fences(plan_mission(plan, 25.0, math.radians(30.0)), plan.scenario, over_the_first)
     assert [item.x for item in mission.fences] == [item.x for k, item in enumerate(whole.fences) if k != 4]
     assert [item.seq for item in mission.fences] == list(range(len(whole.fences) - 1))
-    (said,) = (note for note in notes if note.startswith("omitted from the fence"))
-    assert f": {threats.names[first]}. " in said
+    (said,) = (note for note in notes if note.startswith("the mission passes above or below "))
+    assert f" {threats.names[first]}, so the fence omits it. " in said
 
 
 @pytest.mark.parametrize("kind", ["fence", "rally", "plan"])
@@ -274,4 +274,4 @@ def test_what_is_to_be_stayed_in_is_never_left_out() -> None:
     plan = planned(**TABLES)
     mission, notes = with_fences(plan_mission(plan, 25.0, math.radians(30.0)), plan.scenario, lambda _: True)
     assert [item.command for item in mission.fences] == [5001] * 8
-    assert any("above or below: mast." in note for note in notes)
+    assert any("above or below mast, so the fence omits it." in note for note in notes)

@@ -33,7 +33,7 @@ def test_speeds_count_for_the_legs_after_them() -> None:
     assert np.array_equal(flown.points["min_ground_speed"], [math.nan] * 3 + [28.0] * 4, equal_nan=True)
     assert flown.notes == (
         "item 5: DO_CHANGE_SPEED's throttle: ignored",
-        "item 5: DO_CHANGE_SPEED of ground speed: sets MIN_GROUNDSPEED to 28 m/s",
+        "item 5: DO_CHANGE_SPEED of the ground speed sets MIN_GROUNDSPEED to 28 m/s",
         "item 6: DO_CHANGE_SPEED of type 2, neither airspeed nor ground speed: ignored",
         "item 12: DO_CHANGE_SPEED to 0 m/s: ignored",
     )
@@ -141,7 +141,7 @@ def test_jumps_are_followed_as_often_as_they_say() -> None:
     endless = route(*corners, "2 177 2 -1 0 0 0 0 0")
     assert endless.items.tolist() == [1, 2, 3, 2, 3]
     assert endless.notes == (
-        "item 4: DO_JUMP repeats indefinitely: its items are flown once more, and the simulated flight ends there",
+        "item 4: DO_JUMP repeats indefinitely; the simulated flight flies its items once more and then ends",
     )
     assert (endless.endless_jump, route(*corners, "2 177 2 2 0 0 0 0 0").endless_jump) == (4, None)
     # What follows a jump without end is never flown.
@@ -206,7 +206,8 @@ def test_a_return_or_a_landing_ends_the_itinerary() -> None:
     assert (home.rtl_start, home.rtl_loiter) == (1, pytest.approx((0.0, 0.0, 400.0, 80.0, 0.0), abs=0.01))
     assert home.notes == (
         "item 4: never reached",
-        "item 3: NAV_RETURN_TO_LAUNCH: to home, 1.5 km away, descending 100 m on a straight slope to 400 m AMSL;"
+        "item 3: NAV_RETURN_TO_LAUNCH: returns to home, 1.5 km away, descending 100 m on a straight slope to 400"
+        " m AMSL;"
         " the simulated flight ends after 60 s of the loiter there",
     )
     landed = route(

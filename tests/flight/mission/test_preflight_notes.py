@@ -41,7 +41,7 @@ def notes(
     changes |= {} if ground is None else {"terrain": ground}
     scenario: Scenario = replace(setup.scenario, **changes)
     found = preflight_notes(setup.mission, setup.route, scenario, rules, parameters or {}, assumed or {})
-    return [one for one in found if ": lands on " not in one]
+    return [one for one in found if ": landing on " not in one]
 
 
 def landed_on(ground: Terrain | None, wind: Wind, landing: LandingStrip | None = None) -> list[str]:
@@ -49,7 +49,7 @@ def landed_on(ground: Terrain | None, wind: Wind, landing: LandingStrip | None =
     setup = setup_of(*WAY, home="36.5 -84.2 100")
     scenario = replace(setup.scenario, terrain=ground, wind=wind, landing=landing)
     found = preflight_notes(setup.mission, setup.route, scenario, DEFAULT_RETURN_RULES, {}, {})
-    return [one for one in found if ": lands on " in one]
+    return [one for one in found if ": landing on " in one]
 
 
 def sloped(east: float, north: float) -> Terrain:
@@ -67,8 +67,8 @@ def test_a_landing_without_a_strip_tells_its_course_wind_and_ground() -> None:
     """Landed to the east: what rises to the north falls to the right."""
     (said,) = landed_on(sloped(0.03, 0.02), Wind(4.0, math.radians(90.0)))
     assert said == (
-        "item 4: lands on course 90°, against 4.0 m/s of wind. Over 200 m around the landing point the ground rises"
-        " by 3.0% in the landing direction, and falls by 2.0% to the right. Touchdown and roll-out"
+        "item 4: landing on course 90°, against 4.0 m/s of wind. Over 200 m around the landing point the ground rises"
+        " by 3.0% in the landing direction and falls by 2.0% to the right. Touchdown and roll-out"
         " are not judged, because the scenario has no [landing]"
     )
     assert (
@@ -76,7 +76,7 @@ def test_a_landing_without_a_strip_tells_its_course_wind_and_ground() -> None:
         in landed_on(sloped(0.0, 0.0), Wind(0.0, 0.0))[0]
     )
     assert (
-        "the ground rises by 3.0% in the landing direction, and is level to the right"
+        "the ground rises by 3.0% in the landing direction and is level to the right"
         in landed_on(sloped(0.03, 0.0), Wind(0.0, 0.0))[0]
     )
     (said,) = landed_on(None, Wind(4.0, math.radians(270.0)))
@@ -87,7 +87,7 @@ def test_a_landing_without_a_strip_tells_its_course_wind_and_ground() -> None:
 @pytest.mark.parametrize(("east", "north", "told"), [(0.099, 0.0, False), (0.101, 0.0, True), (0.0, -0.101, True)])
 def test_ground_that_no_plan_would_land_on_is_told(east: float, north: float, told: bool) -> None:
     (said,) = landed_on(sloped(east, north), Wind(0.0, 0.0))
-    assert ("(planfly plan accepts slopes of up to 10%)" in said) is told
+    assert ("(planfly plan accepts landing slopes up to 10%)" in said) is told
     # It leaves the verdict open, too.
     setup = setup_of(*WAY, home="36.5 -84.2 100")
     setup = replace(setup, scenario=replace(setup.scenario, terrain=sloped(east, north)))
@@ -205,7 +205,7 @@ def test_a_mission_without_home_has_no_return_to_speak_of() -> None:
     setup = setup_of(*WAY)
     nowhere = Mission(None, setup.mission.items)
     found = preflight_notes(nowhere, setup.route, setup.scenario, ReturnRules(), {}, {})
-    assert [one for one in found if ": lands on " not in one] == []
+    assert [one for one in found if ": landing on " not in one] == []
 
 
 def test_an_item_that_states_its_height_above_home_as_amsl_is_named() -> None:

@@ -72,7 +72,8 @@ def test_the_height_of_a_rally_point_may_be_counted_from_the_sea_for_the_slope()
 def test_why_it_goes_there_is_said() -> None:
     far = choose_target(ReturnRules(rally_limit=1900.0), (0.0, 6000.0, 900.0), HOME, RALLY)
     assert rtl_note(far, ReturnRules(), 900.0) == (
-        "NAV_RETURN_TO_LAUNCH: to home, 6.0 km away (rally point 1, the nearest, is 2.0 km away, beyond RALLY_LIMIT_KM"
+        "NAV_RETURN_TO_LAUNCH: returns to home, 6.0 km away (rally point 1, the nearest, is 2.0 km away, beyond"
+        " RALLY_LIMIT_KM"
         " 1.9), descending 500 m on a straight slope to 400 m AMSL; the simulated flight ends after 60 s"
         " of the loiter there"
     )
@@ -314,7 +315,8 @@ def test_a_return_that_holds_its_height_comes_down_over_its_target() -> None:
     # Level until the circle about home, down to 100 m over it there.
     assert (ups[0], ups[-1]) == (900.0, 400.0)
     assert rtl_note(target, rules, 900.0).startswith(
-        "NAV_RETURN_TO_LAUNCH: to home, 8.0 km away, level, and descending 500 m in a loiter there, to 400 m AMSL; the"
+        "NAV_RETURN_TO_LAUNCH: returns to home, 8.0 km away, level, and descending 500 m in a loiter there, to"
+        " 400 m AMSL; the"
     )
     low = choose_target(rules, (0.0, 8000.0, 350.0), HOME, ())
     assert ", climbing 50 m first, to 400 m AMSL" in rtl_note(low, rules, 350.0)

@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -235,14 +236,15 @@ def test_a_route_starts_at_the_first_position_or_over_home() -> None:
     plain = route(wp(0, 500, 120), wp(0, 1500, 150))
     assert plain.positions[0] == pytest.approx([0.0, 500.0, 420.0], abs=0.01)
     assert plain.started.startswith(
-        "no TAKEOFF: the flight starts in the air, trimmed, at the first position, item 1: 36.504"
+        "no take-off item, so the flight starts in the air, trimmed, at the first position (item 1): 36.504"
     )
     assert plain.started.endswith("420.0 m AMSL, on course 0 degrees")
     over_home = route("3 22 15 0 0 0 0 0 80", wp(900, 0))
     assert over_home.positions[0] == pytest.approx([0.0, 0.0, 380.0], abs=0.01)
     assert over_home.items.tolist() == [1, 2]
     assert over_home.started.startswith(
-        "NAV_TAKEOFF (item 1): the flight starts in the air, trimmed, over home at this item's altitude"
+        "NAV_TAKEOFF (item 1) is not flown from the ground: the flight starts in the air, trimmed, over home at this"
+        " item's altitude"
     )
     own_place = route(wp(0, 700, 80, command=22), wp(900, 700))
     assert own_place.items.tolist() == [-1, 1, 2]
@@ -256,8 +258,8 @@ def test_a_take_off_without_home_starts_at_the_first_position() -> None:
     flown = route(wp(0, 700, 80, command=22), wp(900, 700), home="0 0 0", terrain=ground())
     assert flown.items.tolist() == [1, 2]
     assert flown.positions[0] == pytest.approx([0.0, 700.0, 380.0], abs=0.01)
-    assert "over the first position, as there is no home" in flown.started
-    assert "home has no altitude: the ground at 36.506" in flown.notes[-1]
+    assert "over the first position (there is no home)" in flown.started
+    assert re.search(r"home has no altitude, so .* used: .* AMSL at 36\.506", flown.notes[-1])
 
 
 def test_heights_of_every_frame_are_amsl() -> None:

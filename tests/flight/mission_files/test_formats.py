@@ -20,9 +20,13 @@ SAMPLES = Path(__file__).parents[1] / "missions"
 
 # What each sample holds, counted by hand: mission items, of which have a place, warnings.
 DIALECTS = {
-    "by_hand.waypoints": (5, 5, ["no current item", "home is at 0, 0"]),
+    "by_hand.waypoints": (5, 5, ["no item is marked as current", "home is at 0, 0"]),
     "endless.waypoints": (6, 4, ["home is at 0, 0"]),
-    "mavproxy.txt": (6, 5, ["no current item", "the sequence numbers have a gap before 4 (2 gaps in all)"]),
+    "mavproxy.txt": (
+        6,
+        5,
+        ["no item is marked as current", "the sequence numbers have a gap before 4 (2 gaps in all)"],
+    ),
     "mavproxy_terrain.txt": (4, 4, []),
     "mission_planner.waypoints": (10, 5, []),
     "mission_planner_land.waypoints": (7, 6, []),

@@ -126,7 +126,9 @@ def test_a_plan_for_another_kind_of_vehicle_is_a_line(kind: int, name: str) -> N
     data["mission"]["vehicleType"] = kind
     with pytest.raises(MissionError) as caught:
         parse_mission(json.dumps(data), "a.plan")
-    assert str(caught.value) == (f"a.plan: mission.vehicleType: {kind}: {name}: planfly flies fixed-wing aircraft (1)")
+    assert str(caught.value) == (
+        f"a.plan: mission.vehicleType: {kind}: {name}; planfly flies only fixed-wing aircraft (vehicleType 1)"
+    )
     # An aeroplane, and what does not say.
     for also in (1, 0, None):
         data["mission"]["vehicleType"] = also

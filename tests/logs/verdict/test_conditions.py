@@ -183,16 +183,16 @@ def test_a_corridor_that_nobody_stated_says_what_it_is_made_of_and_what_it_is_wi
     setup = make_setup()
     survey = replace(setup, route=setup.route.with_fields(position=lines(20.0)))
     assert setup.corridor == 30.0
-    default = "Corridor: 30 m to either side of the legs, planfly's default (set [limits] corridor_m to change it)"
+    default = "Corridor: 30 m to either side of the legs, planfly's default. To change it, set [limits] corridor_m"
     assert corridor_line(survey, ()) == (
-        f"{default}; the corridor is wider than the 20 m between legs 0 and 2, so a flight within the corridor may"
+        f"{default}. The corridor is wider than the 20 m between legs 0 and 2, so a flight within the corridor may"
         " not have followed the lines"
     )
     assert corridor_line(replace(setup, route=setup.route.with_fields(position=lines(31.0))), ()) == default
     assert corridor_line(setup, ()) == default
     assert corridor_line(replace(setup, autopilot=ArduPlane(ArduPilotParameters.defaults())), ()) == (
-        "Corridor: 180 m to either side of the legs, 2 times ArduPlane's acceptance radius of 90 m"
-        " (set [limits] corridor_m to change it)"
+        "Corridor: 180 m to either side of the legs, 2 times ArduPlane's acceptance radius of 90 m."
+        " To change it, set [limits] corridor_m"
     )
     stated = setup.scenario.limits.model_copy(update={"corridor_m": 30.0})
     assert corridor_line(survey.in_scenario(replace(setup.scenario, limits=stated)), ()) == ""

@@ -30,7 +30,7 @@ def test_a_leg_that_is_too_short_for_its_turns_is_named_instead_of_the_margin_th
     short = replace(plan, certificate=replace(plan.certificate, available_length=-31.2))
     finding = next(item for item in judge_plan_only(short).findings if item.rule == "turn")
     assert not finding.ok
-    assert finding.reason == "the plan turns too sharply: a leg is 31 m too short for its turns"
+    assert finding.reason == "the plan turns too sharply; a leg is 31 m too short for its turns"
 
 
 def test_rules_come_in_the_verdicts_order() -> None:

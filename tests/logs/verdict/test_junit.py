@@ -31,7 +31,7 @@ def cases(text: str) -> dict[tuple[str, str], ElementTree.Element]:
 def test_each_finding_is_a_case_and_the_answer_one_more() -> None:
     leg = Place("leg", 1, to_item=3)
     found = (
-        make_finding("slope", leg, ok=False, reason='climbs 9° & more than <8°> on "leg"\x1b[2J', margin=-1.0),
+        make_finding("slope", leg, ok=False, reason='climbs at 9° & more than <8°> on "leg"\x1b[2J', margin=-1.0),
         make_finding("slope", leg, ok=True, reason=""),
         make_finding("clearance", FLIGHT, ok=None, reason="no terrain"),
     )
@@ -43,7 +43,7 @@ def test_each_finding_is_a_case_and_the_answer_one_more() -> None:
         made["planfly.a & b_waypoints.clearance", "flight"],
         made["planfly.a & b_waypoints", "verdict"],
     )
-    assert failed[0].get("message") == 'slope: climbs 9° & more than <8°> on "leg" [2J'
+    assert failed[0].get("message") == 'slope: climbs at 9° & more than <8°> on "leg" [2J'
     assert len(passed) == 0
     assert (unknown[0].tag, unknown[0].get("message")) == ("skipped", "not judged: no terrain")
     assert answer[0].get("message") == "not flyable: slope"

@@ -88,8 +88,8 @@ def test_a_verdict_has_the_levels_that_were_asked(autopilot: FlightSetup) -> Non
         assert verdict.levels[-1].headline == verdict.headline
     three = asked["geometry", "airframe", "autopilot"]
     assert three.lines[-2:] == (
-        "By geometry only: flyable; flight and geometry agree on every finding that both judge",
-        "UAV alone (planfly's guidance, exact navigation): flyable; both flights agree",
+        "Geometry only (no flight): flyable; flight and geometry agree on every finding that both judge",
+        "Without the autopilot (planfly's guidance, exact navigation): flyable; both flights agree",
     )
 
 
@@ -233,7 +233,7 @@ def test_a_flight_that_never_began_fails_its_own_level_and_not_geometry(autopilo
         assert [(level.name, level.flyable) for level in verdict.levels] == [("geometry", True), (name, False)]
         assert verdict.headline == verdict.levels[-1].headline
         assert "not started: no progress" in verdict.headline
-        assert verdict.lines[-1] == "By geometry only: flyable"
+        assert verdict.lines[-1] == "Geometry only (no flight): flyable"
 
 
 def test_a_flight_that_fails_at_take_off_does_not_pass_with_another_guidance() -> None:

@@ -92,7 +92,7 @@ def test_a_place_is_shown_with_the_value_that_fails_or_else_with_the_reason() ->
     """12.34 m to three significant figures; a value within its limit fails for another reason."""
     low = make_finding("clearance", Place("leg", 4), ok=False, reason="low", flown=12.34, limit=60.0, margin=-47.66)
     slow = make_finding("speed", Place("leg", 2), ok=False, reason="too slow", flown=16.5, limit=16.0, margin=0.5)
-    assert (low.place_and_value, slow.place_and_value) == ("leg 4 (12.3)", "leg 2 (too slow)")
+    assert (low.place_and_value, slow.place_and_value) == ("leg 4: 12.3", "leg 2: too slow")
 
 
 def test_states_of_findings_and_of_their_rule() -> None:

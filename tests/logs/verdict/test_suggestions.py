@@ -91,7 +91,7 @@ def test_where_the_levels_disagree_both_are_named() -> None:
     assert not verdict.flyable
     assert [level.flyable for level in verdict.levels] == [True, False]
     assert Disagreement("corridor", leg(0), "geometry", there=True, here=False) in verdict.levels[0].disagreements
-    assert "By geometry only: flyable" in verdict.summary
+    assert "Geometry only (no flight): flyable" in verdict.summary
 
 
 # ----------------------------------------------------------------------
@@ -115,8 +115,8 @@ def test_the_nearest_side_and_the_nearest_height() -> None:
     assert (west.what, west.place, west.wanted) == ("west", place, pytest.approx(41.0, abs=1.0))
     assert (higher.what, higher.wanted) == ("height", pytest.approx(51.0, abs=1.0))
     assert suggestions_text(item.suggestions) in (
-        "pass town 41 m further west, or pass town 51 m higher",
-        "pass town 42 m further west, or pass town 52 m higher",
+        "pass town 41 m further west; or pass town 51 m higher",
+        "pass town 42 m further west; or pass town 52 m higher",
     )
 
 

@@ -30,9 +30,9 @@ def test_what_ends_a_flight_comes_before_what_a_plan_may_be_mended_by() -> None:
     assert headline(late, False) == (
         "not flyable: loss of control (why), completion (why), landing (why), energy (why)"
     )
-    assert headline(found, False).endswith(f", +{len(RULES) - 4} more")
+    assert headline(found, False).endswith(f" and {len(RULES) - 4} more")
     assert headline(found, False).startswith(
-        "not flyable: launch (why), loss of control (why), completion (why), mission (why), +"
+        "not flyable: launch (why), loss of control (why), completion (why), mission (why) and "
     )
 
 
@@ -41,7 +41,7 @@ def test_the_worst_of_each_rule_comes_before_the_second_worst_of_any() -> None:
     turn = failed("turn", waypoint(2), -0.1, planned=50.1, limit=50.0)
     assert headline([*slopes, turn], False) == (
         "not flyable: slope on leg 3 (11° > 8°), slope on leg 4 (12° > 8°), slope on leg 5 (13° > 8°),"
-        " turn at waypoint 2 (50.1° > 50°), +2 more"
+        " turn at waypoint 2 (50.1° > 50°) and 2 more"
     )
 
 
@@ -110,7 +110,7 @@ def test_who_flew_is_said_with_the_parameters_that_decide_most() -> None:
     known = len(mine.values) - 1
     assert (
         f"Parameters: 1 from the file, 0 from the aircraft, {known} from ArduPlane's defaults;"
-        " not used: FOO0, FOO1, FOO2, FOO3, +2 more"
+        " not used: FOO0, FOO1, FOO2, FOO3 and 2 more"
     ) in lines
     landing = lines_by(ArduPilotParameters.from_text("WP_RADIUS 50", "mine.parm").changed("assumed", RTL_AUTOLAND=1.0))
     assert any(line.startswith("Parameters: 1 from the file, 1 assumed for the landing, 0 from") for line in landing)

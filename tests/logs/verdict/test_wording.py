@@ -169,7 +169,7 @@ def test_changes_together_and_alternatives() -> None:
     assert suggestion_text(gentler) == "descend 20 m on leg 1 and descend 20 m on leg 2"
     text = "lengthen leg 1 from 150 m to 300 m and leg 1 from 150 m to 300 m"
     assert suggestion_text((LONGER, LONGER)) == text
-    assert suggestions_text((gentler, (LONGER, LONGER))) == f"{suggestion_text(gentler)}, or {text}"
+    assert suggestions_text((gentler, (LONGER, LONGER))) == f"{suggestion_text(gentler)}; or {text}"
     assert suggestions_text(()) == ""
 
 

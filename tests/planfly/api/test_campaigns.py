@@ -134,10 +134,11 @@ def test_a_campaign_that_goes_on_without_a_number_says_its_number(
     options = {"scenario": tmp_path / "short.toml", "seed": 1, "out": out, "resume": True}
     planfly.campaign(tmp_path / "short.waypoints", at_least=0.9, **options)
     too_few = (
-        "warning: 2 flights cannot show P >= 0.9, even if all are flyable; that needs 29 flights without a failure"
+        "warning: 2 flights cannot show a probability of at least 0.9, even if all are flyable; that needs"
+        " 29 flights without a failure"
     )
     # 0.9^28 is above and 0.9^29 below 0.05.
-    assert caplog.messages == ["number of flights: 2, the number of the resumed campaign", too_few]
+    assert caplog.messages == ["number of flights: 2, as in the resumed campaign", too_few]
     caplog.clear()
     planfly.campaign(tmp_path / "short.waypoints", flights=2, at_least=0.9, **options)
     assert caplog.messages == [too_few]

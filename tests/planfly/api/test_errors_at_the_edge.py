@@ -97,7 +97,7 @@ CASES: dict[str, tuple[Callable[[], object], _Known]] = {
     ),
     "an airspeed": (
         lambda: planfly.plan("tight", airspeed=59.0),
-        _Known("", "airspeed", 59.0, "aerosonde flies "),
+        _Known("", "airspeed", 59.0, "allowed 18..31 m/s for aerosonde"),
     ),
     "a spread": (
         lambda: _spread('[mass]\ndistribution = "norm"\nloc = "one"\nsource = "a guess"'),

@@ -49,11 +49,18 @@ def test_flights_with_the_same_draws_are_pairs(
     assert found.rules == [("clearance", 0, 14), ("slope", 3, 0), ("energy", 1, 0)]
     assert found.inputs == ("wind.speed_mps 9.0 instead of 5.0",)
     lines = comparison_lines(found)
-    assert lines[0].startswith("flights of the second campaign are less likely to be flyable: -0.2000 (-0.3447 to")
-    assert (
-        "  fails   clearance: more often: 0 flights of the first, 14 of the second (+28.0 percentage points)" in lines
+    assert lines[0].startswith(
+        "flights of the second campaign are less likely to be flyable: the probability differs by -0.2000 (95 %"
+        " interval: -0.3447 to"
     )
-    assert "  fails   slopes: less often: 3 flights of the first, 0 of the second (-6.0 percentage points)" in lines
+    assert (
+        "  fails   clearance more often in the second campaign: 14 of 50 flights, and 0 of 50 in the first"
+        " (+28.0 percentage points)" in lines
+    )
+    assert (
+        "  fails   slopes less often in the second campaign: 0 of 50 flights, and 3 of 50 in the first (-6.0"
+        " percentage points)" in lines
+    )
     answer = answered(capsys, 0, "compare", str(first), str(second))
     assert (answer["answer"], answer["pairs"], answer["campaigns"][1]["flyable"]) == ("less likely", 50, 36)
 
@@ -142,8 +149,8 @@ def test_rules_are_compared_on_the_flights_that_both_campaigns_have(base: Campai
     assert (found.difference.value, found.only_first, found.only_second) == (0.0, 0, 0)
     assert found.rules == [("clearance", 4, 4)]
     assert (
-        "  fails   clearance: as often: 4 flights of the first, 4 of the second (+0.0 percentage points)"
-        in comparison_lines(found)
+        "  fails   clearance as often in the second campaign: 4 of 10 flights, and 4 of 10 in the first (+0.0"
+        " percentage points)" in comparison_lines(found)
     )
 
 

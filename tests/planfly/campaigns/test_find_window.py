@@ -115,7 +115,7 @@ def test_windows_are_the_runs_of_open_departures(tmp_path: Path) -> None:
     # The tenth flight has 81 Wh left.
     assert {departure.energy_left for departure in result.departures} == {81.0}
     assert result.is_go is True
-    assert answer_line(result) == "take-off windows: 2026-05-01 06:00 to 08:00, 2026-05-01 12:00 to 13:00 UTC"
+    assert answer_line(result) == "take-off windows (UTC): 2026-05-01 06:00 to 08:00, 2026-05-01 12:00 to 13:00"
     lines = window_lines(result)
     assert " ".join(lines[1].split()) == "2026-05-01 06:00 8/10 44% to 97% 4.0 m/s from 270 81 Wh left completion"
     assert len(lines) == 9
@@ -128,13 +128,13 @@ def test_a_departure_that_is_asked_about(tmp_path: Path) -> None:
     go = found(base, 3.0, 0.5)
     assert (go.is_go, [departure.time for departure in go.departures][1]) == (True, at_hour(0.5))
     assert answer_line(go).startswith(
-        "take-off at 2026-05-01 06:30 UTC: go, 8 of 10 flights are flyable; take-off windows: 2026-"
+        "take-off at 2026-05-01 06:30 UTC: go, 8 of 10 flights are flyable; take-off windows (UTC): 2026-"
     )
     no_go = found(base, 3.0, 2.0)
     assert no_go.is_go is False
     assert (
-        "no go, 0 of 10 flights are flyable, less than the required 80 %; take-off windows: 2026-05-01 06:00 to 07:00"
-        in answer_line(no_go)
+        "no go, 0 of 10 flights are flyable, less than the required 80 %; take-off windows (UTC): 2026-05-01"
+        " 06:00 to 07:00" in answer_line(no_go)
     )
     # After the end of the forecast, and before its beginning.
     for hour, words in ((9.0, "15:00"), (-2.0, "04:00")):
@@ -151,7 +151,8 @@ def test_a_share_that_reaches_the_probability_is_open(tmp_path: Path) -> None:
     closed = found(base, 0.0, probability=0.81)
     assert closed.is_go is False
     assert (
-        answer_line(closed) == "no take-off time is open; the best is 2026-05-01 06:00 UTC with 8 of 10 flights flyable"
+        answer_line(closed)
+        == "no take-off time is flyable; the best is 2026-05-01 06:00 UTC with 8 of 10 flights flyable"
     )
 
 
@@ -213,7 +214,7 @@ def test_the_page_lists_all_departures_in_both_times(tmp_path: Path) -> None:
     assert [sum(patch.get_hatch() is not None for patch in axes.patches) for axes in figure.axes] == [2, 2, 2]
     page = window_page(result, figure, "planfly window x").render().decode()
     assert '<div class="answer reached">' in page
-    assert "<strong>take-off windows: 2026-05-01 06:00 only UTC</strong>" in page
+    assert "<strong>take-off windows (UTC): 2026-05-01 06:00 only</strong>" in page
     assert '<th scope="col" class="u">take-off, UTC</th><th scope="col" class="u">take-off, UTC+02:00</th>' in page
     assert page.count('<td class="u">2026-05-01 06:00</td><td class="u">2026-05-01 08:00</td>') == 1
     assert page.count('<td colspan="5">not judged: ') == 2

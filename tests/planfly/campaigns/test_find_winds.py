@@ -136,7 +136,7 @@ def test_a_direction_in_which_every_flight_fails_does_not_fail_the_mission_in_ca
     lines = wind_lines(found)
     assert lines[0].startswith("not judged: 4 of 4 directions have too few flights (6 to 10 flights)")
     assert lines[1:4] == [
-        "directions without a boundary, by their own flights, which do not prove it:",
+        "directions in which the boundary is not proven, with the wind speed that their own flights suggest:",
         "  from 0° to 90°: at least 10.0 m/s (12 flights)",
         "  from 180°: below 5.0 m/s (10 flights)",
     ]
@@ -239,7 +239,7 @@ def test_a_mission_that_always_fails_in_calm_air_is_answered_at_once(
     assert [boundary.estimate for boundary in found.boundaries] == [0.0] * 4
     assert table(tmp_path / WINDS_DATABASE) == []
     lines = wind_lines(found)
-    assert lines[0] == f"not flyable with P >= {target:g} even in calm air"
+    assert lines[0] == f"not flyable with a probability of at least {target:g} even in calm air"
     assert lines[1] == f"in calm air, {flights} of {flights} flights fail"
     assert "clearance" in lines[2]
     assert "leg 3" in lines[2]
@@ -370,7 +370,7 @@ def test_progress_tells_what_is_known(wind_base: CampaignBase, tmp_path: Path, m
         found = find_winds(wind_base, goal, Workers(1), store, lambda *one: told.append(one), surer_but_in_the_west)
     # What it takes at least is said before the first flight.
     assert told.pop(0) == (0.0, 4 * 36.0, "0 of 144 flights at least")
-    pattern = r"(\d) of 4 directions settled, (\d+) flights?, \d+ a minute(, \d+ s left at least)?"
+    pattern = r"(\d) of 4 directions settled, (\d+) flights?, \d+ flights a minute(, \d+ s left at least)?"
     lines = [re.fullmatch(pattern, remark) for _, _, remark in told]
     assert all(lines)
     flights = len(found.flights)

@@ -57,7 +57,7 @@ def test_a_steep_final_that_holds_in_less_than_95_percent_is_stated(
     assert flown == list(range(40))
     assert bool(texts) == is_stated
     for text in texts:
-        assert text.startswith(f"only {flyable} of 40 simulated landings succeed (P between ")
+        assert text.startswith(f"only {flyable} of 40 simulated landings succeed (95 % interval of the probability: ")
         assert "on a final of 6.0°. Use a strip or a landing course with a clear final of at most 5°" in text
 
 

@@ -127,12 +127,14 @@ def test_flights_are_counted_by_wind() -> None:
     first = chart_directions(FOUND)[0]
     assert (first.from_deg, first.flights) == (0.0, ((8.0, 2, 1),))
     assert wind_lines(ESTIMATED)[1] == (
-        "by the best estimate, flyable with P >= 0.9 in wind up to 7.0 m/s from the worst direction, 0°"
+        "by the best estimate, flyable with a probability of at least 0.9 in wind up to 7.0 m/s from the worst"
+        " direction, 0°"
         " (6.5 to 7.5 m/s at 95 %); highest: over 20 m/s from 270°"
     )
     alike = replace(ESTIMATED, boundaries=(*(WindBoundary(20.0, 18.0 + k, 20.0, True) for k in (1, 0, 1, 1)),))
     assert wind_lines(alike)[1] == (
-        "by the best estimate, flyable with P >= 0.9 in wind up to over 20 m/s from the worst direction, 90°"
+        "by the best estimate, flyable with a probability of at least 0.9 in wind up to over 20 m/s from the"
+        " worst direction, 90°"
         " (18.0 to over 20 m/s at 95 %)"
     )
 
@@ -156,7 +158,9 @@ def test_few_flights_say_what_they_show_of_each_direction(base: CampaignBase, tm
     """Flown in 0° up to 6 and failed from 8 m/s, in 90° and 180° flown in 5, in 270° lost or failed in 9 m/s."""
     flights = ((0, 6.0, True), (0, 8.0, False), (0, 9.0, True), (1, 5.0, True), (2, 5.0, True), (3, 9.0, False))
     found = replace(FOUND, flights=flights, lost=())
-    start = wind_lines(found).index("directions without a boundary, by their own flights, which do not prove it:")
+    start = wind_lines(found).index(
+        "directions in which the boundary is not proven, with the wind speed that their own flights suggest:"
+    )
     assert wind_lines(found)[start + 1 : start + 4] == [
         "  from 0°: between 6.0 and 8.0 m/s (3 flights)",
         "  from 90° to 180°: at least 5.0 m/s (2 flights)",
@@ -179,11 +183,11 @@ def test_rules_that_fail_in_calm_air_are_named_with_their_places() -> None:
     boundaries = (*(WindBoundary(0.0, 0.0, 0.3, False) for _ in range(3)), WindBoundary(2.0, 1.8, 2.2, False))
     found = replace(FOUND, boundaries=boundaries, calm=CalmFailures(0.0, 4, 3, by_rule))
     # The answer of calm air comes before the direction that is not judged, and is that of the other three.
-    assert wind_lines(found)[0] == "not flyable with P >= 0.9 even in calm air"
+    assert wind_lines(found)[0] == "not flyable with a probability of at least 0.9 even in calm air"
     assert wind_lines(found)[1].startswith("not judged in full: 1 of 4 directions has too few flights (1 flight); each")
     found = replace(found, flights=ESTIMATED.flights)
     assert wind_lines(found)[:4] == [
-        "by the best estimate, not flyable with P >= 0.9 even in light wind from 0°;"
+        "by the best estimate, not flyable with a probability of at least 0.9 even in light wind from 0°;"
         " from 270°, flyable in wind up to 2.0 m/s",
         "in calm air, 3 of 4 flights fail",
         "  failed  slopes in 1 flight: leg 2 in 1 flight",
@@ -194,7 +198,7 @@ def test_rules_that_fail_in_calm_air_are_named_with_their_places() -> None:
         found, flights=FOUND.flights, boundaries=boundaries[:1] * 4, calm=CalmFailures(0.3, 4, 3, by_rule[1:])
     )
     assert wind_lines(nowhere)[:2] == [
-        "not flyable with P >= 0.9 even in calm air",
+        "not flyable with a probability of at least 0.9 even in calm air",
         "in 0.3 m/s, the weakest wind flown, 3 of 4 flights fail",
     ]
 
@@ -235,12 +239,13 @@ def test_what_flights_show_by_themselves_where_none_failed() -> None:
     flights = (*((3, 20.0, True) for _ in range(132)), (3, 10.0, True), (0, 20.0, False))
     (line,) = (one for one in wind_lines(replace(FOUND, flights=flights)) if " no flight failed" in one)
     assert line == (
-        "in 1 of 4 directions no flight failed: at least 132 flights in 20 m/s from each of them show P >= 0.978"
+        "in 1 of 4 directions no flight failed: at least 132 flights in 20 m/s from each of them show a"
+        " probability of at least 0.978"
     )
     flights += tuple((2, 20.0, True) for _ in range(58))
     (line,) = (one for one in wind_lines(replace(FOUND, flights=flights)) if " no flight failed" in one)
     assert "in 2 of 4 directions no flight failed: at least 58 flights" in line
-    assert line.endswith("P >= 0.95")
+    assert line.endswith("probability of at least 0.95")
     failed = replace(FOUND, flights=((3, 20.0, False), (0, 10.0, True)))
     assert not any(" no flight failed" in one for one in wind_lines(failed))
 
@@ -280,7 +285,9 @@ def test_the_cases_of_continuous_integration_are_the_answer_and_each_direction()
     flights = ((0, 0.0, False),) * 3
     failing = winds_suite("m", replace(FOUND, boundaries=calm, flights=flights, calm=CalmFailures(0.0, 3, 3, ())))
     assert [case.result for case in failing.cases] == ["failure"] * 5
-    assert {case.message for case in failing.cases} == {"not flyable with P >= 0.9 even in calm air"}
+    assert {case.message for case in failing.cases} == {
+        "not flyable with a probability of at least 0.9 even in calm air"
+    }
 
 
 def test_data_picture_and_page(base: CampaignBase, tmp_path: Path) -> None:

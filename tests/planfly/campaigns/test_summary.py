@@ -328,9 +328,11 @@ def test_undecided_flights_are_no_failures_and_name_the_reason_of_the_first(base
     summary = summary_of_outcomes(base, tmp_path, Goal(0.9, False, 20), 1, 0, 19)
     lines = campaign_lines(summary)
     assert lines[0] == (
-        "P >= 0.9 is undecided: 1 of 20 flights is flyable, 19 not judged in full, P from 0.0500 to 1.0000"
+        "it is undecided whether the probability of a flyable flight is at least 0.9: 1 of 20 flights is"
+        " flyable, 19 not"
+        " judged in full, a share of 0.0500 to 1.0000"
     )
-    assert "  Not judged: 19 of 20 flights; first reason: mission (open 1)" in lines
+    assert "  Not judged in full: 19 of 20 flights; the first for this reason: mission (open 1)" in lines
     assert not any(line.startswith("  failed") for line in lines)
     assert not any("decides mission" in line for line in lines)
     data = json.loads(summary_json(summary))

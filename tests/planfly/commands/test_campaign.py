@@ -139,7 +139,8 @@ def test_a_target_beyond_the_flights_is_said_before_they_are_flown(
     monkeypatch.setattr(campaigns, "report_line", lines.append)
     campaigns._warn_of_too_few_flights(Goal(0.95, False, flights))
     warning = (
-        "warning: 58 flights cannot show P >= 0.95, even if all are flyable; that needs 59 flights without a failure"
+        "warning: 58 flights cannot show a probability of at least 0.95, even if all are flyable; that"
+        " needs 59 flights without a failure"
     )
     assert lines == [warning] * said
     campaigns._warn_of_too_few_flights(Goal(None, False, 1))

@@ -91,7 +91,7 @@ def test_the_cruise_speed_of_a_plan_file_is_that_of_the_mission_or_the_aircraft(
         (str(log_file), [], 25.0, "from aerosonde"),
     ):
         assert main(["export", source, "a.plan", *more, "--overwrite"]) == 0
-        assert f"cruiseSpeed {speed:.0f} m/s: {words})" in capsys.readouterr().out
+        assert f"cruiseSpeed {speed:.0f} m/s {words})" in capsys.readouterr().out
         assert json.loads(Path("a.plan").read_text())["mission"]["cruiseSpeed"] == round(speed)
 
 

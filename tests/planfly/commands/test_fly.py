@@ -29,8 +29,8 @@ def test_aircraft_and_airspeed_replace_the_scenarios(tmp_path: Path, capsys: pyt
         (["--aircraft", "boeing"], "planfly: --aircraft boeing: no aircraft called 'boeing'"),
         (["--aircraft", "./nothere"], "planfly: --aircraft ./nothere: nothere/nothere.toml: No such file"),
         (["--scenario", "tight", "--aircraft", "boeing"], "planfly: --aircraft boeing: no aircraft called 'boeing'"),
-        (["--scenario", "tight", "--airspeed", "70"], "planfly: --airspeed 70: aerosonde flies 18..31 m/s"),
-        (["--airspeed", "70"], "planfly: --airspeed 70: aerosonde flies 18..31 m/s"),
+        (["--scenario", "tight", "--airspeed", "70"], "planfly: --airspeed 70: allowed 18..31 m/s for aerosonde"),
+        (["--airspeed", "70"], "planfly: --airspeed 70: allowed 18..31 m/s for aerosonde"),
         (["--airspeed", "28"], None),
         (["--airspeed", "-3"], "a number above 0"),
     ):

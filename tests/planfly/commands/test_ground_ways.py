@@ -43,7 +43,7 @@ def test_a_first_waypoint_behind_a_ridge_is_not_judged_in_full(
     )
     # The flight itself is well: no autopilot is blamed.
     assert "The aircraft can" not in out
-    assert "UAV alone (planfly's guidance, exact navigation): flyable in the air; both flights agree" in out
+    assert "Without the autopilot (planfly's guidance, exact navigation): flyable in the air; both flights agree" in out
     assert main(["check", str(tmp_path / "f.mcap")]) == 3
 
 

@@ -127,7 +127,7 @@ def test_a_log_becomes_a_folder_that_flies(
         (["aerosonde", "--check", "a.BIN"], "only with --identify"),
         (["--new", "./mine", "--mass", "2", "--until", "20"], "only with --identify"),
         (["--new", "./mine", "--mass", "2", "--out", "./elsewhere"], "--out: --new names the folder"),
-        (["--new", "./mine", "--mass", "2", "--motor-braking"], "--motor-braking: it is an option of each flight"),
+        (["--new", "./mine", "--mass", "2", "--motor-braking"], "--motor-braking: it is an option for flights"),
     ],
 )
 def test_bad_input_is_one_line_and_leaves_nothing(

@@ -78,6 +78,6 @@ def test_a_port_is_not_taken_for_a_time_in_silence(
     assert main(["replay", str(log), "--to", to]) == code
     out = capsys.readouterr()
     if code:
-        assert f"--to {to}: the log ends at" in out.err
+        assert f"--to {to}: after the end of the log at" in out.err
         assert f"--to 127.0.0.1:{to}" in out.err
         assert out.out == ""

@@ -152,7 +152,11 @@ def test_nobody_there_is_one_line(here: Path, capsys: pytest.CaptureFixture[str]
         ({"garbage": True}, "the server's answer is not a readable GeoTIFF"),
         ({"moved": ("N46", "N47")}, "does not cover the area of its name: expected latitude 46..47, longitude 8..9"),
         ({"odd": True}, "cannot be fetched: bytes 0-65535 were requested, but the server sent bytes 1-65535/"),
-        ({"status": 404}, "the server has no tile for this area: open sea, or not a server of Copernicus GLO-30 tiles"),
+        (
+            {"status": 404},
+            "the server has no tile for this area. Either the area is open sea, or the server has no Copernicus"
+            " GLO-30 tiles",
+        ),
     ],
 )
 def test_a_server_that_is_none_is_one_line(
@@ -386,14 +390,14 @@ def test_around_a_mission_is_home_and_all_its_places(here: Path) -> None:
         (["--box", "46,8,47,9", "--out", "dem.png"], "dem.png: expected a name that ends with .tif"),
         (
             ["--box", "46,8,47,9", "--source", "ftp://x/y"],
-            "--source 'ftp://x/y': expected a folder, or its http or https address",
+            "--source 'ftp://x/y': expected a folder, or an http or https address",
         ),
-        (["--box", "46,8,47,9", "--source", "http://127.0.0.1:9/\u00e4"], "its http or https address without"),
-        (["--box", "46,8,47,9", "--source", "http://[::1/"], "its http or https address without"),
-        (["--box", "46,8,47,9", "--source", f"http://{'a' * 64}.example/"], "its http or https address without"),
-        (["--box", "46,8,47,9", "--source", "http://a/?b"], "its http or https address without"),
+        (["--box", "46,8,47,9", "--source", "http://127.0.0.1:9/\u00e4"], "an http or https address without"),
+        (["--box", "46,8,47,9", "--source", "http://[::1/"], "an http or https address without"),
+        (["--box", "46,8,47,9", "--source", f"http://{'a' * 64}.example/"], "an http or https address without"),
+        (["--box", "46,8,47,9", "--source", "http://a/?b"], "an http or https address without"),
         (["--box", "46,8,47,9", "--source", "none"], "none: no such elevation file"),
-        (["--box", "40,0,46,9", "--source", "http://127.0.0.1:9"], "tiles: at most 25 are fetched"),
+        (["--box", "40,0,46,9", "--source", "http://127.0.0.1:9"], "tiles: at most 25 tiles are fetched"),
         (["--around", "none.waypoints"], "none.waypoints"),
     ],
 )

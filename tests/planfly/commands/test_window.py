@@ -66,7 +66,8 @@ def test_a_window_around_a_storm(folder: Path, capsys: pytest.CaptureFixture[str
         (
             "07:00",
             0,
-            "take-off at 2026-05-01 07:00 UTC: go, 10 of 10 flights are flyable; take-off windows: 2026-05-01 06:",
+            "take-off at 2026-05-01 07:00 UTC: go, 10 of 10 flights are flyable; take-off windows (UTC):"
+            " 2026-05-01 06:",
         ),
         (
             "08:00",
@@ -89,7 +90,7 @@ def test_the_exit_code_answers_for_the_time_that_is_asked_about(
 def test_no_open_departure(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     times = ("--from", f"{DAY}08:00Z", "--to", f"{DAY}09:00Z", "--every", "30 min")
     answer = answered(capsys, 4, *WORDS, *times, "--workers", "1")
-    assert answer["headline"] == "no take-off time is open"
+    assert answer["headline"] == "no take-off time is flyable"
     assert [one["time"][11:16] for one in answer["departures"]] == ["08:00", "08:30", "09:00"]
 
 
@@ -118,8 +119,8 @@ def test_the_result_in_python(folder: Path) -> None:
     ("words", "line"),
     [
         ((), "--from: missing; state the first time of take-off, or --at TIME"),
-        (("--from", "06:00"), "--from 06:00: expected a time in ISO 8601 with its offset from UTC"),
-        (("--from", f"{DAY}06:00"), f"--from {DAY}06:00: expected a time in ISO 8601 with its offset from UTC"),
+        (("--from", "06:00"), "--from 06:00: expected a time in ISO 8601 format with its offset from UTC"),
+        (("--from", f"{DAY}06:00"), f"--from {DAY}06:00: expected a time in ISO 8601 format with its offset from UTC"),
         (("--at", f"{DAY}06:00Z/{DAY}07:00Z"), f"--at {DAY}06:00Z/{DAY}07:00Z: expected a time in ISO 8601"),
         (("--from", f"{DAY}06:00Z", "--to", f"{DAY}05:00Z"), f"--to {DAY}05:00Z: expected a time after"),
         (("--from", f"{DAY}06:00Z", "--every", "0min"), "--every 0min: expected a time such as 30min or 1h"),

@@ -108,7 +108,10 @@ def test_an_upload_that_crosses_its_own_fence_is_warned_of_and_not_armed(
     assert (judged.possible, judged.flyable) == (True, armed)
     warnings = [text.text for text in judged.texts if text.severity == WARNING]
     assert (
-        any(text.startswith("fence item 0 (exclusion): 200.0 m inside, 14.3 s in all. The path ") for text in warnings)
+        any(
+            text.startswith("fence item 0 (exclusion): 200.0 m inside for 14.3 s in all. The path ")
+            for text in warnings
+        )
         != armed
     )
     arming = ArmingState()

@@ -89,8 +89,8 @@ NETCDF: dict[str, tuple[Writer, tuple[str, ...]]] = {
         nc(lambda: with_units(aloft(), "isobaricInhPa", None)),
         ("isobaricInhPa: units None: allowed Pa, hPa",),
     ),
-    "no northward wind": (nc(lambda: winds().drop_vars("v")), ("u: its northward wind is missing",)),
-    "no eastward wind": (nc(lambda: winds().drop_vars("u")), ("v: its eastward wind is missing",)),
+    "no northward wind": (nc(lambda: winds().drop_vars("v")), ("u: the northward wind that belongs to it is missing",)),
+    "no eastward wind": (nc(lambda: winds().drop_vars("u")), ("v: the eastward wind that belongs to it is missing",)),
     "no wind": (
         nc(lambda: aloft().drop_vars(["u", "v"])),
         ("wind: missing: no pair of",),
@@ -105,7 +105,7 @@ NETCDF: dict[str, tuple[Writer, tuple[str, ...]]] = {
     ),
     "no level": (
         nc(lambda: winds().isel(height=0, drop=True)),
-        ("u: its level is not stated: pressure, height above ground or altitude",),
+        ("u: its level is not stated; expected a pressure, a height above ground or an altitude",),
     ),
     "descending times": (
         nc(lambda: winds().isel(time=slice(None, None, -1))),
@@ -134,8 +134,14 @@ NETCDF: dict[str, tuple[Writer, tuple[str, ...]]] = {
     ),
     "an infinite value": (nc(lambda: with_value(winds(), np.inf)), ("u, v: values are missing",)),
     "only missing values": (nc(lambda: winds() * np.nan), ("u: no value around the mission",)),
-    "one latitude": (nc(lambda: winds(latitudes=np.array([46.0]))), ("latitude: one node: expected at least two",)),
-    "one longitude": (nc(lambda: winds(longitudes=np.array([8.0]))), ("longitude: one node: expected at least two",)),
+    "one latitude": (
+        nc(lambda: winds(latitudes=np.array([46.0]))),
+        ("latitude: only one grid node; expected at least two",),
+    ),
+    "one longitude": (
+        nc(lambda: winds(longitudes=np.array([8.0]))),
+        ("longitude: only one grid node; expected at least two",),
+    ),
     "a node twice": (
         nc(lambda: winds(longitudes=np.array([7.9, 8.0, 8.0, 8.1]))),
         ("longitude: two nodes at the same place",),
@@ -160,11 +166,11 @@ NETCDF: dict[str, tuple[Writer, tuple[str, ...]]] = {
                 .assign_coords(valid_time=(("time", "step"), np.stack([winds().time.values] * 2)))
             )
         ),
-        ("valid_time: several times of issue in one file: only one is allowed",),
+        ("valid_time: the file has several issue times; only one is allowed",),
     ),
     "another place": (
         nc(lambda: winds(latitudes=LATITUDES + 10.0)),
-        ("latitude, longitude: the mission is at 46.000, 8.000: the forecast's box is 55.800 to 55.900",),
+        ("latitude, longitude: the mission is at 46.000, 8.000: outside the forecast's area, latitude 55.8",),
     ),
     "a file that does not close round the globe": (
         nc(lambda: winds(longitudes=np.linspace(60.0, 300.0, 7))),
@@ -176,11 +182,11 @@ NETCDF: dict[str, tuple[Writer, tuple[str, ...]]] = {
     ),
     "no time around the take-off": (
         nc(lambda: winds(hours=(-4.0, -3.0, 4.0, 5.0))),
-        ("time: take-off 2026-05-01 06:00 UTC: the forecast has no time between 2026-05-01 03:00 and", "up to 6 h"),
+        ("time: take-off 2026-05-01 06:00 UTC: the forecast has no time between 2026-05-01 03:00 and", "at most 6 h"),
     ),
     "currents of the sea": (
         nc(lambda: winds().assign(u=winds().u.assign_attrs(standard_name="eastward_sea_water_velocity"))),
-        ("v: its eastward wind is missing",),
+        ("v: the eastward wind that belongs to it is missing",),
     ),
     "missing values of -99": (
         nc(lambda: with_value(winds(), -99.0)),
@@ -203,7 +209,7 @@ NETCDF: dict[str, tuple[Writer, tuple[str, ...]]] = {
     ),
     "no level above the mission": (
         nc(lambda: winds(levels=(10.0, 50.0, 100.0, 150.0))),
-        ("levels: the mission flies at 260 m AMSL: the forecast's highest level is at 250 m AMSL there",),
+        ("levels: the mission flies at 260 m AMSL: this is above the forecast's highest level, 250 m AMSL there",),
     ),
     "no level below the mission": (
         nc(lambda: winds(levels=(200.0, 300.0, 400.0, 500.0))),
@@ -230,7 +236,7 @@ NETCDF: dict[str, tuple[Writer, tuple[str, ...]]] = {
 GRIB: dict[str, tuple[Writer, tuple[str, ...]]] = {
     "no northward wind": (
         lambda path: write_grib(path, grib_messages(winds(levels=(10.0, 11.0, 12.0, 13.0))[["u"]])),
-        ("u: its northward wind is missing",),
+        ("u: the northward wind that belongs to it is missing",),
     ),
     "no geopotential height": (
         lambda path: write_grib(path, grib_messages(aloft()[["u", "v"]])),
@@ -296,17 +302,17 @@ OPEN_METEO: dict[str, tuple[Writer, tuple[str, ...]]] = {
         json_file(hourly(time=answer()["hourly"]["time"][::-1])),
         ("hourly.time: the times are not in ascending order",),
     ),
-    "fewer values than times": (json_file(hourly(wind_speed_10m=[3.0])), ("hourly.wind_speed_10m: allowed 4 values",)),
+    "fewer values than times": (json_file(hourly(wind_speed_10m=[3.0])), ("hourly.wind_speed_10m: expected 4 values",)),
     "a value as text": (
         json_file(hourly(wind_speed_10m=[3.0, "4", 5.0, 6.0])),
-        ("hourly.wind_speed_10m: value 2 is 4: a number is needed",),
+        ("hourly.wind_speed_10m: value number 2 is '4'; expected a number",),
     ),
     "a null in the middle": (
         json_file(hourly(wind_speed_10m=[3.0, None, 5.0, 6.0])),
-        ("hourly.wind_speed_10m: value 2 is None: a number is needed",),
+        ("hourly.wind_speed_10m: value number 2 is None; expected a number",),
     ),
-    "NaN": (json_file(hourly(wind_direction_10m=[3.0, 1.0, float("nan"), 6.0])), ("value 3 is nan",)),
-    "a number of 400 digits": (json_file(hourly(wind_speed_10m=[3, 10**400, 5, 6])), ("value 2 is 1000",)),
+    "NaN": (json_file(hourly(wind_direction_10m=[3.0, 1.0, float("nan"), 6.0])), ("value number 3 is nan",)),
+    "a number of 400 digits": (json_file(hourly(wind_speed_10m=[3, 10**400, 5, 6])), ("value number 2 is 1000",)),
     "a negative speed": (json_file(hourly(wind_speed_10m=[3, -1, 5, 6])), ("-1 to 6 m/s: allowed 0..150 m/s",)),
     "a speed of sound": (json_file(hourly(wind_speed_10m=[3, 340, 5, 6])), ("3 to 340 m/s: allowed 0..150 m/s",)),
     "no direction": (
@@ -340,7 +346,7 @@ OPEN_METEO: dict[str, tuple[Writer, tuple[str, ...]]] = {
     ),
     "another place": (
         json_file(answer(latitude=47.0)),
-        ("the mission is at 46.000, 8.000: within 15 km of the forecast's only place, 47.000, 8.000",),
+        ("the mission is at 46.000, 8.000: it must be within 15 km of the forecast's only place, 47.000, 8.000",),
     ),
     "JSON of another kind": (json_file({"type": "FeatureCollection", "features": []}), ("hourly: hourly winds",)),
     "brackets": (lambda path: path.write_text("[" * 100_000), ("damaged or incomplete: not JSON",)),
@@ -471,7 +477,7 @@ def test_a_count_of_values_in_a_grib_message_cannot_take_the_memory(tmp_path: Pa
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (["--forecast", "a.nc"], "--at: missing: a forecast needs the time of take-off"),
+        (["--forecast", "a.nc"], "--at: missing; a forecast needs the time of take-off"),
         (["--forecast", "a.nc", "--at", "2026-05-01T06:00"], "--at 2026-05-01T06:00:"),
         (["--forecast", "a.nc", "--at", "tomorrow"], "--at tomorrow:"),
         (
@@ -514,4 +520,4 @@ def test_a_scenario_with_a_forecast_and_no_time(tmp_path: Path, capsys: pytest.C
     write_netcdf(tmp_path / "a.nc", winds())
     (tmp_path / "valley.toml").write_text(f'{SCENARIO}[wind]\nforecast = "a.nc"\n', encoding="utf-8")
     for command in (list(FLY), ["plan", "valley.toml"], ["run", "valley.toml"], ["campaign", "valley.toml"]):
-        assert "--at: missing: a forecast needs the time of take-off" in refused(command, tmp_path, capsys)
+        assert "--at: missing; a forecast needs the time of take-off" in refused(command, tmp_path, capsys)

@@ -87,4 +87,4 @@ def test_a_name_that_a_log_asks_for_and_lacks_is_shown_on_one_line(
     assert main(["check", "asks.mcap"]) == 2
     (said,) = capsys.readouterr().err.splitlines()
     assert said.isprintable()
-    assert said.endswith("missing; setup.json lists it")
+    assert said.endswith("missing, although setup.json lists this attachment")

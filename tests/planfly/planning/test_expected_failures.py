@@ -41,7 +41,7 @@ def landing_plan(turbulence: str = "none", **strip: Any) -> Plan:
     return replace(plan, scenario=scenario, procedures=DepartureAndApproach(None, descent))
 
 
-@pytest.mark.parametrize(("name", "part"), [("steep", "leg 4: climbs 18.3°"), ("tight", "leg 9: 30 m long")])
+@pytest.mark.parametrize(("name", "part"), [("steep", "leg 4: climbs at 18.3°"), ("tight", "leg 9: 30 m long")])
 def test_limits_that_are_looser_than_the_aircraft_are_said(name: str, part: str) -> None:
     (text,) = said_of(plan_of(name))
     assert text.startswith("flights are expected to fail")
@@ -62,13 +62,13 @@ def test_limits_that_the_aircraft_keeps_are_not_said() -> None:
         # In light turbulence a plan uses 0.7 of FW_T_SINK_R_SP (2 m/s) and of FW_T_CLMB_R_SP (3 m/s), and keeps 0.5°.
         # At 25 m/s these are asin(1.4 / 25) = 3.21° and asin(2.1 / 25) = 4.82°, at 600 m AMSL 0.1° less.
         ("px4", -2.5, ""),
-        ("px4", -2.9, "leg 0: sinks 2.9°"),
+        ("px4", -2.9, "leg 0: sinks at 2.9°"),
         ("px4", 4.1, ""),
-        ("px4", 4.5, "leg 0: climbs 4.5°"),
+        ("px4", 4.5, "leg 0: climbs at 4.5°"),
         # 0.65 of the Aerosonde's TECS_CLMB_MAX (5.6 m/s): asin(3.64 / 25) = 8.37°.
         ("ardupilot", -2.9, ""),
         ("ardupilot", 7.4, ""),
-        ("ardupilot", 8.2, "leg 0: climbs 8.2°"),
+        ("ardupilot", 8.2, "leg 0: climbs at 8.2°"),
     ],
 )
 def test_numbers_that_are_looser_than_the_rates_of_the_autopilot_are_said(

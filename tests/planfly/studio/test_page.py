@@ -545,7 +545,7 @@ def test_a_place_is_listed_once_under_a_title_of_what_it_is(page: Browser) -> No
         "slopes leg 3",
     ]
     # What failed in flight has only changes that were flown; what the flight did not reach has those of the geometry.
-    untried = "slopes leg 1Applyraise it (not tried by flight: the flight ended before it)"
+    untried = "slopes leg 1Applyraise it (not tried in flight, because the flight ended before it)"
     assert flown == ["What is not judged in flight", untried]
     assert planned[0] == "What is not judged"
     # The geometry's own finding is applied.

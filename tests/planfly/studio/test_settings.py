@@ -98,7 +98,7 @@ def test_parameters_of_the_command_and_of_the_studio_are_told_apart(tmp_path: Pa
     # The airspeeds of the aircraft (its TOML); the value is in no file.
     with pytest.raises(PlanflyError) as refused:
         set_in(session, parameter="AIRSPEED_CRUISE=40")
-    assert str(refused.value) == "Parameter AIRSPEED_CRUISE: 40: aerosonde flies 18..31 m/s"
+    assert str(refused.value) == "Parameter AIRSPEED_CRUISE: 40: allowed 18..31 m/s for aerosonde"
     with pytest.raises(PlanflyError) as refused:
         set_in(session, parameter="NO_SUCH=1")
     assert str(refused.value) == "Parameter NO_SUCH: not a parameter of the simulated ArduPlane"
@@ -160,11 +160,11 @@ def test_an_aircraft_named_by_its_folder_can_be_chosen_again(tmp_path: Path) -> 
         ({"wind_speed": 500.0}, "Wind: 500: allowed 0..40"),
         ({"wind_from": -361.0}, "Wind from: -361: allowed -360..360"),
         # One range on both sides, the aircraft's (its TOML); the Zagi flies from 11 m/s, and a scenario takes 15 m/s.
-        ({"airspeed": 2.0}, "Airspeed 2: aerosonde flies 18..31 m/s"),
-        ({"airspeed": 60.5}, "Airspeed 60.5: aerosonde flies 18..31 m/s"),
-        ({"airspeed": 10.0, "aircraft": "zagi"}, "Airspeed 10: zagi flies 11..16.9 m/s"),
-        ({"airspeed": 60.0, "aircraft": "zagi"}, "Airspeed 60: zagi flies 11..16.9 m/s"),
-        ({"aircraft": "zagi"}, "Airspeed: 25: zagi flies 11..16.9 m/s"),
+        ({"airspeed": 2.0}, "Airspeed 2: allowed 18..31 m/s for aerosonde"),
+        ({"airspeed": 60.5}, "Airspeed 60.5: allowed 18..31 m/s for aerosonde"),
+        ({"airspeed": 10.0, "aircraft": "zagi"}, "Airspeed 10: allowed 11..16.9 m/s for zagi"),
+        ({"airspeed": 60.0, "aircraft": "zagi"}, "Airspeed 60: allowed 11..16.9 m/s for zagi"),
+        ({"aircraft": "zagi"}, "Airspeed: 25: allowed 11..16.9 m/s for zagi"),
         ({"aircraft": "../x8"}, "Aircraft: expected an aircraft listed by 'planfly aircraft'"),
         ({"parameter": "WP_RADIUS=99999"}, "Parameter WP_RADIUS: 99999: allowed 0..32767"),
         ({"parameter": "WP_RADIUS=wide"}, "Parameter WP_RADIUS: 'wide': expected a finite number"),

@@ -149,8 +149,8 @@ def test_what_an_overlap_needs_and_what_a_pixel_shows_are_stated() -> None:
     sides = {"side": 0.3, "line_pair": (0, 1), "line_spacing": 124.0, "side_height": 120.0}
     front, side, pixels, blur = overlap_lines(OverlapMeasure(CAMERA, **photos, **sides))  # type: ignore[arg-type]
     lowest = ", because the lowest photos are taken 120 m above ground"
-    assert front.endswith(f"75 % required: photos must be at most 29 m apart{lowest}")
-    assert side.endswith(f"65 % required: lines must be at most 61 m apart{lowest}")
+    assert front.endswith(f"75 % is required. The photos must be at most 29 m apart{lowest}")
+    assert side.endswith(f"65 % is required. The lines must be at most 61 m apart{lowest}")
     assert blur == "motion blur is not judged"
     assert pixels == "ground sampling distance 2.9 to 3.9 cm per pixel (120 m to 160 m above ground)"
     # The worst place is not the lowest: 35 % of 80 m x 23.5 / 16 are 41.1 m.

@@ -12,7 +12,7 @@ from planfly.terminal.verdict_lines import verdict_lines
 from tests.logs.verdict.judging import ROUTE, judge
 from tests.synthetic import fly_path, make_setup
 
-FLOWN_TEXT = "no change that passes was found in simulated flights"
+FLOWN_TEXT = "no change was found with which a simulated flight would pass"
 HINT = f"{FLOWN_TEXT}; planfly check --geometry suggests changes for the planned route"
 FAILS = LevelAnswer("geometry", False, "not flyable")
 
@@ -48,7 +48,7 @@ def test_the_hint_of_a_flight(geometry: LevelAnswer, suggests: bool, expected: l
 def test_a_verdict_by_geometry_refers_neither_to_flights_nor_to_itself() -> None:
     verdict = judge_geometry(make_setup(ROUTE, limits={"max_turn_deg": 60.0}))
     assert verdict.failed
-    assert texts(without_suggestions(verdict), suggests=True) == ["no change that passes was found"]
+    assert texts(without_suggestions(verdict), suggests=True) == ["no change was found with which it would pass"]
 
 
 def test_a_suggestion_of_another_than_the_worst_finding_names_its_place() -> None:
@@ -75,4 +75,6 @@ def test_required_returns_that_fail_refer_to_their_own_suggestions() -> None:
     # The reason of the return after the last item says what prevents it.
     assert texts(verdict, suggests=True) == []
     high = make_finding("clearance", Place("leg", 1), ok=False, reason="low")
-    assert texts(replace(verdict, findings=(high, own_end)), suggests=True) == ["no change that passes was found"]
+    assert texts(replace(verdict, findings=(high, own_end)), suggests=True) == [
+        "no change was found with which it would pass"
+    ]

@@ -55,7 +55,7 @@ def slope(leg: int, flown: float, limit: float) -> Finding:
         "deg",
         "fit",
         flown <= limit,
-        f"leg {leg} is as it is",
+        f"leg {leg} climbs at {flown:g}°; the aircraft's limit is {limit:g}°",
         suggestions=((Change("length", Place("leg", leg), 300.0, 400.0, "m"),),),
     )
 
@@ -64,7 +64,7 @@ def test_a_value_beyond_its_limit_that_passes_is_within_its_tolerance(capsys: py
     """4.06° flown where 4° are the limit, with a tolerance of 0.1°: it passes, and says by what."""
     beyond = replace(slope(1, 4.06, 4.0), ok=True)
     lines = printed(capsys, Verdict((beyond,), flyable=True, complete=True, lines=("flyable",), level="flown"))
-    assert "4.06° (limit ≤ 4°, aircraft; within the tolerance of 0.1°)" in lines[-1]
+    assert "4.06° (limit ≤ 4°, set by the aircraft; within the tolerance of 0.1°)" in lines[-1]
     inside = Verdict((slope(1, 3.9, 4.0),), flyable=True, complete=True, lines=("flyable",), level="flown")
     assert "tolerance" not in printed(capsys, inside)[-1]
 
@@ -89,10 +89,10 @@ def test_failures_stand_below_the_summary_with_what_would_pass(capsys: pytest.Ca
     findings = (slope(0, 5.0, 8.0), slope(1, 9.0, 8.0), slope(2, 7.5, 8.0))
     lines = printed(capsys, Verdict(findings, False, True, ("not flyable: slope",), "flown"), "gusty")
     assert lines[0] == "not flyable: slope"
-    assert lines[1] == "  failed  slope at leg 1: leg 1 is as it is"
+    assert lines[1] == "  failed  slope at leg 1: leg 1 climbs at 9°; the aircraft's limit is 8°"
     assert lines[2].endswith("would pass: lengthen leg 1 from 300 m to 400 m")
     # Of 5 and 7.5 and 9 against 8 the last has the least margin.
-    assert "2 of 3 ok; furthest beyond its limit at leg 1: slope 9° (limit ≤ 8.1°, aircraft)" in lines[3]
+    assert "2 of 3 ok; furthest beyond its limit at leg 1: slope 9° (limit ≤ 8.1°, set by the aircraft)" in lines[3]
     assert lines[-1] == "  note    gusty"
 
 
@@ -101,16 +101,18 @@ def test_large_numbers_stand_without_a_power_of_ten(
     capsys: pytest.CaptureFixture[str], flown: float, limit: float
 ) -> None:
     lines = printed(capsys, Verdict((slope(0, flown, limit),), True, True, ("flyable",), "flown"))
-    assert lines[1].endswith(f"leg 0: slope {round(flown)}° (limit ≤ {round(limit)}°, aircraft)")
+    assert lines[1].endswith(f"leg 0: slope {round(flown)}° (limit ≤ {round(limit)}°, set by the aircraft)")
 
 
 def test_failures_of_one_rule_are_one_paragraph_the_worst_first(capsys: pytest.CaptureFixture[str]) -> None:
     findings = (*(slope(k, 9.0 + k, 8.0) for k in range(9)), slope(9, 4.0, 8.0))
     lines = printed(capsys, Verdict(findings, False, True, ("not flyable",), "flown"))
-    assert lines[1] == "  failed  slope: 9 of 10 places fail; the worst is at leg 8: leg 8 is as it is"
+    assert lines[1] == (
+        "  failed  slope: 9 of 10 places fail; the worst is at leg 8: leg 8 climbs at 17°; the aircraft's limit is 8°"
+    )
     assert lines[2].endswith("would pass: lengthen leg 8 from 300 m to 400 m")
     assert lines[3] == (
-        "          also at leg 7 (16°); leg 6 (15°); leg 5 (14°); leg 4 (13°); leg 3 (12°); leg 2 (11°); 2 more"
+        "          also at leg 7: 16°; leg 6: 15°; leg 5: 14°; leg 4: 13°; leg 3: 12°; leg 2: 11°; 2 more"
     )
     assert not any(line.startswith("  failed") for line in lines[2:])
 
@@ -119,7 +121,7 @@ def test_a_failure_by_other_evidence_than_its_number_states_its_reason_instead(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     """A level leg fails by the arc at its end: 0 degrees alone would be no reason."""
-    arc = message("the arc at waypoint 1", " descends 9.9°")
+    arc = message("the arc at waypoint 1", " descends at 9.9°")
     level = make_finding(
         "slope",
         Place("leg", 0),
@@ -132,7 +134,7 @@ def test_a_failure_by_other_evidence_than_its_number_states_its_reason_instead(
         unit="deg",
     )
     lines = printed(capsys, Verdict((slope(2, 9.0, 8.0), level), False, True, ("not flyable",), "flown"))
-    assert "          also at leg 0 (the arc at waypoint 1)" in lines
+    assert "          also at leg 0: the arc at waypoint 1" in lines
 
 
 def test_warnings_do_not_mix_with_results(capsys: pytest.CaptureFixture[str]) -> None:
@@ -183,14 +185,14 @@ def test_unsafe_returns_of_a_flyable_mission_follow_its_first_line(
     answer: str, safe: bool, undecided: bool, row: int, capsys: pytest.CaptureFixture[str]
 ) -> None:
     returns: Any = SimpleNamespace(safe=safe, undecided=undecided, each=(None,))
-    summary = ReturnSummary("all 3 returns violate town", returns=returns)
+    summary = ReturnSummary("all 3 returns violate a zone", returns=returns)
     verdict = Verdict((), flyable=answer == "flyable", complete=True, lines=ANSWER_LINES[answer], level="geometric")
     print(*verdict_lines(verdict, ["a note"], returns=summary), sep="\n")
     lines = capsys.readouterr().out.splitlines()
     (place,) = [number for number, line in enumerate(lines) if line.startswith("returns")]
     assert place == row % len(lines)
     required = "; the scenario requires no safe return" if row == 1 else ""
-    assert lines[place] == f"returns   all 3 returns violate town{required}; details: planfly returns"
+    assert lines[place] == f"returns   all 3 returns violate a zone{required}; details: planfly returns"
 
 
 def test_a_mission_without_a_home_has_no_line_on_returns(capsys: pytest.CaptureFixture[str]) -> None:

@@ -118,7 +118,7 @@ def test_the_text_of_a_suggestion_that_passed_moves_the_items_as_its_trial_did()
     for trial in SuggestionTrials(context, judged).find_passing():
         text = suggestion_text(trial.suggestion)
         after = trial.setup.mission
-        match = re.fullmatch(r".* \(move item (\d+) (.*)\)", text)
+        match = re.fullmatch(r".*: move item (\d+) (.*)", text)
         if match is None:
             continue
         step = {side: float(metres) for side, metres in re.findall(r"(\w+) by ([\d.]+) m", match[2])}

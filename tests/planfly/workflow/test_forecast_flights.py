@@ -287,7 +287,7 @@ def test_levels_above_ground_count_where_the_mission_is(folder: Path) -> None:
 REFUSED: dict[str, tuple[Callable[[], xarray.Dataset], str]] = {
     "no level above the mission": (
         lambda: wind_dataset(3.0, 0.0, kind="altitude", levels=(100.0, 250.0)),
-        r"a\.nc: levels: the mission flies at 260 m AMSL: the forecast's highest level is at 250 m AMSL there",
+        r"a\.nc: levels: the mission flies at 260 m AMSL: this is above the forecast's highest level, 250 m AMSL there",
     ),
     "no level below the mission": (
         lambda: wind_dataset(3.0, 0.0, kind="altitude", levels=(290.0, 600.0)),
@@ -297,7 +297,7 @@ REFUSED: dict[str, tuple[Callable[[], xarray.Dataset], str]] = {
         lambda: wind_dataset(
             np.array([3.0, 9.0])[:, np.newaxis, np.newaxis], 0.0, kind="altitude", levels=(100.0, 250.0)
         ),
-        r"a\.nc: levels: the mission flies at 260 m AMSL: the forecast's highest level is at 250 m AMSL there",
+        r"a\.nc: levels: the mission flies at 260 m AMSL: this is above the forecast's highest level, 250 m AMSL there",
     ),
     "a mean wind of a hurricane": (
         lambda: wind_dataset(50.0, 0.0),

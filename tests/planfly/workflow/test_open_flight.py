@@ -246,9 +246,7 @@ def test_the_judge_finds_the_fence_kept() -> None:
     threats = [missile(198.0, 700.0, 200.0), missile(-900.0, 0.0, 150.0)]
     setup = setup_of(*CORNER, threats=threats)
     mission, notes = add_plan_fence(setup)
-    assert any(
-        note.startswith("omitted from the fence, because the mission passes above or below: m198. ") for note in notes
-    )
+    assert any(note.startswith("the mission passes above or below m198, so the fence omits it. ") for note in notes)
 
     def failed(fences: Any) -> list[str]:
         judged = judge_geometry(replace(setup, mission=replace(setup.mission, fences=fences)))
@@ -382,7 +380,7 @@ def test_a_capacity_unlike_the_batterys_is_noted_with_what_the_failsafe_leaves(
     failsafe = failsafe._replace(capacity_parameter="BATT_CAPACITY", capacity=capacity)
     notes = _capacity_notes([failsafe, BatteryFailsafe("BATT_LOW_VOLT", 14.0)], 29.6, 14.8)
     expected = (
-        f"BATT_CAPACITY {capacity:g} mAh, but the aircraft's battery has 2000 mAh (29.6 Wh at 14.8 V);"
-        f" BATT_LOW_MAH 800 leaves the mission with {left} mAh left"
+        f"BATT_CAPACITY {capacity:g} mAh, but the aircraft's battery has 2000 mAh (29.6 Wh at 14.8 V)."
+        f" The failsafe BATT_LOW_MAH 800 ends the mission with {left} mAh left"
     )
     assert notes == (() if left is None else (expected,))

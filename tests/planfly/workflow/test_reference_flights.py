@@ -417,7 +417,7 @@ def test_a_flight_that_passes_has_a_reference_flight_only_on_request() -> None:
     assert asked.reference.deciding is None
     assert asked.verdict.findings == usual.verdict.findings
     assert [line for line in asked.verdict.lines if line not in usual.verdict.lines] == [
-        "UAV alone (planfly's guidance, exact navigation): flyable; both flights agree"
+        "Without the autopilot (planfly's guidance, exact navigation): flyable; both flights agree"
     ]
     assert find_deciding_parameter(setup, AIRCRAFT, usual.verdict) is None
 

@@ -103,10 +103,15 @@ def test_what_an_early_end_left_unjudged_is_named() -> None:
         RemainingFinding("clearance", Place("leg", 5), fails=False),
     )
     text = suggestion_text((replace(higher(1, 12.0)[0], remaining=remaining),))
-    fails_text = "later in the flight fails: clearance at leg 4"
-    assert text == f"raise both ends of leg 1 by 12 m ({fails_text}; later in the flight undecided: clearance at leg 5)"
+    fails_text = "clearance at leg 4 then fails later in the flight"
+    assert (
+        text
+        == f"raise both ends of leg 1 by 12 m: {fails_text}; clearance at leg 5 then is undecided later in the flight"
+    )
     lost = replace(higher(1, 12.0)[0], remaining=(RemainingFinding("departure", FLIGHT, fails=True),))
-    assert suggestion_text((lost,)) == ("raise both ends of leg 1 by 12 m (later in the flight fails: loss of control)")
+    assert (
+        suggestion_text((lost,)) == "raise both ends of leg 1 by 12 m: loss of control then fails later in the flight"
+    )
     # The energy of a flight that ended early passes only for the part that was flown.
     flown_part, whole = (make_finding("energy", FLIGHT, ok=ok, reason="") for ok in (True, False))
     assert is_passed(replace(before, findings=(*before.findings, flown_part)), verdict_of(whole), low(1))
@@ -176,7 +181,7 @@ def test_items_that_state_heights_above_home_as_amsl_are_offered_the_other_frame
     judged = judge_mission_geometry(setup_of(*lines, home="36.5 -84.2 100"))
     (finding, *_) = [finding for finding in judged.failed if finding.rule == "clearance"]
     first = "read the altitudes of the items below ground as heights above home (frame 3 instead of 0)"
-    assert finding.suggestion.startswith(f"{first}, or raise waypoint 1 (item 2) by 50 m (move item 2 up by 50 m)")
+    assert finding.suggestion.startswith(f"{first}; or raise waypoint 1 (item 2) by 50 m: move item 2 up by 50 m")
     # Below the ground in both frames, the item is raised.
     lines[1] = wp(0, 2500, -20.0, frame=0)
     judged = judge_mission_geometry(setup_of(*lines, home="36.5 -84.2 100"))
@@ -416,7 +421,7 @@ def test_beyond_the_end_of_a_flight_a_suggestion_is_tried_by_geometry_and_says_s
         assert not_flown == {1: False, 2: False, 3: fails_by_geometry}
         assert flights.count == (2 if fails_by_geometry else 3)
     text = suggestion_text((replace(higher(3, 12.0)[0], not_flown=True),))
-    assert text == "raise both ends of leg 3 by 12 m (not tried by flight: the flight ended before this leg)"
+    assert text == "raise both ends of leg 3 by 12 m: not tried in flight, because the flight ended before this leg"
 
 
 def test_a_longer_leg_is_compared_with_its_length_in_the_mission(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -516,7 +521,7 @@ def test_a_low_leg_over_a_hill_is_offered_to_follow_the_ground() -> None:
     (leg,) = {finding.place.index for finding in judged.failed if finding.rule == "clearance"}
     assert following(judged) == [(leg, [("terrain height", leg, 60.0)])]
     (finding,) = [finding for finding in judged.failed if finding.rule == "clearance"]
-    assert finding.suggestion.startswith("follow the ground to item 2 at 60 m above it (frame 10), or raise both ends")
+    assert finding.suggestion.startswith("follow the ground to item 2 at 60 m above it (frame 10); or raise both ends")
     # Over ground that varies by less than 20 m, raising the leg is all that is offered.
     low = judge_mission_geometry(over_a_hill(wp(0, 0, 40.0), wp(0, 4000, 40.0), height=18.0))
     assert {finding.rule for finding in low.failed} == {"clearance"}
@@ -578,7 +583,7 @@ def test_a_low_return_is_offered_the_parameter_of_its_altitude_or_a_higher_start
     assert 10.0 <= start.wanted <= 22.0
     assert f"set RTL_ALTITUDE to {end.wanted:g} m instead of 100 m" in finding.suggestion
     assert (
-        f"raise waypoint 1 (item 2) by {start.wanted:.0f} m (move item 2 up by {start.wanted:.0f} m)"
+        f"raise waypoint 1 (item 2) by {start.wanted:.0f} m: move item 2 up by {start.wanted:.0f} m"
         in finding.suggestion
     )
     # It passes with the parameter, and with its margin; 1 m less has no such margin.

@@ -253,7 +253,7 @@ KML_FAULTS = {
     "no KML": ("<gpx/>", "expected a <kml> element"),
     "an entity": (
         '<!DOCTYPE kml [<!ENTITY a "aaaa"><!ENTITY b "&a;&a;&a;">]><kml>&b;</kml>',
-        "a document type is declared: not allowed",
+        "declares a document type (DOCTYPE), which is not allowed",
     ),
     "a line": (document(placemark("<LineString/>", "road")), "Placemark 1 (road): expected a Polygon"),
     "a point alone": (document(placemark("<Point><coordinates>8,46</coordinates></Point>")), "expected a Polygon"),

@@ -125,7 +125,7 @@ SHAPES = {
     "two corners": ("polygon_m = [[0, 900], [100, 1000]]", "2 corners: at least three different ones are needed"),
     "no corner": ("polygon_m = []", "0 corners: at least three different ones are needed"),
     "no ring": ("rings_deg = []", "no corners: at least three are needed"),
-    "a sliver": ("polygon_deg = [[46, 8], [46, 8.0001], [46.000000001, 8.0001]]", "nothing inside"),
+    "a sliver": ("polygon_deg = [[46, 8], [46, 8.0001], [46.000000001, 8.0001]]", "encloses only"),
 }
 
 

@@ -96,7 +96,9 @@ def test_places_at_the_edge_of_the_box(east: float, is_inside: bool) -> None:
     if is_inside:
         forecast_wind(TABLE, made_forecast(), NOON.isoformat(), site(east), 0)
         return
-    with pytest.raises(ForecastError, match=r"the forecast's box is 45\.900 to 46\.100, 7\.900 to 8\.100"):
+    with pytest.raises(
+        ForecastError, match=r"outside the forecast's area, latitude 45\.900 to 46\.100, longitude 7\.900 to 8\.100"
+    ):
         forecast_wind(TABLE, made_forecast(), NOON.isoformat(), site(east), 0)
 
 
@@ -112,7 +114,7 @@ def test_a_single_place_holds_for_15_km(east: float, is_near: bool) -> None:
 @pytest.mark.parametrize("is_varied", [True, False])
 @pytest.mark.parametrize(
     ("amsl", "words"),
-    [(899.0, ""), (901.0, "highest level is at 900 m AMSL"), (1.0, ""), (-1.0, "lowest level is at 100 m AMSL")],
+    [(899.0, ""), (901.0, "highest level, 900 m AMSL"), (1.0, ""), (-1.0, "lowest level is at 100 m AMSL")],
 )
 def test_altitudes_at_the_ends_of_the_levels(amsl: float, words: str, is_varied: bool) -> None:
     forecast = made_forecast() if is_varied else uniform_forecast(6.0)

@@ -101,7 +101,7 @@ def test_a_circle_that_a_parameter_makes_too_tight_is_no_fault_of_the_mission() 
     assert item.planned is not None
     assert item.limit is not None
     assert item.planned < 65.0 < 110.0 < item.limit
-    assert "flown wider, because the bank limit requires 116 m, more than WP_LOITER_RAD" in item.reason
+    assert "flown wider than WP_LOITER_RAD: the bank limit requires a radius of 116 m" in item.reason
 
 
 @pytest.mark.parametrize("flight", ["time", "to-height"])

@@ -143,7 +143,8 @@ def test_what_is_wrong_beside_a_gap_is_wrong(tmp_path: Path) -> None:
 def test_only_stretches_in_auto_are_judged_each_with_its_time(tmp_path: Path) -> None:
     flight = judged(tmp_path, with_modes((20.0, "AUTO"), (80.0, "FBWA")), AEROSONDE)
     assert (
-        "Judged: AUTO from 20.0 s to 80.0 s, legs 0 to 1, leg 1 in part; leg 0 begins at 30.0 s" in flight.verdict.lines
+        "Judged: the flight in AUTO from 20.0 s to 80.0 s, on legs 0 to 1, leg 1 in part; leg 0 begins at 30.0 s"
+        in flight.verdict.lines
     )
     assert not flight.verdict.flyable
     completion = next(item for item in flight.verdict.findings if item.rule == "completion")

@@ -84,7 +84,7 @@ def test_the_way_to_the_first_waypoint_is_left_open_where_a_wall_stands_in_it() 
         verdict.headline
         == "not judged in full: the flight starts in the air, but a straight climb from home to item 1 hits the ground"
     )
-    assert into_it.reason.endswith(" 1000 m from home, where it is 2 m below the surface, even at the steepest climb")
+    assert into_it.reason.endswith(" even at the steepest climb: 1000 m from home it is 2 m below the surface")
 
 
 def test_beyond_the_climb_the_way_to_the_first_waypoint_is_level() -> None:
@@ -126,7 +126,7 @@ def test_a_take_off_into_a_wall_fails_and_one_that_only_its_steepest_climb_clear
     assert "the climb from home towards item 2 hits the ground" in verdict.headline
     assert failed.planned == pytest.approx(-30.0, abs=0.5)
     assert (
-        " 500 m from home, where it is 30 m below the surface, even at the steepest climb (climb angle 14.1°); a "
+        " even at the steepest climb: 500 m from home it is 30 m below the surface. The climb angle is 14.1°. A "
     ) in failed.reason
 
 
@@ -140,13 +140,13 @@ def test_a_climb_past_its_item_states_its_angle_and_its_end(deviation_deg: float
     certain = math.degrees(math.atan(climb())) - 1.645 * deviation_deg
     slope = 0.7 * math.tan(math.radians(certain))
     certain_text = "certain " if deviation_deg else ""
-    reason = "; the steepest climb is 14.1°, but only 9.0° is certain"
+    reason = ". The steepest climb is 14.1°, but only 9.0° is certain"
     assert found.ok is None
     assert found.reason == (
-        f"the climb from home towards item 2, at 70 % of the steepest {certain_text}climb, hits the ground 400 m from"
-        f" home, where it is {80.0 - 400.0 * slope:.0f} m below the surface (climb angle"
-        f" {math.degrees(math.atan(slope)):.1f}°; the climb ends 100 m above home after {100.0 / slope:.0f} m,"
-        f" beyond item 2, which is 300 m from home{f'{reason} for this aircraft' if deviation_deg else ''})"
+        f"the climb from home towards item 2, at 70 % of the steepest {certain_text}climb, hits the ground: 400 m from"
+        f" home it is {80.0 - 400.0 * slope:.0f} m below the surface. The climb angle is"
+        f" {math.degrees(math.atan(slope)):.1f}°, and the climb ends 100 m above home after {100.0 / slope:.0f} m."
+        f" Item 2 is only 300 m from home{f'{reason} for this aircraft' if deviation_deg else ''}"
     )
 
 
@@ -155,13 +155,13 @@ def test_courses_are_named_on_which_a_launch_would_climb_free() -> None:
     # it from acos(1 / 1.03) = 13.9 degrees on.
     top = 100.0 + 1.03 * 500.0 * climb()
     assert judged("climbout", wall(500.0, top), *TAKEOFF)[0].reason.endswith(
-        "a launch course of 020° to 340° would be clear of obstacles"
+        "A launch course of 020° to 340° would be clear of obstacles"
     )
 
     def basin(east: Floats, at: Floats) -> Floats:
         return np.where(np.hypot(east, at) > 300.0, 2000.0, 100.0)
 
-    assert judged("climbout", basin, *TAKEOFF)[0].reason.endswith("no launch course is clear of obstacles")
+    assert judged("climbout", basin, *TAKEOFF)[0].reason.endswith("No launch course is clear of obstacles")
 
 
 def test_no_ground_stands_in_the_way_for_the_first_50_metres() -> None:
@@ -308,7 +308,7 @@ def test_a_glide_into_a_wall_fails_and_one_that_only_just_clears_it_is_left_open
     failed, verdict = judged("approach", wall(POINT - 600.0, up + 60.0), *landing())
     assert "approach at waypoint 2, item 3 (the glide to item 3 hits the ground)" in verdict.headline
     assert failed.reason == (
-        "the glide to item 3 hits the ground 600 m before the landing point, where it is 60 m below the surface"
+        "the glide to item 3 hits the ground: 600 m before the landing point it is 60 m below the surface"
     )
     _, verdict = judged("approach", wall(POINT - 600.0, up - 3.0), *landing())
     assert verdict.headline == "not judged in full: the glide to item 3 clears the ground by only 3.0 m"

@@ -98,8 +98,8 @@ def test_the_line_on_the_corridor_states_where_it_is_wider() -> None:
     verdict = judge(setup, fly_path(setup))
     [line] = [one for one in verdict.lines if one.startswith("Corridor: ")]
     assert line == (
-        "Corridor: 30 m to either side of the legs, planfly's default; up to 65 m along 2 legs with turns or loiters"
-        " that need more (set [limits] corridor_m to change it)"
+        "Corridor: 30 m to either side of the legs, planfly's default. Along 2 legs it is up to 65 m, because turns or"
+        " loiters need more. To change it, set [limits] corridor_m"
     )
     straight = make_setup(STRAIGHT)
     assert "up to" not in corridor_line(straight, judge(straight, fly_path(straight)).findings)

@@ -196,7 +196,7 @@ def test_a_jump_without_end_needs_more_than_any_battery() -> None:
     first_energy = power * (6000.0 - first_cut * radius) / 25.0 / 3600.0
     # Of 1000 Wh, 20 % are the reserve.
     repeats = math.floor((800.0 - first_energy) / round_energy)
-    assert f"the energy lasts for only {repeats + 1} rounds. Set its repeat count to {repeats} (" in item.reason
+    assert f" usable Wh, enough for {repeats + 1} rounds. Set its repeat count to {repeats}. Details: " in item.reason
     assert item.brief.startswith("the jump at item 5 repeats indefinitely")
 
 

@@ -99,7 +99,7 @@ def test_a_planned_path_through_a_zone() -> None:
     assert (known["entry time"], known["exit time"]) == pytest.approx((20.0, 40.0), abs=1e-3)
     assert (known["entries"], known["entry leg"], known["exit leg"], known["entry up"]) == (1, 0, 0, 300.0)
     assert item.brief == "10.0 m inside"
-    assert "enters it at 20.0 s, east 0 m, north 500 m, 300 m AMSL (leg 0 (to item 1))" in item.reason
+    assert "enters it at 20.0 s on leg 0 (to item 1), east 0 m, north 500 m, 300 m AMSL" in item.reason
 
 
 def test_a_flight_off_its_path_is_judged_by_its_track() -> None:
@@ -124,7 +124,7 @@ def test_what_was_planned_is_told_where_the_flight_fails_too() -> None:
     setup = within_zones(Zone("yard", "exclusion", OVER))
     (item,) = findings(setup, fly_path(setup))
     assert (item.planned, item.flown) == pytest.approx((10.0, 10.0), abs=0.02)
-    assert "(the planned path is 10.0 m inside at " in item.reason
+    assert ". Details: the planned path is 10.0 m inside at " in item.reason
 
 
 def test_an_inclusion_that_is_left() -> None:

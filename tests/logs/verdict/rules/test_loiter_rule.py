@@ -44,7 +44,7 @@ def test_a_circle_too_small_for_the_bank_limit_fails_and_says_what_it_needs() ->
     assert item.ok is False
     assert item.margin is not None
     assert item.margin < 0.0
-    assert item.brief == item.reason.partition(" (")[0]
+    assert item.brief == item.reason.partition(". Details")[0]
     assert f"the aircraft needs {item.limit:.0f} m in this wind" in item.reason
 
 

@@ -82,7 +82,7 @@ def test_the_radius_as_flown_is_told(wider: float) -> None:
     assert low == pytest.approx(200.0 + min(wider, 0.0), abs=0.06)
     assert high == pytest.approx(200.0 + max(wider, 0.0), abs=0.06)
     # The item states 2 laps; the path to the next waypoint leads farther around the circle.
-    assert f"2 laps planned ({circle.laps:.2f} laps from joining to leaving) with a radius of 200 m" in item.reason
+    assert f"2 laps planned ({circle.laps:.2f} laps from joining to leaving), with a radius of 200 m" in item.reason
     assert item.margin == pytest.approx(200.0 - float(requirements.min_radius[circle.first : circle.last + 1].max()))
 
 

@@ -77,7 +77,7 @@ def test_in_open_country_a_circle_that_is_flown_wider_is_flyable() -> None:
     (line,) = (line for line in verdict_lines(judge_geometry(loiter(TIME, OWN)), []) if line.startswith("  loiter"))
     assert "1 of 1 ok; waypoint 1 (item 2): " in line
     required = f"{radius_at(30.0):.0f} m"
-    assert line.endswith(f"flown wider, because the bank limit requires {required}, more than WP_LOITER_RAD")
+    assert line.endswith(f"flown wider than WP_LOITER_RAD: the bank limit requires a radius of {required}")
 
 
 def sphere(east: float, radius: float) -> dict[str, Any]:

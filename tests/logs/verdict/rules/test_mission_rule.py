@@ -29,7 +29,7 @@ def of(check: str, *lines: str, home: str = "36.5 -84.2 300") -> Finding:
     verdict = judge_geometry(setup_of(*lines, home=home))
     found = [item for item in verdict.findings if item.rule == "mission" and item.check == check]
     assert len(found) == 1, verdict.findings
-    assert found[0].reason.endswith(f"(PX4 function {check})"), found[0].reason
+    assert found[0].reason.endswith(f"(see PX4's function {check})"), found[0].reason
     assert not (verdict.flyable and found[0].ok is False)
     return found[0]
 
@@ -246,7 +246,7 @@ def test_geofence() -> None:
         fenced = replace(setup, mission=replace(setup.mission, fences=fences))
         (finding,) = [item for item in judge_geometry(fenced).findings if item.check == "checkGeofence"]
         assert finding.ok == (words is None)
-        assert "(PX4 function checkGeofence)" in finding.reason
+        assert "(see PX4's function checkGeofence)" in finding.reason
         assert words is None or words in finding.reason
 
 

@@ -264,7 +264,7 @@ def test_the_return_after_the_last_item_counts_as_an_items(
         found = [item for item in verdict.findings if item.rule == "return"]
         assert [item.ok for item in found] == ([] if ok is None else [ok])
         assert verdict.flyable is not (ok is False), verdict.lines
-        assert ok is not False or "the return after the last item hits the ground" in verdict.headline
+        assert ok is not False or "return after the last item (hits the ground)" in verdict.headline
         # A loiter by time has a time, which an unlimited loiter could not keep.
         is_mended = ok is False and lines == BEHIND_THE_HILL
         offered = [change.what for item in found for one in item.suggestions for change in one]
@@ -275,7 +275,7 @@ def test_the_return_of_a_mission_without_home_is_not_judged_and_the_first_line_s
     """As without elevation data: flyable, a line that says why, and a skipped case."""
     setup = behind_a_hill(*BEHIND_THE_HILL)
     homeless = replace(setup, mission=replace(setup.mission, home=None))
-    reason = "the mission has no home, to which ArduPlane returns by itself after the last item"
+    reason = "ArduPlane returns to home by itself after the last item, but the mission has no home"
     for verdict in (judge_geometry(homeless), flown(homeless)[0]):
         assert (verdict.flyable, verdict.undecided) == (True, False)
         assert verdict.headline.startswith("flyable; return not judged")
@@ -302,10 +302,10 @@ def test_a_mission_that_ends_within_10_m_of_its_scenarios_destination_is_judged_
     found = [item for item in verdict.findings if item.rule == "return"]
     unjudged = [line for line in verdict.lines if line.startswith("Not judged: return")]
     if judged:
-        distance = f"{math.hypot(east, above):.1f} m from the scenario's destination, more than 10 m"
+        distance = f"{math.hypot(east, above):.1f} m from it, and at most 10 m are allowed"
         assert [item.ok for item in found] == [False]
         assert distance in found[0].reason
-        assert found[0].reason.endswith("a landing or NAV_LOITER_UNLIM at the end prevents it")
+        assert found[0].reason.endswith("A landing or NAV_LOITER_UNLIM at the end of the mission prevents this return")
         assert not unjudged
     else:
         assert not found

@@ -75,8 +75,8 @@ def test_a_speed_within_what_is_not_known_is_undecided(speed: float, ok: bool | 
         assert (item.ok, item.check) == (ok, "unknown aircraft" if ok is None else "")
         assert verdict.undecided is (ok is None)
         if ok is None:
-            told = "the fastest level flight according to a data sheet is 32.0 m/s ± 2.0 m/s"
-            assert item.reason.startswith(f"30.0 m/s is commanded; {told}")
+            told = "the maximum level speed according to a data sheet is 32.0 m/s TAS ± 2.0 m/s"
+            assert item.reason.startswith(f"30.0 m/s TAS is commanded; {told}")
             assert (
                 "airspeeds on 2 legs are too close to the limit to judge, because the aircraft's limits are uncertain"
                 in verdict.headline
@@ -98,7 +98,7 @@ def test_arduplane_takes_a_command_for_equivalent_airspeed() -> None:
         true = 31.0 * math.sqrt(1.225 / (1.225 if up == 0.0 else 1.112))
         assert (item.ok, item.planned) == (ok, pytest.approx(true, rel=1e-3))
         assert of(judge_geometry(made), "speed", leg(0)).ok
-        assert (f"31.0 m/s of equivalent airspeed, {true:.1f} m/s of true airspeed," in item.reason) is not ok
+        assert (f"31.0 m/s EAS ({true:.1f} m/s TAS) is commanded" in item.reason) is not ok
 
 
 def test_each_leg_has_its_own() -> None:

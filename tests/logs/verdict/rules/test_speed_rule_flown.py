@@ -100,8 +100,9 @@ def test_the_higher_end_of_a_leg_limits_its_speed(speed: float, rise: float, lim
     assert item.limit == pytest.approx(limit)
     assert item.margin == pytest.approx(-abs(speed - limit) if not ok else abs(speed - limit))
     if not ok:
-        which = "below the slowest" if speed < 20.0 else "above the fastest"
-        assert f"{speed} m/s is {which} level flight, {limit} m/s at {max(600.0, 600.0 + rise):.0f} m" in item.reason
+        which = "below the minimum" if speed < 20.0 else "above the maximum"
+        top = max(600.0, 600.0 + rise)
+        assert f"{speed} m/s TAS is {which} level speed, {limit} m/s TAS at {top:.0f} m" in item.reason
 
 
 def test_what_is_told_of_a_leg_that_was_not_flown_and_of_the_route_alone() -> None:

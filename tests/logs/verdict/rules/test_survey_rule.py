@@ -265,10 +265,7 @@ def test_overlap_as_drawn_is_what_was_asked_for() -> None:
         assert low == pytest.approx([75.0, 60.0], abs=0.3)
         assert (front.limit, side.limit) == pytest.approx((65.0, 50.0))
         assert (front.ok, side.ok) == (True, True)
-    assert (
-        "front overlap 75 % at the lowest (line 1: photos 50 m apart, 100 m above ground), 75 % required"
-        in front.reason
-    )
+    assert "lowest front overlap 75 % (line 1: photos 50 m apart, 100 m above ground); 75 % is required" in front.reason
     # Without a camera nothing is said of it.
     assert overlaps(judge(with_camera(1, 2), fly_path(with_camera(1, 2)))) == {}
 
@@ -281,7 +278,7 @@ def test_photos_from_the_ground_or_below_it_overlap_by_nothing(up: float) -> Non
     setup = replace(setup, route=setup.route.with_fields(position=low))
     found = overlaps(judge(setup, fly_path(setup, radius=FITS)))
     assert [found[check].flown for check in ("front overlap", "side overlap")] == [0.0, 0.0]
-    assert " 0 m above ground), 75 % required" in found["front overlap"].reason
+    assert " 0 m above ground); 75 % is required" in found["front overlap"].reason
 
 
 @pytest.mark.parametrize(("aside", "ok"), [(49.0, True), (51.0, False)])
@@ -295,7 +292,7 @@ def test_lines_apart_overlap_less(aside: float, ok: bool) -> None:
     side = overlaps(judge(setup, fly_path(setup, radius=FITS, across=left)))["side overlap"]
     assert side.flown == pytest.approx(100.0 * (1.0 - (200.0 + aside) / 500.0), abs=0.2)
     assert side.ok is ok
-    assert f"lines 1 and 2: {200.0 + aside:.0f} m apart, 100 m above ground), 60 % required" in side.reason
+    assert f"lines 1 and 2: {200.0 + aside:.0f} m apart, 100 m above ground); 60 % is required" in side.reason
 
 
 def second(s: np.ndarray) -> np.ndarray:
@@ -373,8 +370,8 @@ def test_the_largest_gap_between_photos_is_named_with_the_spacing_that_has_none(
     setup = replace(setup, route=setup.route.with_fields(position=low))
     front, side = (overlaps(judge_geometry(setup))[check] for check in ("front overlap", "side overlap"))
     assert (front.planned, side.planned) == (0.0, 0.0)
-    assert "0 %, a gap of 30 m between the photos, at the lowest (line 3: photos 50 m apart, 10 m" in front.reason
-    assert "0 %, a gap of 125 m between the photos, at the lowest (lines 2 and 3: 200 m apart, 15 m" in side.reason
+    assert "0 %, with a gap of 30 m between the photos (line 3: photos 50 m apart, 10 m" in front.reason
+    assert "0 %, with a gap of 125 m between the photos (lines 2 and 3: 200 m apart, 15 m" in side.reason
     requirements = route_requirements(setup)
     measure = measure_overlap(requirements, None, requirements.surveys[0])
     assert measure is not None
