@@ -30,7 +30,6 @@ from planfly.flight_options import (
     select_mission_options,
 )
 from planfly.kernel_units.unit_kernels import FLYING, PLANNING_AND_FLYING
-from planfly.rtl.return_summary import ReturnSummary, return_summary
 from planfly.runtime.stages import report_replaced, stage
 from planfly.workflow import pipeline
 from planfly.workflow.flight_limits import FlightLimits, computing_time_key, length_and_duration_text
@@ -42,7 +41,14 @@ from planfly.workflow.output_paths import (
     expand_path_pattern,
     prepare_folder,
 )
-from planfly.workflow.pipeline import FlownMission, PlanThenFly, autopilot_log_path, fly_and_judge
+from planfly.workflow.pipeline import (
+    FlownMission,
+    PlanThenFly,
+    ReturnSummary,
+    autopilot_log_path,
+    fly_and_judge,
+    return_summary,
+)
 from planfly.workflow.suggestion_trials import judge_mission_geometry
 from planner.plan import Plan
 from world.errors import ArgumentError, ScenarioError

@@ -72,6 +72,19 @@ class ReturnStarts:
         return ReturnStarts(*arrays, self.is_flown, *masks, self.height_loss[indices], self.grounded_count)
 
 
+def return_starts(
+    setup: FlightSetup, track: Track | None, interval: float, requirements: RouteRequirements | None = None
+) -> ReturnStarts:
+    """Return the states from which returns start, on the flown track, or on the planned path without a flight.
+
+    interval: time between two returns, s.
+    requirements: the setup's route requirements if already known.
+    """
+    if track is not None and len(track):
+        return flown_starts(setup, track, interval)
+    return planned_starts(setup, interval, requirements)
+
+
 def flown_starts(setup: FlightSetup, track: Track, interval: float) -> ReturnStarts:
     """Sample a flown track as starts of returns, without samples on the ground or in the mission's RTL.
 
