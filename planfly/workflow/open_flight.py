@@ -14,10 +14,9 @@ from flight.mission.altitude_frames import find_misread_altitudes
 from flight.mission.fences import fence_zones
 from flight.mission.from_plan import plan_mission
 from flight.mission.ground_phases import landing_slopes
-from flight.mission.implied_scenario import implied_scenario
 from flight.mission.items import OTHER_VEHICLES, Command, Mission, command_name
 from flight.mission.itinerary import stated_loiter
-from flight.mission.placing import PlacedMission, home_point, place_stops, return_points
+from flight.mission.placing import PlacedMission, home_point, implied_scenario, place_stops, return_points
 from flight.mission.return_path import ReturnPoint, ReturnRules
 from flight.mission.route import Route, route_through_stops, with_end_courses
 from flight.mission.surveys import camera_notes
