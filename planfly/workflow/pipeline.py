@@ -15,8 +15,7 @@ from flight.simulation.track import Track, TrackBuilder, join_tracks
 from logs.recording.reader import LogEvent
 from logs.recording.recorder import Recorder, thin_track
 from logs.verdict.judge_flight import judge_flight, judge_plan_only
-from logs.verdict.measures.energy import check_energy
-from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
+from logs.verdict.measures.route_requirements import RouteRequirements, check_energy, route_requirements
 from logs.verdict.places import ReferenceFlights
 from logs.verdict.returns.drawn_returns import DrawnReturns, drawn_returns, drawn_returns_without_glides
 from logs.verdict.returns.judge_glides import judge_glides
@@ -221,9 +220,9 @@ def fly_and_judge(
     findings_only: True for a verdict with only its findings and answer, see `logs.verdict.judge_flight.judge_flight`.
     limits: limits of the flight time and of the size of the log.
 
-    If the flight cannot start, or `logs.verdict.measures.energy.check_energy` refuses it, the result has no row and no
-    log; its verdict covers the route and says that the flight did not start.  Raises FlightError if the catalog does
-    not contain the setup's aircraft, or if a program does not fly the mission to its end; then no log is left.
+    If the flight cannot start, or `check_energy` refuses it, the result has no row and no log; its verdict covers the
+    route and says that the flight did not start.  Raises FlightError if the catalog does not contain the setup's
+    aircraft, or if a program does not fly the mission to its end; then no log is left.
     """
     aircraft = find_logged_aircraft(setup.aircraft, setup.scenario.flight.aircraft)
     task = _FlightTask(aircraft, log, advance, every, limits, reference, returns=returns, findings_only=findings_only)

@@ -11,12 +11,13 @@ from aircraft.envelope import GRAVITY, ground_speed
 from flight.autopilots.simulated_returns import RETURN_START
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import ROLL, Track
-from logs.verdict.measures.energy import leg_energies, predicted_energy
 from logs.verdict.measures.ground_paths import first_landing_leg, landing_item, takeoff_item
 from logs.verdict.measures.path_moves import path_moves
 from logs.verdict.measures.route_requirements import (
     RouteRequirements,
     find_leg_winds,
+    leg_energies,
+    predicted_energy,
     route_requirements,
     true_airspeed_route,
 )
