@@ -313,6 +313,24 @@ class Start:
     ground: float
 
 
+@dataclass(frozen=True, slots=True)
+class Release:
+    """State of the aircraft at its release.
+
+    position: latitude and longitude, deg, and altitude, m AMSL.
+    attitude: roll, pitch, yaw (true), rad.
+    velocity: velocity of the aircraft over the ground, north, east and down, m/s.
+    wind: velocity of the air, north, east and down, m/s.
+    ground: altitude of the ground, m AMSL.
+    """
+
+    position: tuple[float, float, float]
+    attitude: tuple[float, float, float]
+    velocity: tuple[float, float, float]
+    wind: tuple[float, float, float]
+    ground: float
+
+
 class RunningFlight:
     """One flight in progress, advanced by `fly_block`.
 
@@ -472,10 +490,18 @@ class RunningFlight:
             ground=min(0.0, up - 1000.0) if math.isnan(ground_altitude) else ground_altitude,
         )
 
-    def _start_trimmed(self, source: str, start: Start) -> None:
+    def _start_trimmed(
+        self,
+        source: str,
+        start: Start,
+        launch_end: Release | None = None,
+        commands: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0),
+    ) -> None:
         """Start the aircraft trimmed on the slope of the first leg, or level if it cannot hold that slope.
 
         source: file of the mission, for messages.
+        launch_end: state in which a launch then releases the aircraft; None for a start in the air.
+        commands: elevator, aileron, rudder (rad) and throttle (0..1) at the release.
 
         Raises StartError if the aircraft can fly neither the slope nor level.
         """
@@ -493,6 +519,9 @@ class RunningFlight:
         self.fdm.set_gust(*start.wind)
         self._work.commands = tuple(trimmed.commands())
         self._work.air.wind_north, self._work.air.wind_east = start.wind[:2]
+        if launch_end is not None:
+            self._work.commands = release(self.fdm, launch_end, commands)
+            self._work.air.wind_north, self._work.air.wind_east = launch_end.wind[:2]
 
     def fly_block(self, count: int) -> tuple[Rows, str]:
         """Fly up to ``count`` ticks; return their track rows and the reason for the flight's end.
@@ -602,24 +631,6 @@ def _find_wind(setup: FlightSetup, position: Sequence[float], convergence: float
 
 # ----------------------------------------------------------------------
 # Start from the ground.
-
-
-@dataclass(frozen=True, slots=True)
-class Release:
-    """State of the aircraft at its release.
-
-    position: latitude and longitude, deg, and altitude, m AMSL.
-    attitude: roll, pitch, yaw (true), rad.
-    velocity: velocity of the aircraft over the ground, north, east and down, m/s.
-    wind: velocity of the air, north, east and down, m/s.
-    ground: altitude of the ground, m AMSL.
-    """
-
-    position: tuple[float, float, float]
-    attitude: tuple[float, float, float]
-    velocity: tuple[float, float, float]
-    wind: tuple[float, float, float]
-    ground: float
 
 
 def default_gear(ground_phases: GroundPhases) -> Gear:
@@ -752,7 +763,12 @@ class Flight(RunningFlight):
         if level_trim is None:
             reason = f"no level flight at {gains.reference_airspeed:.1f} m/s and {start.amsl:.0f} m AMSL"
             raise StartError(setup.aircraft, reason, field="airspeed", value=gains.reference_airspeed)
-        self._start_motion(setup, start, level_trim.elevator)
+        launch_end, take_off = None, self._ground_phases.take_off
+        if take_off is not None:
+            launch_end = find_release(setup, self.map, self._ground, aircraft, take_off)
+        commands = (level_trim.elevator, 0.0, 0.0, self._law.released_throttle)
+        start_motion = partial(self._start_trimmed, setup.mission.source, start, launch_end, commands)
+        start_motion()
         memory = self.guidance_memory
         memory.trim_elevator, memory.trim_alpha = level_trim.elevator, level_trim.alpha
         memory.trim_throttle = (steady_flight(model, start.airspeed, start.amsl) or level_trim).throttle
@@ -760,7 +776,7 @@ class Flight(RunningFlight):
         memory.max_bank = setup.limits.max_bank + BANK_RESERVE_RAD
         self._law.initialise(self.guidance_memory, self._workspace.law_record)
         self._start_disturbances(setup)
-        self._compiled, self.engine = self._choose_engine(setup, start, level_trim.elevator)
+        self._compiled, self.engine = self._choose_engine(setup, start_motion)
         self._fly_ticks = self._make_loop()
 
     def divert(self, setup: FlightSetup, local_map: LocalMap) -> None:
@@ -785,22 +801,10 @@ class Flight(RunningFlight):
         self._law.transfer_state(old_law_record, self._workspace.law_record, setup.route.positions[0])
         self._fly_ticks = self._make_loop()
 
-    def _start_motion(self, setup: FlightSetup, start: Start, elevator: float) -> None:
-        """Start the aircraft trimmed in the air, and then release it from its launcher if it takes off.
-
-        elevator: elevator command at the release, rad.
-        """
-        self._start_trimmed(setup.mission.source, start)
-        if self._ground_phases.take_off is not None:
-            release_state = find_release(setup, self.map, self._ground, self.fdm.aircraft, self._ground_phases.take_off)
-            commands = (elevator, 0.0, 0.0, self._law.released_throttle)
-            self._work.commands = release(self.fdm, release_state, commands)
-            self._work.air.wind_north, self._work.air.wind_east = release_state.wind[:2]
-
-    def _choose_engine(self, setup: FlightSetup, start: Start, elevator: float) -> tuple[CompiledModel | None, str]:
+    def _choose_engine(self, setup: FlightSetup, start_motion: Callable[[], None]) -> tuple[CompiledModel | None, str]:
         """Choose between the compiled model and JSBSim, by comparing their steps.
 
-        start, elevator: as in `_start_motion`, to start JSBSim again after a comparison that found a difference.
+        start_motion: function that starts JSBSim again after a comparison that found a difference.
         Returns the compiled model, or None for JSBSim, and a text that names the choice and its reason.
         """
         if self._chosen_engine == "jsbsim":
@@ -817,7 +821,7 @@ class Flight(RunningFlight):
         if differences := model.find_differences():
             # Start again, since the comparison has moved the aircraft.
             self.fdm = self._new_fdm()
-            self._start_motion(setup, start, elevator)
+            start_motion()
             return None, f"JSBSim, because the compiled model differs from it in {differences[0]}"
         return model, f"compiled model, bit-identical to JSBSim {JSBSIM_VERSION} over {PROOF_STEPS} test steps"
 
