@@ -1,4 +1,4 @@
-"""Make the `FlightSetup` of a plan or a mission file with the options of its flight."""
+"""Make the `FlightSetup` of a plan or a mission file with the options of its flight, and its preflight notes."""
 
 import math
 from collections.abc import Iterable, Iterator, Mapping

@@ -1,4 +1,4 @@
-"""Plan, fly, record and judge a mission, with one function for each stage."""
+"""Plan, fly, record and judge a mission and returns from it, with one function for each stage."""
 
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
