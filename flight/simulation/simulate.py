@@ -414,7 +414,13 @@ class RunningFlight:
         self._work.settings.center_longitude = self.map.center_longitude
         self._work.settings.battery = setup.battery
         length = self.path.length + _extra_loiter_length(setup, waypoints)
-        ground_speed = _min_ground_speed(setup, self._airspeeds) - _max_wind_deviation(setup, length)
+        ground_speed = _min_ground_speed(setup, self._airspeeds)
+        if (wind_field := setup.scenario.wind.field) is not None:
+            # Allow for the largest deviation of the forecast's wind from the mean wind around the flight.
+            longest_time = TIME_LIMIT_FACTOR * length / MIN_GROUND_SPEED_MPS + TIME_LIMIT_BASE_S
+            flight_field = wind_field.between(0.0, longest_time)
+            flight_field = without_levels_above(flight_field, float(setup.route.positions[:, 2].max()))
+            ground_speed -= float(np.linalg.norm(flight_field.velocities, axis=-1).max())
         time_limit = TIME_LIMIT_FACTOR * length / max(MIN_GROUND_SPEED_MPS, ground_speed) + TIME_LIMIT_BASE_S
         # A loiter for a time lasts as long as its item states, although its path is only one circle.
         timed_loiters = waypoints[(waypoints["loiter_time"] > 0.0) & (waypoints["loiter_time"] < math.inf)]
@@ -600,21 +606,6 @@ def _min_ground_speed(setup: FlightSetup, airspeeds: Floats) -> float:
         table = tables[airspeed]
         speeds += [float(ground_speed_on(table, courses[leg], up)) for up in points[leg : leg + 2, 2]]
     return float(np.nanmin(speeds)) if np.isfinite(speeds).any() else MIN_GROUND_SPEED_MPS
-
-
-def _max_wind_deviation(setup: FlightSetup, length: float) -> float:
-    """Return the largest deviation of a forecast's wind from the mean wind around a flight, m/s.
-
-    length: length of the flight, m.
-
-    Without a forecast the result is 0.
-    """
-    field = setup.scenario.wind.field
-    if field is None:
-        return 0.0
-    longest_time = TIME_LIMIT_FACTOR * length / MIN_GROUND_SPEED_MPS + TIME_LIMIT_BASE_S
-    flight_field = without_levels_above(field.between(0.0, longest_time), float(setup.route.positions[:, 2].max()))
-    return float(np.linalg.norm(flight_field.velocities, axis=-1).max())
 
 
 def _find_wind(setup: FlightSetup, position: Sequence[float], convergence: float) -> tuple[float, float, float]:
