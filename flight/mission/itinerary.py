@@ -630,7 +630,11 @@ class _ItineraryBuilder:
         if item.command == Command.DO_CHANGE_SPEED:
             self._change_speed_as_px4(item)
         elif item.command == Command.CONDITION_GATE:
-            self._add_gate(item)
+            # PX4 passes a gate at once if it has no position or precedes the start.
+            if item.has_position and self.stops:
+                self.gates.append(Gate(item.seq, item.lat_deg, item.lon_deg, self.px4_airspeed))
+            else:
+                self.notes.px4.add(f"{command_name(item.command)}: passed at once", item.seq)
         else:
             if item.command in CAMERA_SWITCHES and self.gates:
                 self.gates[-1] = self.gates[-1]._replace(switches_camera=True)
@@ -701,16 +705,6 @@ class _ItineraryBuilder:
             min_ground_speed=self.min_ground_speed,
             home_up=self.home.alt,
         )
-
-    def _add_gate(self, item: MissionItem) -> None:
-        """Add a gate to the next leg.
-
-        PX4 passes a gate at once if it has no position or precedes the start.
-        """
-        if item.has_position and self.stops:
-            self.gates.append(Gate(item.seq, item.lat_deg, item.lon_deg, self.px4_airspeed))
-        else:
-            self.notes.px4.add(f"{command_name(item.command)}: passed at once", item.seq)
 
     def _add_take_off(self, item: MissionItem) -> None:
         """Add the stop of a take-off.

@@ -83,7 +83,9 @@ def flight_results(mission: Mission, route: Route, findings: Iterable[Finding], 
     order = {item.seq: k for k, item in enumerate(mission.items)}
     results: _Results = {}
     findings = tuple(findings)
-    places_reached = _places_reached(findings)
+    places_reached: set[tuple[str, int | None]] = {
+        (finding.place.kind, finding.place.index) for finding in findings if finding.flown is not None
+    }
     for finding in findings:
         key, description = _place_key(finding.place, route.items.tolist(), order)
         is_planned = finding.flown is None or _is_decided_by_plan(finding)
@@ -127,11 +129,6 @@ def _other_cause(finding: Finding, value: float | None) -> str:
         return ""
     is_within_limit = value >= finding.limit if finding.at_least else value <= finding.limit
     return finding.brief if is_within_limit else ""
-
-
-def _places_reached(findings: Iterable[Finding]) -> set[tuple[str, int | None]]:
-    """Return the kinds and indices of the places with a flown number; empty if nothing was flown."""
-    return {(finding.place.kind, finding.place.index) for finding in findings if finding.flown is not None}
 
 
 def _is_reached(place: Place, places_reached: set[tuple[str, int | None]]) -> bool:
