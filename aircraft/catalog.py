@@ -169,8 +169,10 @@ def find_aircraft(name: str) -> Aircraft:
 def find_logged_aircraft(name: str, stated_name: str) -> Aircraft:
     """Return the aircraft that a setup or log names.
 
+    Setups and logs contain only a name. For an aircraft of the user's own, the scenario states the folder to read.
+
     name: name of the aircraft in the setup or log.
-    stated_name: name or folder of the aircraft in the scenario. It is used if it is a folder whose name is `name`.
+    stated_name: name or folder of the aircraft in the scenario; a folder is read if its last part is `name`.
 
     Raises FlightError as `load_aircraft` does.
 

@@ -98,7 +98,11 @@ def find_contacts(aircraft: Aircraft, gear: Gear) -> tuple[Contact, ...]:
 
 
 def with_contacts(model: bytes, aircraft: Aircraft, gear: Gear) -> bytes:
-    """Return the XML of a model with default contacts added; unchanged if the model has contacts."""
+    """Return the XML of a model with default contacts added; unchanged if the model has contacts.
+
+    model: XML of the model.
+    gear: landing gear that is added, belly skids or wheels.
+    """
     if _model_contacts(model):
         return model
     contacts = default_contacts(aircraft, gear)
@@ -161,7 +165,7 @@ def _model_contacts(model: bytes) -> tuple[Contact, ...]:
 
 
 def _center_of_gravity(model: bytes) -> Floats:
-    """Return the center of gravity of the loaded aircraft, m aft, right and up of the reference point, (3,).
+    """Return the loaded aircraft's center of gravity, m aft, right and up of the reference point, (3,).
 
     As in JSBSim, the loaded aircraft consists of the empty aircraft, its point masses and the initial contents of its
     tanks.

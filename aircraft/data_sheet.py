@@ -239,7 +239,7 @@ MAX_ZERO_LIFT_ELEVATOR = 0.9
 CRUISE_ELEVATOR = -0.035
 # Sharpness of the stall, the M of Beard and McLain.
 STALL_SHARPNESS = 80.0
-# Fraction of a rigid propeller's braking that an idle propeller has.
+# An idle propeller brakes with this fraction of the negative thrust that the propeller's formula gives.
 WINDMILL_FRACTION = 0.5
 # Resistance of the Aerosonde's motor at full throttle in cruise, dimensionless: R P / V^2.
 _RESISTANCE_RATIO = 0.026
@@ -340,7 +340,8 @@ def _weight(sheet: DataSheet) -> float:
 def _wing_area(sheet: DataSheet) -> float:
     """Return the wing area, m^2.
 
-    The area is the stated area, or else the area that the stall speed requires at the maximum lift of the class.
+    The area is the stated area, or else the area that the stall speed requires at the maximum lift coefficient of the
+    aircraft's class.
     """
     if sheet.area:
         return sheet.area
@@ -354,7 +355,7 @@ class SizedAircraft:
     numbers: numbers of the model.
     sheet: the sheet with all missing values filled in.
     guessed: fields that were filled in.
-    partial_climb: stated climb at less than full throttle, rad; NaN if none was stated. The sheet's climb is that at
+    partial_climb: stated climb at less than full throttle, rad; NaN if none was stated. `sheet.climb` is the climb at
         full throttle.
     """
 
@@ -754,7 +755,7 @@ def _size_engine(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> tuple
 
 
 def _solve_engine(sheet: DataSheet, drag: Drag, target_fields: list[str]) -> tuple[FuelEngine, DataSheet]:
-    """Solve for the engine torque that meets one field of a sheet; for two fields also solve for the pitch.
+    """Solve for the engine torque that meets one field of a sheet; for two fields also for the pitch.
 
     Returns the engine and the sheet with its performance. Raises _NoPropellerError if there is no solution.
     """
@@ -789,7 +790,7 @@ def _solve_engine(sheet: DataSheet, drag: Drag, target_fields: list[str]) -> tup
 
 
 def _thrust_error(motor: Motor, sheet: DataSheet, drag: Drag, field: str) -> float:
-    """Return the relative thrust error of a motor: thrust divided by the thrust that a field requires, minus 1.
+    """Return a motor's thrust divided by the thrust that a field of the sheet requires, minus 1.
 
     field: field of the sheet. "top" requires its thrust at full throttle, "climb" at `DataSheet.climb_throttle`, and
         "trim_throttle" requires the drag at that throttle.
@@ -858,7 +859,9 @@ def _solve_by_newton(errors: Callable[[Floats], Floats], x: Floats) -> Floats | 
 
 
 def _no_propeller_error(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> FlightError:
-    """Return the error for a sheet that no propeller meets; it states the feasible range of a stated value.
+    """Return the error for a sheet that no propeller meets.
+
+    For a stated climb, top speed or motor, the error states the range of it that some propeller meets.
 
     sheet: the sheet with missing values filled in.
     """

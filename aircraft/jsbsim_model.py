@@ -18,8 +18,9 @@ _READINGS = (*_COMMANDS, "current", "power")
 
 @dataclass(frozen=True, slots=True)
 class CommandProperty:
-    """Property of a command, and its change per radian (or per full throttle).
+    """JSBSim property that receives a command, and its change per radian (or per full throttle).
 
+    name: name of the property.
     above, below: change for positive and for negative commands; they differ if the travel is unequal.
     """
 
@@ -30,7 +31,7 @@ class CommandProperty:
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """Property of a reading, and the factor from the property's unit to SI.
+    """JSBSim property from which planfly reads a quantity, and the factor from the property's unit to SI.
 
     An empty name means that the model lacks the quantity; its value is then 0.
     """

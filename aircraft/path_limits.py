@@ -18,9 +18,9 @@ from world.geometry import leg_courses, leg_slopes, wrap
 from world.kernels import compiled, compiled_inline, inlined
 from world.wind import W20, Wind, mean_wind_speed
 
-# Time to roll from a turn into an opposite turn, s per rad of the bank change beyond the bank limit: the roll from
-# level flight to the bank limit is part of every turn. Measured on the shortest S-turn legs that are flown within
-# tolerance (`benchmarks.limits`).
+# Time to roll from a turn into an opposite turn, s per rad by which the bank change exceeds the bank limit. The roll
+# from level flight to the bank limit takes no extra time, because every turn includes it. Measured on the shortest
+# S-turn legs that are flown within tolerance (`benchmarks.limits`).
 ROLL_TIME = 0.8
 # Vertical acceleration in the blend between two slopes, m/s^2.
 BLEND_ACCELERATION = 1.0
@@ -69,7 +69,7 @@ class Limits:
     reserve_height: height above ground reserved for downdrafts in addition to the clearance, m.
     reserve_threats: distance reserved around missiles' spheres, in all directions, and above and below zones, m.
     reserve_climb: climb rate that legs leave unused for downdrafts, m/s.
-    reserve_above: distance below a maximum height above ground reserved for updrafts, m.
+    reserve_above: height kept free for updrafts below the scenario's maximum height above ground, m.
     reserve_sink: sink rate that legs leave unused for updrafts, m/s.
     """
 
@@ -111,7 +111,7 @@ class Limits:
         amsl: altitude, m.
         airspeed: m/s; None for the airspeed of the limits.
 
-        The radius is that for the highest ground speed on the arc.
+        It is the radius at the highest ground speed on the arc.
         """
         return float(turn_radius_between(self.performance(airspeed), course_in, course_out, amsl))
 

@@ -110,7 +110,7 @@ class ElectricMotor:
     emf: back-emf constant, V s/rad.
     resistance: ohm.
     idle_current: no-load current, A.
-    windmill: fraction of an idle propeller's negative thrust that is applied.
+    windmill: an idle propeller brakes with this fraction of the negative thrust that its formula gives.
     power_ratio: ratio of the battery power used for propulsion to the computed power of motor and propeller.
     avionics: power of autopilot, radios and servos, W.
 
@@ -146,12 +146,12 @@ class ElectricMotor:
         return max(0.0, driven_speed, windmilling_speed)
 
     def thrust(self, throttle: float, airspeed: float, rho: float) -> float:
-        """Return the thrust, N."""
+        """Return the thrust, N, at a throttle (0 to 1), an airspeed (m/s) and an air density (kg/m^3)."""
         thrust = self.propeller.thrust_at(self.speed(throttle, airspeed, rho), airspeed, rho)
         return thrust if thrust > 0.0 else self.windmill * thrust
 
     def power(self, throttle: float, airspeed: float, rho: float) -> float:
-        """Return the power from the battery, W."""
+        """Return the power from the battery, W, at a throttle, an airspeed (m/s) and an air density (kg/m^3)."""
         volts = self.volts * throttle
         current = max(0.0, (volts - self.emf * self.speed(throttle, airspeed, rho)) / self.resistance)
         return self.power_ratio * volts * current + self.avionics
@@ -236,12 +236,12 @@ class FuelEngine:
         return max(0.0, larger_root(square, linear, constant + self.friction - engine_torque))
 
     def thrust(self, throttle: float, airspeed: float, rho: float) -> float:
-        """Return the thrust, N."""
+        """Return the thrust, N, at a throttle (0 to 1), an airspeed (m/s) and an air density (kg/m^3)."""
         thrust = self.propeller.thrust_at(self.speed(throttle, airspeed, rho), airspeed, rho)
         return thrust if thrust > 0.0 else self.windmill * thrust
 
     def power(self, throttle: float, airspeed: float, rho: float) -> float:
-        """Return the heat flow of the fuel, W."""
+        """Return the fuel's heat per second, W, at a throttle, an airspeed (m/s) and an air density (kg/m^3)."""
         work = throttle * self.torque * rho / _SEA_LEVEL_DENSITY * self.speed(throttle, airspeed, rho)
         return work / self.efficiency
 

@@ -39,7 +39,7 @@ class TrackingError:
     All tables have the shape (t, s), for the turns `TURNS` and the ground speeds `SPEED_RATIOS` x airspeed.
 
     airspeed: equivalent airspeed command, m/s; the true airspeed increases with altitude.
-    acceptance: acceptance radius with the smallest deviation, m.
+    acceptance: acceptance radius at which the autopilot deviates least from the legs at a corner, m.
     excursion: maximum distance from the legs near the corner with that acceptance radius, m.
     before, after: lengths of the legs before and after the corner on which the deviation exceeds the deviation on a
         straight leg, m.

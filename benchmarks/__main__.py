@@ -12,7 +12,7 @@ import os
 import platform
 from pathlib import Path
 
-# One thread each: a linear algebra library that spreads over the cores would not be compared, it would be fed.
+# All programs use one thread: a linear algebra library that used all cores would have more of the machine than others.
 for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 

@@ -1,8 +1,8 @@
-"""Compare ArduPlane's law with ArduPlane itself on the same random plans in the same wind, gust for gust.
+"""Compare the model of ArduPlane with ArduPlane itself on the same random plans, in the same wind and gusts.
 
 ``python -m benchmarks.against_arduplane [--plans N] [--from SEED] [--steep] [--json FILE] [--keep FILE]`` plans
 across the ridges near Jacksboro (random ends, winds of 0 to 10 m/s from any direction, light or moderate turbulence),
-flies each plan with the law and with the program that PLANFLY_ARDUPLANE names (default: ``arduplane`` in the working
+flies each plan with the model and with the program that PLANFLY_ARDUPLANE names (default: ``arduplane`` in the working
 folder), and prints the overshoots of both at all sufficiently sharp corners, and the ground clearance of both.
 --steep plans climbs at full throttle; other plans leave a part of it for gusts.  --keep writes the program's flights,
 with their missions, in the form of `tests.authorities`.
@@ -59,7 +59,7 @@ CLEARANCE = 3.0
 
 @dataclass(frozen=True, slots=True)
 class Corner:
-    """Flown corner: turn (degrees) and overshoot of the leg after it, m."""
+    """Flown corner: turn (degrees), and how far the flight overshot the leg after it, m."""
 
     waypoint: int
     turn_deg: float
@@ -79,7 +79,11 @@ class Flown:
 
 @dataclass(frozen=True, slots=True)
 class Compared:
-    """Flights of one plan by both, and their differences (RMS and maximum) across the legs and in altitude, m."""
+    """Flights of one plan by the model and by ArduPlane, and the distance between both.
+
+    law, real: figures of the model's flight and of ArduPlane's.
+    apart_across, apart_up: RMS and largest distance across the legs and in altitude, m.
+    """
 
     seed: int
     wind: float
@@ -91,7 +95,9 @@ class Compared:
 
 
 def random_setup(seed: int, *, steep: bool = False) -> tuple[FlightSetup, Uav]:
-    """Make the first feasible plan between random ends in a random wind, for ArduPlane with exact navigation.
+    """Make the first feasible plan between random ends in a random wind.
+
+    The plan is for ArduPlane with exact navigation.
 
     The same seed gives the same plan.  steep: True to allow the climbs of `_climbing`.
     """
@@ -144,7 +150,7 @@ def _legs(setup: FlightSetup) -> tuple[Floats, Floats, Floats]:
 
 
 def _along_legs(setup: FlightSetup, track: Track) -> tuple[Floats, Floats]:
-    """Return cross-track distance (right positive) and altitude at each step along every leg, m, (n,) each."""
+    """Return cross-track distance (right positive) and altitude at steps along every leg, m, (n,) each."""
     across, up = [], []
     begin = 0
     for start, course, run in zip(*_legs(setup), strict=True):
@@ -164,7 +170,7 @@ def _along_legs(setup: FlightSetup, track: Track) -> tuple[Floats, Floats]:
 
 
 def _corners(setup: FlightSetup, track: Track) -> tuple[Corner, ...]:
-    """Measure the flight at each inner corner of a route."""
+    """Measure the overshoot at each corner that is sharp enough and has a long enough leg after it."""
     starts, courses, runs = _legs(setup)
     found = []
     for i in range(1, len(runs)):

@@ -14,13 +14,20 @@ from flight.dynamics.fdm import Fdm, Variation
 from flight.dynamics.trim import linearise, steady_flight
 from tests.aircraft import beard_mclain as reference
 
+# Aerosonde without parasite drag, as in the published trim.
 CLEAN = Variation(parasite_drag=0.0)
+# Trim that the book publishes: angles in rad, throttle 0 to 1.
 PUBLISHED_TRIM = {"elevator": -0.125112, "aileron": 0.001837, "throttle": 0.676780}
+# Constants of the roll and pitch transfer functions that the book publishes.
 PUBLISHED_CONSTANTS = np.array([22.62885, 130.88368, 5.29474, -36.11239])
 
 
 def against_the_book() -> dict[str, float]:
-    """Return the worst relative errors of trim, modes, published trim and constants, over a flat planet."""
+    """Compare trims and modes with the book (Beard and McLain), over a flat planet.
+
+    Returns the worst relative error of trims and modes against the book's equations, and of the published trim and
+    constants.
+    """
     aerosonde = load_aircraft("aerosonde")
     world = reference.BookAtmosphere()
     trims, modes = [], []
@@ -60,6 +67,7 @@ def against_the_book() -> dict[str, float]:
     }
 
 
+# Largest allowed relative error of each row.
 MUST = {
     "trim against the book's equations": 5e-4,
     "modes against the book's equations": 1e-3,

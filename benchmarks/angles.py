@@ -46,7 +46,11 @@ def angles(numbers: Iterable[int], margin: float) -> Angles:
 
 
 def _line(shape: RouteRequirements, track: Track, leg: int) -> Floats:
-    """Return east, north and up (3,) per metre over the ground, by least squares; NaN for a short stretch."""
+    """Fit a straight line to the flight on a leg, and return its direction.
+
+    The direction is east, north and up per metre over the ground, (3,).  Only the part between the turns and the blends
+    of the slopes is used; the result is NaN if that part is too short.
+    """
     away = track.position - shape.points[leg]
     along = away[:, :2] @ shape.leg_unit(leg)
     low = shape.length_after[leg] + shape.blend[leg] + SETTLING

@@ -150,7 +150,10 @@ def path_costs(paths: Floats, ground: Floats, cylinders: Floats) -> Floats:
 
 
 def by_bearing(rows: Floats, ground: Floats) -> Floats:
-    """Decode paths (n, 12, 3) from distances, [climb angles,] and bearings (n, 20 or 30), as `SphericalToCart.m`."""
+    """Decode paths (n, 12, 3) from distances, [climb angles,] and bearings (n, 20 or 30).
+
+    The decoding is that of `SphericalToCart.m`.
+    """
     distance, bearing = rows[:, :NODES], rows[:, -NODES:]
     climb = rows[:, NODES:-NODES] if rows.shape[1] > 2 * NODES else np.zeros_like(distance)
     steps = (distance * np.cos(climb) * np.sin(bearing), distance * np.cos(climb) * np.cos(bearing))
@@ -164,7 +167,10 @@ def by_bearing(rows: Floats, ground: Floats) -> Floats:
 
 
 def by_offset(rows: Floats, ground: Floats) -> Floats:
-    """Decode paths (n, 12, 3) from offsets to the left of the straight line, at equal steps, and heights (n, 20)."""
+    """Decode paths (n, 12, 3) from offsets to the left of the straight line, and heights (n, 20).
+
+    The points are at equal steps along the line.
+    """
     start, displacement = np.array(START), np.array(END) - np.array(START)
     left = np.array([-displacement[1], displacement[0]]) / math.hypot(displacement[0], displacement[1])
     paths = np.empty((len(rows), NODES + 2, 3))
@@ -205,7 +211,7 @@ def measure_paths(terrain: Path, seeds: int) -> None:
         print(f"paths by {name}: {EVALUATIONS:,} evaluations, {seeds} seeds; median, worst")
 
         def cost(rows: Floats, decode: Callable[[Floats, Floats], Floats] = decode) -> Floats:
-            """Make the function of a BBOB problem: the error of points."""
+            """Return the costs of paths, decoded from rows of variables."""
             return np.asarray(path_costs(decode(rows, ground), ground, CYLINDERS))
 
         for model in MODELS:
@@ -264,7 +270,7 @@ def bbob_functions(seed: int) -> dict[str, Cost]:
     from cocoex import BareProblem
 
     def cost(number: int) -> Cost:
-        """Return the costs of paths, decoded from rows of variables."""
+        """Make the function of a BBOB problem: the error of points."""
         problem = BareProblem("bbob", number, VARIABLES, seed)
         least = float(problem.best_value())
         return lambda points: np.array([problem(point) for point in points]) - least

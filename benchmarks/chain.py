@@ -91,7 +91,9 @@ def run() -> dict[str, Any]:
 
 
 def recording(setup: FlightSetup, uav: Uav, folder: Path, rounds: int = 2 * ROUNDS) -> dict[str, float]:
-    """Measure the flight without a log, with a log at 20 Hz and at 60 Hz, in turn: smallest CPU time of each, s.
+    """Measure the flight without a log, and with a log at 20 Hz and 60 Hz, in turn.
+
+    Returns the smallest CPU time of each, s.
 
     The cost of recording is a small difference of these, which would be lost in medians on a busy machine.
     """

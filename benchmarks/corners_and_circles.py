@@ -1,8 +1,8 @@
-"""Compare corners beyond 100 degrees and loiters of ArduPlane's law with the flights of ArduPlane itself.
+"""Compare corners beyond 100 degrees and loiters of ArduPlane's model with the flights of ArduPlane itself.
 
 ``python -m benchmarks.corners_and_circles`` flies the stored missions of `tests.flight.autopilots.arduplane` with the
-law, and prints the overshoot of each corner, and the radius of each loiter (its largest distance from the centre, if it
-is tighter than the bank limit allows) and its smallest distance: of the law, of ArduPlane, and their ratio.
+model, and prints the overshoot of each corner, and the radius of each loiter (its largest distance from the centre, if
+it is tighter than the bank limit allows) and its smallest distance: of the model, of ArduPlane, and their ratio.
 """
 
 import math
@@ -40,7 +40,7 @@ def main() -> None:
 def _compare(kind: str, name: str, law: float, real: float, ratios: dict[str, list[float]]) -> None:
     """Print the value of the model, of the real autopilot, and their ratio, and store the ratio."""
     if not math.isfinite(law / real):
-        # Left before its distance from the centre had settled.
+        # The loiter was left before its distance from the centre had settled.
         return
     ratios[kind].append(law / real)
     print(f"{name}: {kind} {law:.1f} m by law, {real:.1f} m by ArduPlane, {law / real:.3f}")

@@ -2,7 +2,7 @@
 
 ``python -m benchmarks.data_sheets [--sheets N] [--seed S]``.  Random sheets of all classes (0.5 to 25 kg; tail, V-tail,
 flying wing; battery, fuel) are made into aircraft, each of which flies 5 km with turns, climbs and descents in wind and
-light turbulence, with planfly's guidance and with ArduPlane's law.  Then the intervals of data sheets of published
+light turbulence, with planfly's guidance and with ArduPlane's model.  Then the intervals of data sheets of published
 aircraft are compared with the climb, sink and cruise power of the published models.
 """
 
@@ -44,7 +44,7 @@ SLOPE = 0.5
 
 
 def random_sheet(random: np.random.Generator) -> DataSheet:
-    """Draw the data sheet of a small aircraft: log-uniform mass, with typical speeds and span for the mass.
+    """Draw the data sheet of a small aircraft: log-uniform mass, and speeds and span typical of the mass.
 
     Wing loading and span are within a factor of 1.5 of typical aircraft of this mass.
     """
@@ -85,7 +85,10 @@ def sheets(count: int, seed: int) -> list[DataSheet]:
 
 
 def route(aircraft: Aircraft, random: np.random.Generator, climb: float, descent: float) -> Floats:
-    """Return waypoints (w, 3) of 5 km: turns of 20 to 90 degrees, slopes up to half of the aircraft's limits."""
+    """Return waypoints (w, 3) of a route of 5 km.
+
+    It has turns of 20 to 90 degrees, and slopes up to half of the aircraft's limits.
+    """
     legs = 7
     runs = random.uniform(0.6, 1.4, legs)
     runs *= LENGTH / runs.sum()
@@ -98,7 +101,10 @@ def route(aircraft: Aircraft, random: np.random.Generator, climb: float, descent
 
 
 def fly_both(aircraft: Aircraft, seed: int) -> dict[str, tuple[str, float, float]]:
-    """Fly with each law; return how the flight ended, and its largest errors across and in altitude, m."""
+    """Fly one mission with planfly's guidance and with ArduPlane's model.
+
+    Returns for each, by its name, how the flight ended, and its largest errors across and in altitude, m.
+    """
     random = np.random.default_rng([seed, 7])
     make = setup_maker(aircraft)
     climb, descent = make(np.array([[0.0, 0.0, AMSL], [0.0, 500.0, AMSL]])).envelope.air_angles(aircraft.airspeed, AMSL)
@@ -121,7 +127,10 @@ def fly_both(aircraft: Aircraft, seed: int) -> dict[str, tuple[str, float, float
 
 
 def fly_random_sheets(count: int, seed: int) -> dict[str, int]:
-    """Count the random sheets that complete their mission with each law."""
+    """Count the random sheets whose aircraft completes its mission, with each guidance.
+
+    Each mission is flown with planfly's guidance, and with the model of ArduPlane's.
+    """
     done = {"planfly": 0, "arduplane": 0}
     print(f"{count} random data sheets (seed {seed}), {LENGTH / 1000.0:g} km each:")
     with tempfile.TemporaryDirectory() as place:
@@ -172,9 +181,10 @@ def performance(aircraft: Aircraft, variation: Variation | None = None) -> Perfo
     )
 
 
-# Data sheets of published aircraft as their makers would print them: mass, span, area, speeds and bank; climb, sink and
-# power are to be estimated.  The class of each excludes the aircraft itself: the other flying wing, the other tail; so
-# does the prior of drag and power, which was fitted to no other of them.
+# Published aircraft, whose data sheets state mass, span, area, speeds and bank, as their makers would print them;
+# climb, sink and power are estimated.  No aircraft contributes to its own estimate: the class of a flying wing is taken
+# from the other flying wing, that of an aircraft with a tail from the other one.  Of these aircraft only the X8 is in
+# the data of the prior of drag and power, which is therefore fitted without it.
 _OTHER_WING = {
     "zagi": {"lift_slope": 0.893, "oswald": 0.829},
     "x8": {"lift_slope": 0.717, "oswald": 0.9},
@@ -193,9 +203,9 @@ INSIDE = 0.95
 
 
 def sheet_of(name: str) -> DataSheet:
-    """Return the data sheet of a published aircraft.
+    """Return the data sheet of one of `SHEETS_OF`.
 
-    Also of a Cessna, although it is not a small aircraft.
+    They include a Cessna, although it is not a small aircraft.
     """
     known = load_aircraft(name)
     top = fastest_level_flight(Fdm(known), AMSL)

@@ -52,7 +52,10 @@ BEST_FIELD = {"field_path": 0.1, "field_course": 11.0, "field_course_integral": 
 
 @dataclass(frozen=True, slots=True)
 class Errors:
-    """Errors of a flight: RMS and largest error across and in altitude, m, largest bank, degrees, and completion."""
+    """Errors of a flight: RMS and largest error across and in altitude, m, and largest bank, degrees.
+
+    It also states whether the flight was completed.
+    """
 
     cross_rms: float
     cross_max: float
@@ -99,7 +102,10 @@ def _most(values: NDArray[Any]) -> float:
 
 
 def windy(seed: int, speed: float = 10.0, turbulence: str = "moderate", share: float = 0.8, **more: Any) -> FlightSetup:
-    """Make the standard mission in a wind from the seed's direction, with slopes scaled to the model's limits."""
+    """Make the standard mission in a wind from the seed's direction.
+
+    Its slopes are limited to the fraction `share` of the model's limits in this wind.
+    """
     from_deg = float(np.random.default_rng(seed).uniform(0.0, 360.0))
     waypoints = standard()
     setup = maker()(waypoints, wind=(speed, from_deg), turbulence=turbulence, seed=seed, **more)
@@ -134,7 +140,10 @@ def moderate(seeds: Sequence[int], guidance_hz: int = 60) -> list[Errors]:
 
 
 def anywhere(seeds: Sequence[int]) -> list[Errors]:
-    """Fly in winds of 0 to 10 m/s, none to moderate turbulence."""
+    """Fly the standard mission in a random wind and turbulence, once for each seed.
+
+    The wind is 0 to 10 m/s, the turbulence none to moderate.
+    """
     found = []
     for seed in seeds:
         random = np.random.default_rng([seed, 1])
@@ -182,7 +191,10 @@ def straight_rms(setup: FlightSetup, flown: SimulatedFlight, clear: float = CLEA
 
 
 def reference_laws(seeds: Sequence[int]) -> dict[str, list[float]]:
-    """Return the RMS on the straight legs of the reference laws relative to planfly's, in the same wind, by seed."""
+    """Compare the cross-track errors of reference laws with those of planfly's guidance on straight legs.
+
+    Returns the ratios of the RMS errors in the same wind, one for each seed, by the name of the law.
+    """
     gains = load_gains(aerosonde())
     laws: dict[str, tuple[str, Gains]] = {
         "L1, ArduPlane's defaults": ("l1", gains),
@@ -202,7 +214,9 @@ def reference_laws(seeds: Sequence[int]) -> dict[str, list[float]]:
 
 @dataclass(frozen=True, slots=True)
 class LoopCost:
-    """CPU time of the closed loop relative to bare `run()`, and the real-time factor of each: medians of rounds.
+    """CPU time of the closed loop relative to bare `run()`, and the real-time factor of each.
+
+    All are medians of rounds.
 
     least: the smallest ratio of a round.
     """

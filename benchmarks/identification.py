@@ -108,9 +108,11 @@ def worse_sensors(seed: int, factor: float, *, battery: bool) -> Sensors:
 def identify(
     tracks: Sequence[Track], changed: Aircraft, base: BaseModel, seed: int, sensors: Sensors
 ) -> tuple[Estimate, Any, float]:
-    """Return the estimate, the last log, and the CPU time, s.
+    """Identify an aircraft from simulated logs; return the estimate, the last log, and the CPU time, s.
 
-    Tracks: tracks of flights with the same sensors.
+    tracks: tracks of its flights, all with the same sensors.
+    changed: the aircraft that flew.
+    base: base model of the identification.
     """
     prior = load_aircraft("aerosonde")
     logs = [sensed(track, changed, sensors, seed + 100_000 * k) for k, track in enumerate(tracks)]
@@ -149,7 +151,7 @@ def fly_missions(folder: Path, truth: Truth, seed: int) -> tuple[list[Track], Ai
 
 
 def errors(base: BaseModel, truth: Floats, estimate: Estimate) -> dict[str, Any]:
-    """Return the errors of performance, and if the true values are within their intervals."""
+    """Return the errors of climb, sink, power and drag, and if the true values are in their intervals."""
     best = performance(base, np.vstack([truth, estimate.values]), _CRUISE_MPS, DENSITY)
     drawn = performance(base, draw_aircraft(estimate), _CRUISE_MPS, DENSITY)
     low, high = np.degrees(np.percentile(drawn.climb, [2.5, 97.5]))

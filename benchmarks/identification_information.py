@@ -64,7 +64,10 @@ GLIDES = (0, 20, 60, 120, 300)
 
 
 def flown_as(base: BaseModel, values: Floats, unknown: Floats) -> Floats:
-    """Return sink (rad), power (W) and climb (rad) at cruise for these unknowns, including nuisance parameters."""
+    """Return sink (rad), power (W) and climb (rad) at cruise for these unknowns.
+
+    The unknowns include nuisance parameters.
+    """
     own = int(_IS_DRAG_PARAMETER.sum())
     resistance, idle, voltage, elevator = unknown[own + 1 : own + 5]
     motor = base.motor.with_factors(resistance=1.0 + resistance, idle=1.0 + idle)
@@ -109,9 +112,12 @@ def glide(base: BaseModel, values: Floats, seconds: float) -> ForwardForces:
 
 
 def information(forces: ForwardForces, unknown: Floats, noise: str, *, current: bool = False) -> Floats:
-    """Return the information (p, p) of the forward force, and of the current if it is used.
+    """Return the Fisher information of a log about the p unknowns of `fit_drag`, (p, p).
 
-    noise: "accelerometers", "sensors" or "model".
+    It is the information of the forward force, and of the current if `current` is True.
+
+    noise: assumed noise: "accelerometers" alone; "sensors", with the airspeed sensor; or "model", with the model error
+        that identification assumes.
     """
     rows, amperes = forces.slopes(unknown)
     step = 0.05
@@ -138,7 +144,9 @@ def information(forces: ForwardForces, unknown: Floats, noise: str, *, current: 
 def halves(precision: Floats, slopes: Floats, known: Flags) -> dict[str, float]:
     """Return half the 95 % interval of sink and power, percent, and of the climb, degrees.
 
-    Known: fixed at the truth.
+    precision: information with the prior, (p, p).
+    slopes: gradients of sink, power and climb, (3, p), as from `gradients`.
+    known: mask of the unknowns that are fixed at the truth, (p,).
     """
     inverse = np.zeros_like(precision)
     free = np.flatnonzero(~known)

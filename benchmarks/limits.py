@@ -78,7 +78,10 @@ class Limit:
 
 
 def made_setup(points: ArrayLike, aircraft: Aircraft, wind: float, wind_from: float) -> FlightSetup:
-    """Make a flight through points at cruise over flat ground, in a steady wind (m/s, rad that it blows from)."""
+    """Make a flight through points at cruise over flat ground, in a steady wind.
+
+    wind, wind_from: speed of the wind, m/s, and direction from which it blows, rad.
+    """
     waypoints = np.array(points, dtype=np.float64)
     low, high = waypoints.min(axis=0) - 3000.0, waypoints.max(axis=0) + 3000.0
     ends = [
@@ -125,7 +128,7 @@ def bisect(holds: Callable[[float], bool], good: float, bad: float) -> float:
 
 
 def slope_limit(aircraft: Aircraft, direction: float, wind: float = 0.0, wind_from: float = 0.0) -> Limit:
-    """Find the steepest climb (direction 1) or dive (-1) that is held over 1.2 km, after a level kilometre.
+    """Find the steepest climb (direction 1) or dive (-1) that is held over 1.2 km after a level 1 km.
 
     The prediction is the envelope's limit at the limiting end of the leg: the top of a climb (thinner air, less power),
     and the top of a dive (thinner air, less drag).
@@ -168,7 +171,10 @@ def _held(track: Track, airspeed: float, direction: float) -> bool:
 
 
 def leg_limit(aircraft: Aircraft, turn: float, same_way: bool, wind: float = 0.0, wind_from: float = 0.0) -> Limit:
-    """Find the shortest leg between two turns (rad each), in the same or opposite directions, at 30 degrees of bank."""
+    """Find the shortest leg between two turns (rad each) at 30 degrees of bank.
+
+    The turns are in the same direction or in opposite directions.
+    """
     courses = np.array([COURSE, COURSE + turn, COURSE + (2.0 * turn if same_way else 0.0)])
     directions = np.array([[math.sin(course), math.cos(course), 0.0] for course in courses])
     straight = 60.0 * aircraft.airspeed
@@ -220,7 +226,10 @@ def calm_limits(*, whole: bool) -> list[Limit]:
 
 
 def wind_limits(*, whole: bool) -> list[Limit]:
-    """Measure slopes and shortest legs of the Aerosonde in a wind of 10 m/s: from ahead, behind and the side."""
+    """Measure slopes and shortest legs of the Aerosonde in a wind of 10 m/s.
+
+    The wind comes from ahead, from behind and from the side.
+    """
     aircraft = load_aircraft("aerosonde")
     sides = [COURSE + part * math.pi for part in ((0.0, 0.5, 1.0, 1.5) if whole else (1.0,))]
     found = []

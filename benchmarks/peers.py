@@ -48,7 +48,11 @@ class Found:
 
 
 def found(task: Task, path: Floats, seconds: float, checks: int, inside: float, trace: Any = ()) -> Found:
-    """Certify a peer's path and collect its numbers."""
+    """Certify a peer's path and collect its numbers.
+
+    seconds: CPU time of the search, s.
+    inside: part of it that was spent in planfly's evaluation, s.
+    """
     certificate = task.certificate(path)
     problems = list(certificate.problems)
     if certificate.kill_distance <= 0.0:
@@ -60,9 +64,9 @@ def found(task: Task, path: Floats, seconds: float, checks: int, inside: float, 
 
 
 def best_path(task: Task, vectors: Floats) -> Floats:
-    """Return the first certified safe path of vectors (n, d), in the order of scalar cost.
+    """Return the path of lowest scalar cost that is certified and safe, of the paths of vectors (n, d).
 
-    Without one return the first of all.
+    If no path is, return the path of lowest cost.
     """
     order = np.argsort(scalar(*task.scores(vectors)), kind="stable")
     paths = task.encoding.decode(vectors[order])
@@ -70,7 +74,11 @@ def best_path(task: Task, vectors: Floats) -> Floats:
 
 
 def solve_with_cmaes(task: Task, seed: int, evaluations: int, *, seeded: bool = True, sigma: float = 0.05) -> Found:
-    """Search with CMA-ES in the smooth basis with restarts, from planfly's best coarse seed or the straight line."""
+    """Search with CMA-ES in the smooth basis, with restarts.
+
+    It starts from planfly's best coarse seed if `seeded`, otherwise from the straight line.  A restart begins at
+    the best path so far.
+    """
     from cmaes import CMA
 
     started, inside = time.process_time(), 0.0
@@ -141,7 +149,10 @@ def solve_with_nsga2(task: Task, seed: int, evaluations: int) -> Found:
 
 
 def solve_with_ompl(task: Task, seed: int, seconds: float, ratio: float = 0.0) -> Found:
-    """Search with Informed RRT* for a time or to a length ratio, in a process of its own, as it prints at exit."""
+    """Search with Informed RRT* for a time or to a length ratio.
+
+    It runs in a process of its own, because it prints at exit.
+    """
     command = [sys.executable, "-m", "benchmarks.ompl_peer", task.scenario.name]
     command += [str(number) for number in (seed, seconds, ratio)]
     result = subprocess.run(command, check=True, capture_output=True, text=True)
@@ -149,9 +160,9 @@ def solve_with_ompl(task: Task, seed: int, seconds: float, ratio: float = 0.0) -
 
 
 def measure(seconds: float) -> dict[str, Any]:
-    """Run every peer once on each problem, seed 1, the paper's budget, OMPL for a CPU time, s.
+    """Run every peer once on each problem, print a table and return it.
 
-    Print a table.
+    All peers use seed 1 and the paper's budget of evaluations, but OMPL runs for a CPU time, `seconds`.
     """
     print("\nPeers on the hard set and traps, seed 1: one problem, evaluation and certificate; one core, CPU s, warm")
     print(f"  {'problem':<13}{'method':<28}{'safe':>5}{'PLR':>9}{'/ best':>8}{'CPU s':>8}{'checks':>9}{'in ours':>9}")
@@ -188,7 +199,9 @@ def measure(seconds: float) -> dict[str, Any]:
 
 
 def race(seconds: float) -> dict[str, Any]:
-    """Print the CPU time to a certified path within 2 % of the best known, for OMPL's Informed RRT* and planfly.
+    """Print the CPU time of OMPL's Informed RRT* and of planfly to a nearly best certified path.
+
+    The path is at most 2 % longer than the best known one.
 
     Planfly's time begins with the call of the planner, with scenario and envelope loaded, and includes problem, grids
     and certificates.  OMPL's time begins with its first step, without certificates.  A search that does not reach the

@@ -1,9 +1,9 @@
-"""Fly default plans on three terrains with an autopilot's law or the program itself, and count violations.
+"""Fly default plans on three terrains with an autopilot's model or the program itself, and count violations.
 
 ``python -m benchmarks.planned_for_autopilots [--law LAW] [--plans N] [--from NUMBER] [--sitl PATH]`` plans random
-scenarios (`tests.autopilot_plans`: winds of 0 to 10 m/s, none to moderate turbulence, GNSS errors) for a law, flies
-each, and prints the margins of the certificate and of the flight, and at the end the number of violations, with a
-separate number for moderate turbulence.
+scenarios (`tests.autopilot_plans`: winds of 0 to 10 m/s, none to moderate turbulence, GNSS errors) for the autopilot of
+a model (LAW), flies each, and prints the margins of the certificate and of the flight, and at the end the number of
+violations, with a separate number for moderate turbulence.
 """
 
 import argparse
@@ -24,7 +24,12 @@ from world.scenario import with_flight
 
 @dataclass(frozen=True, slots=True)
 class Flown:
-    """Plan and its flight: fault, "" without one; and the added length of the reserve."""
+    """Plan and its flight.
+
+    wrong: what went wrong, "" if nothing did.
+    harm: margins of the flight; None without a plan.
+    longer: length of the plan relative to a plan without reserve for the tracking error.
+    """
 
     wrong: str
     harm: Harm | None
@@ -33,7 +38,11 @@ class Flown:
 
 
 def fly(number: int, law: str, sitl: Path | None) -> Flown:
-    """Plan and fly the scenario of this number, and print a line about it."""
+    """Plan and fly the scenario of this number, and print a line about it.
+
+    law: autopilot that the plan is made for.
+    sitl: program that flies the plan; None to fly it with the autopilot's model.
+    """
     scenario = with_flight(plan_scenario(number), **flight_entries({"autopilot": law}))
     uav = load_uav(scenario)
     plan = make_plan(scenario, uav, number + 1)

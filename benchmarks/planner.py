@@ -24,8 +24,11 @@ from planner.search.plan_path import plan_path
 from world.arrays import Floats
 from world.scenario import Scenario, load_scenario, scenario_from_spec
 
+# Largest relative difference of equal objectives.
 EQUAL = 1e-12
+# Levels by which paths are ranked: the four counts of violations, length and kill exposure, then the other objectives.
 LEVELS = (Level((0, 1, 2, 3), (0.0,) * 4), Level((4, 5), (NO_GOAL,) * 2), Level((6, 7), (NO_GOAL,) * 2))
+# Number of threats of the test of scale.
 MANY = 10_000
 
 
@@ -54,7 +57,10 @@ def repeated(evaluate: Callable[..., object], data: ProblemArrays, paths: Floats
 
 
 def evaluation() -> dict[str, Any]:
-    """Measure the evaluation of one population: by planfly, by brute force, and by one NumPy batch over all paths."""
+    """Measure the evaluation of one population by three methods.
+
+    They are planfly, brute force, and one NumPy batch over all paths.
+    """
     print("\nFull evaluation of a population (four counts, four objectives), us a path; one core, median of 5")
     print(f"  {'problem':<10}{'ours':>8}{'graded':>9}{'brute force':>13}{'NumPy batch':>13}{'NumPy / ours':>14}  equal")
     record = {}
@@ -93,7 +99,10 @@ def evaluation() -> dict[str, Any]:
 
 
 def ranking() -> dict[str, Any]:
-    """Measure exact ranks of 500 random paths of paper-60: split by level, and by the generic pairwise relation."""
+    """Measure exact ranks of 500 random paths of paper-60.
+
+    They are computed level by level, and by the generic pairwise relation.
+    """
     task = make_task("paper-60")
     counts, objectives = paper_scores(task.problem.search, random_paths(task, 500))
     scores = np.concatenate([counts.astype(np.float64), objectives], axis=1)
@@ -204,6 +213,7 @@ def _searches_of(task: Task, algorithm: str, seeds: int) -> dict[str, Any]:
     }
 
 
+# Program of a new process: it plans to the first certified path, and prints its result and CPU time.
 _FIRST = """
 import json, time
 from benchmarks.task import make_task
@@ -215,7 +225,10 @@ print(json.dumps([plan.safe, float(plan.objectives[0]), time.process_time()]))
 
 
 def cold_start() -> dict[str, Any]:
-    """Time new processes to a first certified path of hard-60, with a warm and an empty cache of compiled code."""
+    """Time new processes to a first certified path of hard-60.
+
+    The cache of compiled code is warm or empty.
+    """
     print("\nNew process, s of wall clock (CPU s of the process)")
     record: dict[str, Any] = {}
     with tempfile.TemporaryDirectory() as folder:

@@ -49,7 +49,7 @@ class Answer:
 
 
 def answer(number: int, *, judged: bool = True, flown: bool = True) -> Answer:
-    """Plan the scenario of this number, judge the plan if ``judged``, and fly it and judge the flight if ``flown``."""
+    """Plan the scenario of this number; judge the plan if ``judged``, fly and judge it if ``flown``."""
     scenario = fresh_scenario(number)
     whose = scenario.name, scenario.wind.turbulence
     began = time.process_time()

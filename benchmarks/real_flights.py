@@ -92,7 +92,12 @@ def predict_thor(folder: Path) -> tuple[dict[str, object], Path]:
 def _score_rates(
     earlier: list[FlightRecord], judged: list[FlightRecord], base: BaseModel, suffix: str
 ) -> dict[str, dict[str, float]]:
-    """Return the errors of roll, pitch and yaw rate over those of constant rates, and the share of white lags.
+    """Score predictions of roll, pitch and yaw rate by an identified model.
+
+    The model is identified from the earlier part of a flight.
+
+    Returns the errors relative to the errors of constant rates, for the identified model and for the base alone, and
+    how white the innovations are (`aircraft.identification.prediction.whiteness`).
 
     earlier, judged: parts of the flight to identify a model with this base, and to predict.
     suffix: ending of the names of the rows.

@@ -20,6 +20,7 @@ from world.geometry import MIN_RANGE_M
 from world.kernels import Records
 from world.terrain import EDGE_TOLERANCE
 
+# Number of points of a leg at which the paper's equations are evaluated.
 POINTS = 6
 
 
@@ -176,7 +177,10 @@ def _brute(
 
 
 def brute_scores(data: ProblemArrays, paths: Floats) -> tuple[Ints, Floats]:
-    """Return counts (n, 4) and objectives (n, 4) of paths (n, w, 3), compiled, without lists of near threats."""
+    """Return counts (n, 4) and objectives (n, 4) of paths (n, w, 3).
+
+    The code is compiled, and uses no lists of near threats.
+    """
     cols, rows = pixels_of(data.to_pixel, paths[..., 0], paths[..., 1])
     low = np.array([data.west, data.south, data.floor])
     high = np.array([data.east, data.north, data.ceiling])
@@ -188,7 +192,11 @@ def brute_scores(data: ProblemArrays, paths: Floats) -> tuple[Ints, Floats]:
 
 @njit
 def _prefers(u: Floats, v: Floats, columns: Ints, goals: Floats, ends: Ints) -> bool:
-    """Return True if u is preferred to v, by definition (see `planner.optimisers.preference`)."""
+    """Return True if u is preferred to v, by definition (see `planner.optimisers.preference`).
+
+    columns, goals: columns and goals of all levels, one level after another.
+    ends: index in `columns` after the last column of each level.
+    """
     begin = 0
     for level in range(ends.size):
         better, worse, equal, open_goal, better_in, worse_in = False, False, True, False, False, False
@@ -223,7 +231,7 @@ def _count_preferred(scores: Floats, columns: Ints, goals: Floats, ends: Ints) -
 
 
 def _flat(levels: Sequence[Level]) -> tuple[Ints, Floats, Ints]:
-    """Return columns and goals of all levels, and the end of each level."""
+    """Return columns and goals of all levels, one level after another, and the index after each level."""
     columns = np.array([column for level in levels for column in level.columns])
     goals = np.array([goal for level in levels for goal in level.goals])
     return columns, goals, np.cumsum([len(level.columns) for level in levels])

@@ -44,7 +44,9 @@ _TARGET = Path("runs") / "return-differences.json"
 def compare_returns(
     aircraft: str, wind: tuple[float, float], count: int, seed: int, autopilot: str
 ) -> list[tuple[float, ...]]:
-    """Return start time, clearance and distance outside a sphere of the point mass and of JSBSim, and the first turn.
+    """Compare the returns of the point mass with those of JSBSim.
+
+    Each row has the start time, clearance and distance outside a sphere of both, and the first turn.
 
     The turn is the angle between the start's course and the bearing of the target, degrees, 0 to 180.  Returns that
     cannot be flown in JSBSim are omitted.

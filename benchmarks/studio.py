@@ -75,6 +75,7 @@ new Promise((done) => {
   setTimeout(step, 200);
 })
 """
+# Script that drags a waypoint and releases it; returns the time from the release to the frame of the flown track, ms.
 RELEASE = """
 new Promise((done) => {
   const page = document.documentElement, map = document.getElementById("map"), before = page.dataset.flown;

@@ -78,7 +78,10 @@ def make_task(name: str) -> Task:
 
 
 def best_known(name: str) -> float:
-    """Return the length ratio of the best known certified path, NaN if unknown (tests/authorities/best_known.json)."""
+    """Return the length ratio of the best known certified path, NaN if unknown.
+
+    The ratios are in tests/authorities/best_known.json.
+    """
     known = json.loads(BEST_KNOWN.read_text(encoding="utf-8"))
     return float(known[name]["length_ratio"]) if name in known else float("nan")
 
@@ -97,7 +100,10 @@ def with_planner(scenario: Scenario, **changes: object) -> Scenario:
 
 
 def seed_vectors(task: Task) -> Floats:
-    """Return planfly's coarse seeds as vectors (n, d), ordered by violations, then kill exposure, then length."""
+    """Return planfly's coarse seeds as vectors (n, d).
+
+    They are ordered by violations, then kill exposure, then length.
+    """
     low, high = task.encoding.lower, task.encoding.upper
     span = (float(low[1::3].min()), float(high[1::3].max()))
     data = task.problem.search
@@ -120,7 +126,10 @@ def scalar(violations: Floats, objectives: Floats) -> Floats:
 
 
 def smooth_axes(task: Task) -> tuple[Floats, Floats]:
-    """Return directions (d, d) of the smooth basis and the spread of paths along each (d,), m."""
+    """Return the directions of the smooth basis, (d, d), and the spread of paths along each, m, (d,).
+
+    A step along a direction moves all waypoints of a path together, so that the path stays smooth.
+    """
     inner = task.encoding.waypoints - 2
     _, deviations = bridge_modes(inner)
     low, high = task.encoding.lower.reshape(inner, 3), task.encoding.upper.reshape(inner, 3)

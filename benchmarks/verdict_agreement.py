@@ -1,10 +1,10 @@
-"""Compare the verdict on the flight of an autopilot's law with the verdict on the autopilot's own flight.
+"""Compare the verdict on the flight of an autopilot's model with the verdict on the autopilot's own flight.
 
 ``python -m benchmarks.verdict_agreement [--law LAW] [--missions N] [--from SEED] [--json FILE]`` makes missions that
-keep one limit narrowly, or exceed it (`tests.field_missions.close_mission`), flies each with the law, with GNSS errors,
-and with the program that PLANFLY_ARDUPLANE (or PLANFLY_PX4) names, both in the same air, judges both flights by the
-same rules, and counts the differences.  ``--ordinary N`` instead flies ordinary missions with the law alone, and counts
-those that are not flyable.
+keep one limit narrowly, or exceed it (`tests.field_missions.close_mission`), flies each with the model, with GNSS
+errors, and with the program that PLANFLY_ARDUPLANE (or PLANFLY_PX4) names, both in the same air, judges both flights
+by the same rules, and counts the differences.  ``--ordinary N`` instead flies ordinary missions with the model alone,
+and counts those that are not flyable.
 """
 
 import argparse
@@ -34,10 +34,10 @@ GRAVE = 1.0
 class Answer:
     """Verdicts on two flights of a mission.
 
-    law, real: first line of the verdict on the law's flight and on the program's flight.
+    law, real: first line of the verdict on the model's flight and on the program's flight.
     agree: True if both are flyable or both are not.
-    harmed: True if the law's flight is flyable, and the program's flight lost clearance or entered a sphere by more
-    than a metre.
+    harmed: True if the model's flight is flyable, and the program's flight lost clearance or entered a sphere by more
+        than a metre.
     """
 
     name: str
@@ -54,14 +54,17 @@ def setup_of(made: FieldMission) -> tuple[FlightSetup, Uav]:
 
 
 def by_law(made: FieldMission) -> tuple[Verdict, float]:
-    """Return the verdict on the law's flight, and its energy, Wh."""
+    """Return the verdict on the model's flight, and its energy, Wh."""
     setup, uav = setup_of(made)
     flown = fly_to_end(Flight(setup, uav.aircraft))
     return judge_flight(setup, flown.track, flown.ended), float(flown.track.energy[-1])
 
 
 def by_program(made: FieldMission, program: Path) -> tuple[Verdict, bool]:
-    """Return the verdict on the program's flight, and True if it violated clearance or a sphere by over `GRAVE`."""
+    """Return the verdict on the program's flight, and True if it has a grave violation.
+
+    A violation of the clearance or of a sphere is grave if it exceeds `GRAVE`.
+    """
     setup, _ = setup_of(made)
     flown = fly_and_judge(setup, autopilot=program)
     threats, position = made.scenario.threats, flown.track.position
@@ -72,7 +75,7 @@ def by_program(made: FieldMission, program: Path) -> tuple[Verdict, bool]:
 
 
 def compare(seed: int, law_name: str, program: Path) -> Answer:
-    """Fly the mission of a seed by both."""
+    """Fly the mission of a seed with the model and with the program, and compare the verdicts."""
     flight = {name: value for name, value in flight_entries({"autopilot": law_name}).items() if value is not None}
     made = close_mission(seed, energy=lambda ordinary: by_law(ordinary)[1], **flight)
     (law, _), (real, lost) = by_law(made), by_program(made, program)

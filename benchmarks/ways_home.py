@@ -2,9 +2,9 @@
 
 ``python -m benchmarks.ways_home [--every S] [--fresh N] [--whole N]`` plans and flies the demo, and judges its returns
 as `planfly returns` does: alone, with the glides, and with the search for rally points.  With the suggested points it
-then returns from N places that the search has not used, by the law on a point mass, and from N of them by the whole law
-in JSBSim, and prints the lowest clearance and the nearest sphere.  Times are measured in the second pass, without
-compilation and cold caches.
+then returns from N places that the search has not used, with a point mass, and from N of them with the simulated
+autopilot in JSBSim, and prints the lowest clearance and the nearest sphere.  Times are measured in the second pass,
+without compilation and cold caches.
 """
 
 import argparse
@@ -50,7 +50,10 @@ def fresh_places(flown: planfly.FlownMission, every: float, count: int) -> Retur
 
 
 def fly_fresh(world: ReturnWorld, starts: ReturnStarts, whole: int) -> None:
-    """Fly returns from fresh places, and print the number of unsafe ones."""
+    """Fly returns from fresh places, and print the number of unsafe ones.
+
+    whole: number of these returns that are also flown in JSBSim.
+    """
     found = judge_returns(world, starts, 0.0)
     low = [one.clearance for one in found.each]
     outside = [one.sphere_distance for one in found.each]

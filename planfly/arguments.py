@@ -124,7 +124,8 @@ CHOICES: Mapping[str, tuple[Any, ...]] = {
 def check_arguments(**arguments: Any) -> None:
     """Raise ArgumentError for the first argument that is outside its range or not an allowed word.
 
-    arguments: value of each argument, keyed by its name in `RANGES` or `CHOICES`; None if it was not given.
+    arguments: value of each argument, keyed by its name in `RANGES` or `CHOICES`; None if it was not given.  A keyword
+    of `CHOICES` may also have a tuple of allowed words.
 
     >>> check_arguments(seed=3, log_hz=60, max_hours=None)
     >>> check_arguments(directions=3)

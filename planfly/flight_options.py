@@ -273,7 +273,7 @@ def select_mission_options(options: MissionOptions) -> MissionOptions:
 
 
 def select_log_and_mission_options(options: LogOptions) -> LogOptions:
-    """Return the options of a mission or of the log of another program, without the options of a radio link."""
+    """Return the options without those of a radio link, for `planfly.judge`."""
     return cast(LogOptions, {name: value for name, value in options.items() if name in LogOptions.__annotations__})
 
 
@@ -301,7 +301,10 @@ class NamedFences:
     rally: tuple[MissionItem, ...] = ()
 
     def add_to_mission(self, mission: Mission) -> Mission:
-        """Add fence and rally points to a mission; warnings state that those of the mission still apply."""
+        """Add the named fences and rally points to a mission, which is unchanged without any.
+
+        Warnings say that the fences and rally points of the mission still apply.
+        """
         if not self.items and not self.rally:
             return mission
         warnings = mission.warnings
@@ -323,7 +326,7 @@ class NamedFences:
 
 
 def read_named_fences(files: FencePaths) -> NamedFences:
-    """Read one or more files of fences, zones or rally points; the suffix of each file determines its format.
+    """Read files of fences, zones or rally points; the suffix of each file determines its format.
 
     Raises MissionError or ScenarioError for a file that cannot be read, for a file without a fence or a rally point,
     and for invalid shapes.
@@ -419,7 +422,7 @@ def apply_options(
 
 
 def _check_aircraft_options(scenario: Scenario, options: FlightOptions) -> None:
-    """Raise ArgumentError for an aircraft of the options that is unknown, and an airspeed at which it does not fly.
+    """Raise ArgumentError if the options name an unknown aircraft, or an airspeed that it cannot fly.
 
     A wrong value in the file of the aircraft raises FlightError.  An unknown aircraft of the scenario raises
     nothing here.

@@ -41,6 +41,9 @@ def with_airspeed_scale(signals: Signals, flow: Flow) -> Signals:
 def airspeed_scale(signals: Signals, flow: Flow) -> tuple[float, float]:
     """Return the ratio of true to measured airspeed, and its standard deviation.
 
+    The ratio, an error of the heading and a mean wind for each record are fitted to the velocities. The residuals are
+    taken as gusts, whose autocorrelation is removed before the fit.
+
     The flow is used only for the direction of the airspeed, to which the scale is insensitive to first order.
     """
     from scipy.signal import lfilter

@@ -111,7 +111,7 @@ class Band:
 
     @property
     def is_informative(self) -> bool:
-        """True if the band is narrower than the band without a model (`unchanged`), or if that band is unknown."""
+        """True if the band is narrower than the band without a model (`unchanged`), or that is unknown."""
         return not self.half_width >= self.unchanged
 
     @property
@@ -151,7 +151,7 @@ class BlindPrediction:
 
     earlier: records before the judged part, for biases, trims, filters and errors.
     judged: records of the judged part.
-    clocks: clocks of the log, from the earlier part.
+    clocks: lags and delays of the log's sensors and servos, estimated from the earlier part.
     base: the central aircraft.
     window: length of a window, s.
     """
@@ -192,6 +192,9 @@ class BlindPrediction:
 
     def bands(self, draws: Sequence[BaseModel]) -> tuple[Band, ...]:
         """Return the band of each of `QUANTITIES` in the judged windows.
+
+        Each draw predicts every window, and gets the prediction errors of a random window of the earlier part.  The
+        bands are those of `band_limits` for these predictions.
 
         draws: draws of the aircraft with which the windows are predicted.
         """

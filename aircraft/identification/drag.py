@@ -89,7 +89,7 @@ class ForwardForces:
     volts: Floats | float
 
     def predict(self, unknown: Floats) -> tuple[Floats, Floats]:
-        """Predict the forward acceleration, m/s^2, and the current, A, both low-pass filtered, two arrays (n,).
+        """Predict forward acceleration, m/s^2, and current, A, both low-pass filtered, two arrays (n,).
 
         unknown: values of the parameters, then of the nuisance parameters.
         """
@@ -114,7 +114,7 @@ class ForwardForces:
         return force / self.base.mass + bias, current
 
     def slopes(self, unknown: Floats) -> tuple[Floats, Floats]:
-        """Return the derivatives of forward acceleration and current with respect to the unknowns, two arrays (n, p).
+        """Return the derivatives of acceleration and current by the unknowns, two arrays (n, p).
 
         The p unknowns are those of `predict`.
         """
@@ -132,7 +132,7 @@ class ForwardForces:
 def fit_drag(
     signals: Signals, base: BaseModel, values: Floats, flow: Flow, uncertainty: AlphaUncertainty | None = None
 ) -> tuple[Fit, Floats, Floats]:
-    """Fit the five parameters of drag and motor; return the fit, the values (5,) and their covariance (5, 5).
+    """Fit the five parameters of drag and motor; return the fit, values (5,) and covariance (5, 5).
 
     values: (n,) values of all parameters, of which the parameters of lift are used.
     uncertainty: uncertainty of the lift curve; None for a default.
@@ -174,12 +174,14 @@ def drag_priors(*, with_current: bool) -> tuple[Floats, Floats]:
 
 
 def _fold_nuisances(forces: ForwardForces, unknown: Floats) -> tuple[Floats, Floats]:
-    """Change the five parameters so that they replace the aircraft's fitted nuisance parameters, by least squares.
+    """Change the five parameters so that they include the effect of the fitted nuisance parameters.
+
+    The model of the identified aircraft does not have these nuisance parameters. The five parameters are therefore
+    changed by least squares, so that force and current without them differ least from force and current with them.
 
     unknown: (p,) fitted values of the unknowns.
 
-    The differences of force and current over the signals are minimised. Returns the values of the parameters (5,), and
-    their derivatives with respect to the unknowns, (5, p).
+    Returns the values of the parameters (5,), and their derivatives with respect to the unknowns, (5, p).
     """
     parameter_count = int(_IS_DRAG_PARAMETER.sum())
     nuisance_indices = parameter_count + np.flatnonzero(_IS_OF_AIRCRAFT)

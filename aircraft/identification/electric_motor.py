@@ -97,7 +97,7 @@ class ElectricMotor:
         return thrust, self.power_ratio * throttle * current + self.avionics / volts
 
     def propeller_torque(self, airspeed: Floats, throttle: Floats, density: Floats) -> Floats:
-        """Return the propeller torque, N m, (n,). A positive torque rolls the aircraft to the left by its reaction."""
+        """Return the propeller torque, N m, (n,); the reaction to a positive torque rolls to the left."""
         speed = self.speed(airspeed, throttle, density, self.voltage)
         q2, q1, q0 = self._torque_coefficients(airspeed, density)
         return np.asarray(q2 * speed * speed + q1 * speed + q0)

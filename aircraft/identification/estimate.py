@@ -262,7 +262,7 @@ def fit_parameters(
     dynamics: bool = True,
     nominal: Refinement | None = None,
 ) -> Estimate:
-    """Estimate all parameters from aligned signals, without the shifts from quantities that are held fixed.
+    """Estimate all parameters from aligned signals, without the shifts from fixed quantities.
 
     lift: (2,) values of slope and offset of the lift curve to hold fixed; None to estimate them.
     level: error of the level of the autopilot, rad.
@@ -311,7 +311,10 @@ def fit_parameters(
 
 
 def alpha_uncertainty(fit: Fit, lift: Floats) -> AlphaUncertainty:
-    """Return the uncertainty of the angle of attack from a fit of the lift curve and from the level."""
+    """Return the uncertainty of the angle of attack: from the lift fit, and from the autopilot's level.
+
+    lift: (n,) lift coefficients of the fitted signals.
+    """
     slope_sd, offset_sd = np.sqrt(np.diag(fit.covariance)).tolist()
     return AlphaUncertainty(float(np.hypot(offset_sd, LEVEL_SD)), slope_sd, float(lift.mean()))
 

@@ -15,7 +15,7 @@ from aircraft.identification.motor import Motor
 from aircraft.identification.parameters import INDEX
 from world.arrays import Floats
 
-# Cutoff of the vane, Hz.
+# Cutoff of the low-pass of the flow angles from the accelerometers, which serve as a vane, Hz.
 VANE_CUTOFF_HZ = 8.0
 
 
@@ -56,7 +56,7 @@ def dynamic_force(signals: Signals, base: BaseModel) -> Floats:
 
 
 def rate_and_elevator_lift(signals: Signals, base: BaseModel) -> Floats:
-    """Return the lift coefficient due to pitch rate and elevator, with the derivatives of the base model, (n,)."""
+    """Return the lift coefficient due to pitch rate and elevator, by the base model's derivatives, (n,)."""
     c = base.coefficients
     pitching = signals.rates[:, 1] * base.chord / (2.0 * signals.airspeed)
     return np.asarray(c.lift_rate * pitching + c.lift_elevator * signals.surfaces[:, 0])

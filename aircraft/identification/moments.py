@@ -93,7 +93,8 @@ def required_moments(signals: Signals, base: BaseModel, motor: Motor) -> dict[Gr
 def _moment_regressors(signals: Signals, base: BaseModel) -> dict[Group, list[Floats]]:
     """Return the terms of the moment coefficient of each axis, arrays (n,).
 
-    The first term of an axis is the known part. Each of the others belongs to one parameter.
+    The first term of an axis is the part that no parameter changes. Each of the others is multiplied by one parameter,
+    in the order of `PARAMETERS`.
     """
     c = base.coefficients
     alpha, beta = signals.extra["alpha"], signals.extra["beta"]

@@ -78,7 +78,7 @@ class MotorTable:
         return np.asarray(self.thrust_factor * ratio * speed**2 * thrust), np.asarray(np.maximum(0.0, current))
 
     def propeller_torque(self, airspeed: Floats, throttle: Floats, density: Floats) -> Floats:
-        """Return the propeller torque, N m, (n,). A positive torque rolls the aircraft to the left by its reaction."""
+        """Return the propeller torque, N m, (n,); the reaction to a positive torque rolls to the left."""
         torque = self._interpolate(self.torques, airspeed / self.speed, throttle)
         return np.asarray(self.load * density / self.density * self.speed**2 * torque)
 
@@ -92,7 +92,7 @@ class MotorTable:
 
 
 def _find_cells(grid: Floats, values: Floats) -> tuple[Ints, Floats]:
-    """Return for each value the index of the grid point below it, and its fraction of the step to the next.
+    """Return the index of the grid point below each value, and the value's fraction of the grid step.
 
     A value beyond an end of the grid is clipped to the end.
     """

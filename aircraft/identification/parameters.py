@@ -17,7 +17,7 @@ Group = Literal["lift", "drag", "pitch", "roll", "yaw"]
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """One unknown quantity.
+    """Quantity of an aircraft that is estimated from logs, and its prior: the assumption without logs.
 
     name: name after ``ident/`` in the model.
     title: name in texts.

@@ -99,8 +99,11 @@ class GustFilter:
 
 
 class Predictor:
-    """A model with the trim offsets and the filtered unmodelled moments of one log.
+    """Predicts the motion in a log by a model, from measured states up to a second ahead.
 
+    It determines the trim offsets and the unmodelled moments in the log first.
+
+    base, values: base model, and values of its parameters, (n,).
     filters: filters of roll, pitch and yaw; None for the filters with the smallest innovations.
     trims: (3,) trim offsets as angular accelerations, rad/s^2; None for the means over each record of the log.
     with_flow: True to use the measured flow angles and airspeed at all times, for an estimate; False to predict them.

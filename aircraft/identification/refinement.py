@@ -67,7 +67,7 @@ class Refinement:
     gains: Floats
 
     def values_for(self, signals: Signals, base: BaseModel, values: Floats) -> Floats:
-        """Return the refined values (m,) for other signals, another base, or other parameters of lift and drag.
+        """Return the refined values (m,) for other signals, another base, or other lift and drag.
 
         The values are not refined again: they change by the gains times the change of the prediction errors.
 

@@ -36,7 +36,10 @@ CORNERS = 50
 
 
 def flown_path(hours: float) -> np.ndarray:
-    """Return lanes (w, 3) of ten legs to the north and back, 1,500 m apart, for some hours at 25 m/s, m."""
+    """Return the waypoints of a flight of some hours at 25 m/s, m, (w, 3).
+
+    The flight follows parallel lanes of ten legs each, alternately to the north and to the south, 1,500 m apart.
+    """
     count = math.ceil(hours * 3600.0 * SPEED / LEG)
     points, north, lane, heading = [(0.0, 0.0)], 0.0, 0.0, 1.0
     for k in range(count):

@@ -84,9 +84,9 @@ def draw_scenario(number: int, draw: int) -> Scenario | None:
 
 
 def _zones(rng: np.random.Generator, ends: Floats) -> list[dict[str, Any]]:
-    """Draw exclusions along the path, some with a floor or ceiling.
+    """Draw exclusion zones along the path, some with a floor or ceiling.
 
-    In every third scenario an inclusion around it.
+    About every third scenario also has an inclusion zone around the path.
     """
     made: list[dict[str, Any]] = []
     step, side = ends[1] - ends[0], np.array([ends[0, 1] - ends[1, 1], ends[1, 0] - ends[0, 0]])
@@ -115,7 +115,10 @@ def _zones(rng: np.random.Generator, ends: Floats) -> list[dict[str, Any]]:
 
 
 def star(rng: np.random.Generator, place: Floats, radius: float, corners: int, least: float = 0.4) -> list[list[float]]:
-    """Draw a ring of corners around a place, at distances between `least` times the radius and the radius, m."""
+    """Draw a ring of corners around a place.
+
+    The corners are at distances between `least` times the radius and the radius, m.
+    """
     turns = (np.arange(corners) + rng.uniform(-0.35, 0.35, corners)) * 2.0 * math.pi / corners
     away = radius * rng.uniform(least, 1.0, corners)
     return [
@@ -124,10 +127,12 @@ def star(rng: np.random.Generator, place: Floats, radius: float, corners: int, l
 
 
 def passable(scenario: Scenario) -> bool:
-    """Return True if a grid path exists: monotone along, within slopes, 45 degree turns and band, outside the zones.
+    """Return True if a search on a grid finds a path, so that a plan must exist.
 
-    States are (course of -45, 0 or +45 degrees from the line, place across, layer); each stage advances one pitch
-    along. A cell is open if it and its surroundings are within the reduced band, and outside all enlarged zones.
+    The search goes in stages along the line from start to destination, by one pitch of the grid each. A path goes
+    straight on or turns by 45 degrees, keeps within the slopes and the reduced band of heights, and stays outside all
+    enlarged zones. ``state[course + 1, across, layer]`` is True if a path reaches the place across the line and the
+    layer of altitude on a course of -45, 0 or +45 degrees from the line.
     """
     start, destination = scenario.start, scenario.destination
     span = destination[:2] - start[:2]
@@ -167,7 +172,13 @@ def passable(scenario: Scenario) -> bool:
 
 
 def _band(scenario: Scenario, places: Floats, pitch: float) -> tuple[Floats, Floats]:
-    """Return the lowest and highest altitude of a path at places (s, y, 2), by the surrounding ground, m AMSL."""
+    """Return the lowest and highest altitude of a path at each place, m AMSL, (s, y) each.
+
+    The lowest altitude is counted from the highest ground within half a pitch of the place, the highest altitude from
+    the lowest ground there.
+
+    places: east and north of the places, m, (s, y, 2): stages along the line, and places across it.
+    """
     terrain = scenario.terrain
     assert terrain is not None
     low, high = np.full(places.shape[:2], -np.inf), np.full(places.shape[:2], np.inf)
@@ -179,7 +190,10 @@ def _band(scenario: Scenario, places: Floats, pitch: float) -> tuple[Floats, Flo
 
 
 def _open(scenario: Scenario, places: Floats) -> Flags:
-    """Return True for places (s, y, 2) on the map and outside every zone at all heights, with margins."""
+    """Return a mask (s, y): True for places (s, y, 2) that are on the map and in no zone, with margins.
+
+    Zones count at all heights.
+    """
     free = (np.abs(places) < HALF - ZONE_ROOM).all(axis=-1)
     for zone in scenario.spec.zones or ():
         if zone.radius_m is not None:
@@ -205,7 +219,10 @@ def ring_distance(ring: Floats, places: Floats) -> Floats:
 
 
 def _slopes(scenario: Scenario) -> tuple[float, float]:
-    """Return the climb and dive limits for all courses, rad, reduced by a tenth for turbulence and by half a degree."""
+    """Return the climb and dive limits for all courses, rad.
+
+    They are the smallest limits, reduced by a tenth for turbulence and by half a degree.
+    """
     limits = load_uav(scenario).limits
     up = float(max(scenario.start[2], scenario.destination[2])) + 100.0
     found = np.array([limits.slopes(course, up) for course in np.radians(np.arange(0, 360, 15))])
@@ -218,7 +235,11 @@ def _slopes(scenario: Scenario) -> tuple[float, float]:
 
 
 def _climbed(cells: Flags, climb: int, dive: int) -> Flags:
-    """Return the layers that one stage reaches from the given ones (across, layers)."""
+    """Return a mask (across, layers) of the layers that a climb or dive over one stage reaches.
+
+    cells: mask of the layers at the start of the stage, (across, layers).
+    climb, dive: number of layers that the stage can climb or dive.
+    """
     out = cells.copy()
     for step in range(1, climb + 1):
         out[:, step:] |= cells[:, :-step]

@@ -84,7 +84,10 @@ def over_simulate(base: CampaignBase, flights: int = 20) -> float:
 
 
 def proof(folder: Path, share: float) -> tuple[int, float]:
-    """Return flights and seconds of ``planfly campaign jacksboro-air --prove SHARE``, with planning and report."""
+    """Return flights and seconds of ``planfly campaign jacksboro-air --prove SHARE``.
+
+    The seconds include planning and report.
+    """
     started = time.perf_counter()
     command = [sys.executable, "-m", "planfly", "campaign", "jacksboro-air", "--prove", str(share), "--seed", "1"]
     done = subprocess.run(

@@ -52,6 +52,6 @@ def client_memory(flights: int) -> float:
 if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as name:
         lead(int(sys.argv[1]), Path(name))
-    # Of this process alone: what getrusage tells is at least what the process that started it had.
+    # The largest size of this process alone; getrusage returns at least the size of the process that started it.
     status = Path("/proc/self/status").read_text(encoding="ascii").splitlines()
     print(next(int(line.split()[1]) / 1024.0 for line in status if line.startswith("VmHWM")))

@@ -52,7 +52,7 @@ def describe_flight(base: CampaignBase, index: int) -> tuple[str, str, bool]:
 
 
 def fly_campaign_flights(name: str, engine: EngineChoice, flights: int) -> tuple[list[tuple[str, str, bool]], float]:
-    """Fly flights of a campaign in this process; return their descriptions and the largest resident size, MB."""
+    """Fly flights of a campaign in this process; return descriptions and the peak resident size, MB."""
     base = open_base(name, engine)
     described = [describe_flight(base, index) for index in range(flights)]
     status = Path("/proc/self/status").read_text(encoding="ascii").splitlines()

@@ -85,7 +85,10 @@ def _without_gusts(made: FieldMission, speed: float) -> FlightSetup:
 
 
 def _max_distance(setup: FlightSetup, uav: Uav) -> float:
-    """Return the largest distance between the flights at both step rates at the same time, m."""
+    """Return the largest distance between the flights at both step rates at the same time, m.
+
+    It is infinite if the flights ended differently, or differ in length by more than one tick.
+    """
     one, other = (_flown(setup, uav, hz) for hz in (120, 60))
     rows = min(len(one.track), len(other.track))
     # The flights may differ by one tick in length.
@@ -123,7 +126,7 @@ def _each(seeds: range, aircraft: str) -> Iterator[StepRates]:
 
 
 def main() -> None:
-    """Fly and print."""
+    """Compare the flights of random missions at both step rates, and print a table."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.campaigns.compare_step_rates")
     parser.add_argument("--missions", type=int, default=200)
     parser.add_argument("--from", dest="first", type=int, default=0, help="seed of the first mission")

@@ -22,13 +22,16 @@ SOBOL_FLIGHTS = 1024
 
 @lru_cache
 def _shares(quantities: int, seed: int) -> NDArray[np.float64]:
-    """Return quantiles (SOBOL_FLIGHTS, quantities) of each quantity's distribution, 0 to 1."""
+    """Return the quantile (0 to 1) of each quantity for each flight, (SOBOL_FLIGHTS, quantities)."""
     out: NDArray[np.float64] = qmc.Sobol(quantities, scramble=True, seed=seed).random(SOBOL_FLIGHTS)
     return out
 
 
 def sobol_draw(dispersions: Dispersions, seed: int, index: int) -> Draw:
-    """Return a flight's draw; index: from 0 to before SOBOL_FLIGHTS."""
+    """Return the draw of a flight, whose varying quantities are a Sobol sample.
+
+    index: number of the flight, from 0 to SOBOL_FLIGHTS - 1.
+    """
     shares = dict(zip(dispersions.varying, _shares(len(dispersions.varying), seed)[index].tolist(), strict=True))
     drawn = {one.quantity: one.value(share) for one, share in shares.items()}
     gusts = int(np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(index,))).integers(2**63))

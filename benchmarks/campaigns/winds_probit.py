@@ -37,7 +37,10 @@ _TARGET = Path("runs") / "winds-probit.json"
 
 
 def fit_probit(speeds: Floats, failed: NDArray[np.bool_]) -> tuple[float, float]:
-    """Return the wind of 50 % failures and the width of the normal distribution, m/s, of greatest likelihood."""
+    """Return the wind in which 50 % of the flights fail, and the standard deviation of this wind, m/s.
+
+    They maximise the likelihood times a wide normal prior.
+    """
 
     def loss(parameters: Floats) -> float:
         """Return the negative log-likelihood of scaled mean and logarithm of the width."""
@@ -50,7 +53,10 @@ def fit_probit(speeds: Floats, failed: NDArray[np.bool_]) -> tuple[float, float]
 
 
 def boundary(speeds: Floats, failed: NDArray[np.bool_], fraction: float) -> float:
-    """Return the wind in which a fraction of the flights fails, from 0 to the largest wind of the search, m/s."""
+    """Return the wind in which a fraction of the flights fails, m/s.
+
+    It is at least 0 and at most the largest wind of the search.
+    """
     center, width = fit_probit(speeds, failed)
     return float(np.clip(center + width * norm.ppf(fraction), 0.0, GOAL.most))
 

@@ -95,7 +95,7 @@ def found_winds() -> WindsResult:
 
 
 def winds_row() -> dict[str, float]:
-    """Return the number of flights of the search, and of the reference's directions that are right within 0.5 m/s."""
+    """Count the flights of the search, and its directions that agree with the reference, by row name."""
     found = found_winds()
     kept = json.loads(REFERENCE.read_text(encoding="utf-8")) if REFERENCE.exists() else {}
     pairs = [(found.boundaries[int(direction)].estimate, points) for direction, points in kept.items()]
@@ -115,9 +115,11 @@ def is_within(boundary: float, points: list[dict[str, Any]], confidence: float) 
 
 
 def reference_interval(points: list[dict[str, Any]], confidence: float) -> tuple[float, float]:
-    """Return the interval of the reference's boundary, m/s.
+    """Return the confidence interval of the reference's boundary, m/s.
 
-    For confidence 0 the most likely boundary twice.
+    For confidence 0 both ends are the most likely boundary.
+
+    points: wind speed, number of flights and of flyable flights at each wind of one direction.
 
     >>> points = [{"speed": 8.0, "flights": 1000, "flyable": 995}, {"speed": 9.0, "flights": 1000, "flyable": 985}]
     >>> [round(one, 1) for one in reference_interval(points, 0.0)]
@@ -158,7 +160,7 @@ def _enough_fly(points: list[dict[str, Any]]) -> bool:
 
 
 def _log_likelihood(points: list[dict[str, Any]]) -> NDArray[np.float64]:
-    """Return the log-likelihood (slopes, boundaries)."""
+    """Return the log-likelihood of the outcomes for each slope (rows) and boundary (columns) of the grids."""
     speeds, flights, flyable = (np.array([one[name] for one in points]) for name in ("speed", "flights", "flyable"))
     x = norm.isf(GOAL.target) + _SLOPES[:, None, None] * (speeds - _BOUNDARIES[:, None])
     out: NDArray[np.float64] = (flyable * norm.logsf(x) + (flights - flyable) * norm.logcdf(x)).sum(axis=-1)
@@ -166,9 +168,10 @@ def _log_likelihood(points: list[dict[str, Any]]) -> NDArray[np.float64]:
 
 
 def _winds_to_fly(boundary: float, beyond: bool, points: list[dict[str, Any]]) -> list[float]:
-    """Return winds below and above a boundary, m/s.
+    """Return the winds at which flights show that a boundary is right, m/s: one below it and one above it.
 
-    Only below if it is beyond the search, and lower if it is wrong.
+    For a boundary beyond the largest wind of the search there is only a wind below it, and a lower one if too few
+    flights were flyable there.
     """
     below = round(max(0.0, boundary - WITHIN), 2)
     if not beyond:

@@ -81,7 +81,10 @@ def reference_ratios(names: Sequence[str], tasks: Sequence[Task], kept: Path) ->
 
 
 def measure(tasks: Sequence[Task], reference: Floats, algorithms: Sequence[str], runs: int) -> dict[str, Any]:
-    """Run each algorithm on each task, compare with the reference ratios (n,), print a table and return it."""
+    """Run each algorithm on each task, print a table of comparisons and return it.
+
+    The results are compared with the reference ratios (n,).
+    """
     ratios = np.full((len(algorithms), len(tasks), runs), np.nan)
     seconds = np.zeros(ratios.shape)
     for at, task in enumerate(tasks):

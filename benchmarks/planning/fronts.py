@@ -84,7 +84,7 @@ class Contest:
         return hypervolume(scaled, np.ones(4))
 
     def certified(self, paths: Floats) -> Floats:
-        """Return the 20 certified and safe paths of (n, w, 3) that cover most."""
+        """Return those 20 certified and safe paths of (n, w, 3) that together have the largest hypervolume."""
         safe = [path for path in paths if self._is_safe(path)]
         if not safe:
             return paths[:0]
@@ -187,7 +187,10 @@ def theirs(
 
 
 def _thinned(contest: Contest, vectors: Floats) -> Floats:
-    """Return the paths of vectors (n, d) that cover most, five times the required number."""
+    """Return the paths of vectors (n, d) that contribute most to the hypervolume.
+
+    Five times the required number is returned.
+    """
     paths = contest.task.to_paths(vectors[-20_000:])
     objectives = contest.task.objectives(contest.task.values(paths))
     chosen: list[int] = []
@@ -250,7 +253,7 @@ def _rows(name: str, seed: int, *, whole: bool, alone: bool) -> tuple[dict[str, 
 
 
 def _covering_first(contest: Contest, vectors: Floats) -> Floats:
-    """Return vectors (n, d) in the order of their coverage, infeasible ones last."""
+    """Return vectors (n, d) in the order of their contributions to the hypervolume, infeasible ones last."""
     objectives, violations = contest.task.scores(contest.task.to_paths(vectors))
     met = np.flatnonzero((violations <= 0.0).all(axis=1))
     first = met[covering_order(objectives[met], contest.reference, len(met))]

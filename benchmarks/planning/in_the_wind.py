@@ -3,9 +3,9 @@
 ``python -m benchmarks.planning.in_the_wind [--missions N] [--from NUMBER] [--setting TEXT] [--planned] [--json FILE]``
 plans missions (`tests.autopilot_plans`: measured and synthetic terrain, ten missiles each) three times, in a wind of
 10 m/s at the altitude of the start from a random direction: for length, for time and for energy. Each plan is flown by
-the law in JSBSim, and its flight time and energy are compared with the flight of the shortest path. Settings are the
-wind's increase with altitude (none; 1 m/s every 100 m, similar to a power law with exponent 1/4 between 100 m and
-500 m) and the aircraft (the Aerosonde at 25 m/s, the X8 at 18 m/s).
+the simulated autopilot in JSBSim, and its flight time and energy are compared with the flight of the shortest path.
+Settings are the wind's increase with altitude (none; 1 m/s every 100 m, similar to a power law with exponent 1/4
+between 100 m and 500 m) and the aircraft (the Aerosonde at 25 m/s, the X8 at 18 m/s).
 
 ``--bound`` instead prints two lower bounds of the time relative to the shortest path, for the same wind at every
 altitude and ignoring obstacles: straight to the destination at the true airspeed of the ceiling; and the fastest
@@ -49,9 +49,12 @@ OBJECTIVES = ("length", "time", "energy")
 
 @dataclass(frozen=True, slots=True)
 class Flown:
-    """Plan and its flight: time (s), energy (Wh), length ratio, CPU time of the plan (s).
+    """Plan and its flight.
 
-    The failure, "" if flown.
+    seconds, energy: flight time, s, and energy, Wh.
+    length_ratio: length of the plan relative to the straight line.
+    cpu: CPU time of the plan, s.
+    wrong: what went wrong, "" if nothing did.
     """
 
     seconds: float
@@ -75,9 +78,9 @@ def mission(number: int, aircraft: str, gradient: float, objective: str) -> Scen
 
 
 def fly(scenario: Scenario, seed: int, *, planned: bool) -> Flown:
-    """Plan a scenario and fly the plan by the law.
+    """Plan a scenario and fly the plan in JSBSim.
 
-    If `planned`, compute time and energy from the legs only.
+    planned: True to compute time and energy from the legs of the plan instead, without a flight.
     """
     uav = load_uav(scenario)
     began = time.process_time()
@@ -141,7 +144,12 @@ def _straight_seconds(scenario: Scenario, limits: Limits, course: float, level: 
 
 
 def bounds(name: str, first: int, count: int) -> Floats:
-    """Return lower bounds of the time (n, 2) relative to the shortest path's time by its legs, and print them."""
+    """Print and return lower bounds of the flight time, (n, 2).
+
+    They are relative to the time of the shortest path by its legs.
+
+    The columns are the two bounds that the module describes; the rows of missions without a safe plan are NaN.
+    """
     assert SETTINGS[name]["gradient"] == 0.0
     ratios, detours = np.full((count, 2), np.nan), np.full(count, np.nan)
     for row, number in enumerate(range(first, first + count)):

@@ -43,7 +43,12 @@ PATTERNS = 1500
 
 
 class Lattice(NamedTuple):
-    """Places of a lattice: open flags (columns, rows, layers), layer distance and position of the first place, m."""
+    """Places of a lattice.
+
+    open: True for open places, (columns, rows, layers).
+    layer: distance between layers, m.
+    west, south, bottom: position of the first place, m.
+    """
 
     open: Flags
     layer: float
@@ -73,8 +78,10 @@ def make_lattice(task: Task) -> Lattice:
 class Tree(NamedTuple):
     """Shortest routes between one place and all others of a lattice; arrays are flat.
 
-    lengths: m, inf without a route.  parents: next place towards the first, -1 without one.  classes: sums of the
-    missiles' weights for the sides on which the route passes them.
+    lengths: length of the route to each place, m; inf without a route.
+    parents: number of the next place on the route from each place towards the first one; -1 without one.
+    classes: number that tells routes apart by the sides on which they pass the missiles: the sum of a random weight for
+        each missile and side.
     """
 
     lengths: Floats
@@ -96,8 +103,13 @@ def _tree(
 ) -> tuple[Floats, Ints, Ints]:
     """Compute the `Tree` of a lattice by Dijkstra's algorithm.
 
-    layer: distance between layers, m.  climb, dive: tangents.  forward: True for routes from home, False for routes to
-    it.  units, weights: data of the missiles, from `_units`.
+    free: True at open places, (columns, rows, layers); a place has the number (column * rows + row) * layers + layer.
+    layer: distance between layers, m.
+    steps: steps on the map in columns and rows, (s, 2).
+    home: column, row and layer of the place where the routes begin or end.
+    climb, dive: tangents of the steepest climb and dive.
+    forward: True for routes from home, False for routes to it.
+    units, weights: data of the missiles, from `_units`.
     """
     columns, rows, layers = free.shape
     lengths, parents = np.full(free.size, np.inf), np.full(free.size, -1)
@@ -135,10 +147,10 @@ def _tree(
 
 @njit
 def _passed(a: int, b: int, c: int, d: int, units: Floats, weights: Ints) -> int:
-    """Sum the weights of the missiles that a step from column a, row b to c, d passes.
+    """Sum the weights of the missiles that a step from column a, row b to column c, row d passes.
 
-    Negative against the course.
-    A step passes a missile if it crosses the line through it perpendicular to the course from start to destination.
+    A step passes a missile if it crosses the line through the missile that is perpendicular to the course from start to
+    destination.  The weight depends on the side on which it passes, and is negative if it passes against the course.
     """
     total = 0
     for m in range(units.shape[0]):
@@ -163,9 +175,11 @@ def _trace(parents: Ints, place: int) -> Ints:
 
 
 def _units(task: Task, lattice: Lattice) -> tuple[Floats, Ints]:
-    """Return the arguments `units` (m, 5) and `weights` (m, 2) of `_tree`.
+    """Return the arguments `units` (m, 5) and `weights` (m, 2) of `_tree`, a row for each missile.
 
-    units: along and across in steps, radius, cosine and sine.
+    The columns of `units` are the missile's place along and across the course from start to destination, and its
+    radius, all in steps of the lattice, then cosine and sine of the course.  The columns of `weights` are random
+    numbers for a route that passes the missile on its left, and for one that passes near its middle, over or under it.
     """
     frame = rotated_frame(task.problem.search.start, task.problem.search.destination)
     threats = task.scenario.threats
@@ -177,7 +191,10 @@ def _units(task: Task, lattice: Lattice) -> tuple[Floats, Ints]:
 
 
 def _gentlest(data: ProblemArrays) -> tuple[float, float]:
-    """Return the tangents of the climb and dive limits at the start's altitude, the smallest over all courses."""
+    """Return the tangents of the climb and dive limits at the start's altitude.
+
+    They are the smallest over all courses.
+    """
     courses = np.linspace(0.0, 2.0 * math.pi, 16, endpoint=False)
     ends = data.start + 100.0 * np.column_stack([np.sin(courses), np.cos(courses), np.zeros(16)])
     slopes = np.array([slope_limits(data, np.array(data.start), end) for end in ends])
@@ -186,10 +203,11 @@ def _gentlest(data: ProblemArrays) -> tuple[float, float]:
 
 
 def lattice_routes(task: Task, most: int = WAYS) -> list[Floats]:
-    """Return routes (n, 3) world m on different sides of the missiles, shortest first.
+    """Return routes (n, 3), m, that pass the missiles on different sides, shortest first.
 
-    Empty if the lattice is closed.
-    Each is the shortest route of its sides that consists of the shortest routes from both ends to some place.
+    Each route joins the shortest route from the start to some place and the shortest route from there to the
+    destination.  Of all such routes that pass every missile on the same side, only the shortest is returned.  The list
+    is empty if no route leads to the destination.
     """
     data, lattice = task.problem.search, make_lattice(task)
     climb, dive = _gentlest(data)

@@ -31,8 +31,11 @@ from world.arrays import Floats, Ints
 from world.random_streams import PLANNER, stream
 from world.scenario import load_scenario
 
+# Last level of both orders: detection exposure and height.
 LAST = Level((DETECTION, HEIGHT), (NO_GOAL, NO_GOAL))
+# Order of preference of the paper: constraints, then length and kill exposure together.
 PAPER_LEVELS = (CONSTRAINTS, Level((LENGTH, KILL), (NO_GOAL, NO_GOAL)), LAST)
+# The same with kill exposure ahead of length.
 KILL_FIRST = (CONSTRAINTS, Level((KILL,), (NO_GOAL,)), Level((LENGTH,), (NO_GOAL,)), LAST)
 
 
@@ -88,7 +91,10 @@ def _widest(degrees: float) -> Callable[[Space, int], Encoding]:
 
 
 def _from_east(space: Space, waypoints: int) -> Encoding:
-    """Return a polar encoding within 45 degrees, with a free first angle from east, as no leg is before it."""
+    """Return a polar encoding within 45 degrees whose first angle is free, and counted from east.
+
+    The first angle cannot be relative, because no leg is before it.
+    """
     encoding = polar_45_encoding(space, waypoints)
     lower, upper = encoding.lower.copy(), encoding.upper.copy()
     lower[1], upper[1] = -math.pi, math.pi

@@ -69,7 +69,11 @@ class Held:
 
 
 def air_scenario(number: int) -> Scenario:
-    """Return a scenario in the air: over the shipped tile, hills and a plain in turn, or made ground up to 4,000 m."""
+    """Return a scenario in the air.
+
+    An odd number gives a scenario of `fresh_scenario`, an even number one of `plan_scenario`.  The ground is the
+    shipped tile, hills and a plain in turn, or made ground up to 4,000 m.
+    """
     if number % 2:
         return fresh_scenario(number // 2)
     scenario = plan_scenario(number // 2, AUTOPILOTS[number // 2 % len(AUTOPILOTS)])
@@ -77,7 +81,10 @@ def air_scenario(number: int) -> Scenario:
 
 
 def landing_scenario(number: int) -> Scenario:
-    """Return a scenario with take-off and landing, for each aircraft in turn and ArduPlane, which flies landings."""
+    """Return a scenario with take-off and landing.
+
+    Its aircraft is each one in turn; its autopilot is ArduPlane, which flies landings.
+    """
     rng = np.random.default_rng([SEED, number])
     aircraft = AIRCRAFT[number % len(AIRCRAFT)]
     field = draw_field(number, flight={"aircraft": aircraft, "autopilot": "ardupilot"})
@@ -124,7 +131,10 @@ def hold(name: str, plan: Plan, flights: int, workers: int) -> Held:
 
 
 def line(held: Held) -> str:
-    """Return the line of one campaign: "!" marks too few flyable flights, "s" the same where the plan says so."""
+    """Return the line of one campaign.
+
+    "!" marks too few flyable flights, and "s" a campaign whose plan says so.
+    """
     causes = "; ".join(
         f"{rule} {one['flights']} ({', '.join(f'{place} {count}' for place, count in one['places'].items())})"
         for rule, one in held.failed.items()

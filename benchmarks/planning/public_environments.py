@@ -93,15 +93,19 @@ class Environment:
         return self.score(self.tracks(vectors))
 
     def score(self, tracks: Floats) -> tuple[Floats, Floats]:
-        """Return the objectives (n, 2) of paths with places (n, 201, 2), and the excess of their turns (n,), rad."""
+        """Return objectives (n, 2) of paths with places (n, 201, 2), and excess of their turns (n,), rad."""
         rows = score_tracks(tracks, self.ground, self.safe_height, self.end_height)
         return rows[:, :2], rows[:, 2]
 
     def first_vectors(self, count: int, rng: np.random.Generator) -> Floats:
-        """Draw vectors (count, d) as the published program does: near the diagonal, each point ahead of the last."""
+        """Draw vectors (count, d) near the diagonal, as the published program does.
+
+        Each point is ahead of the last one.
+        """
         return np.array([list(self._first_vector(rng)) for _ in range(count)])
 
     def _first_vector(self, rng: np.random.Generator) -> Iterator[float]:
+        """Yield the variables of one vector of `first_vectors`: east and north of each inner control point."""
         previous = np.ones(2)
         for number in range(2, self.control_count):
             point = np.full(2, -math.inf)
@@ -114,14 +118,20 @@ class Environment:
 
 @cache
 def spline_basis(control_count: int) -> Floats:
-    """Return the weights (201, n) of control points of a cubic B-spline that begins and ends at the outer points."""
+    """Return the weights (201, n) of control points of a cubic B-spline.
+
+    The spline begins and ends at the outer points.
+    """
     knots = np.concatenate([np.zeros(3), np.linspace(0.0, 1.0, control_count - 2), np.ones(3)])
     return np.asarray(BSpline.design_matrix(np.linspace(0.0, 1.0, PLACE_COUNT), knots, 3).toarray())
 
 
 @compiled
 def path_heights(track: Floats, ground: Floats, safe_height: float, end_height: float) -> Floats:
-    """Return the heights (w,) of a path with places (w, 2): the lowest above the ground that are not too steep."""
+    """Return the heights (w,) of a path with places (w, 2).
+
+    They are the lowest above the ground that are not too steep; the first and the last height are those of the ends.
+    """
     count = track.shape[0]
     heights = np.empty(count)
     for k in range(count):
@@ -141,7 +151,7 @@ def path_heights(track: Floats, ground: Floats, safe_height: float, end_height: 
 
 @compiled
 def score_tracks(tracks: Floats, ground: Floats, safe_height: float, end_height: float) -> Floats:
-    """Return length, mean height and excess of the turns, rad, of paths with places (n, w, 2), as rows (n, 3)."""
+    """Return length, mean height and excess of the turns, rad, of paths (n, w, 2), as rows (n, 3)."""
     rows = np.zeros((tracks.shape[0], 3))
     for n in range(tracks.shape[0]):
         track = tracks[n]
@@ -237,7 +247,10 @@ def make_mountains(peaks: int, zone_radius: float, rng: np.random.Generator, *, 
 
 
 def make_environments(seed: int) -> list[Environment]:
-    """Make the six environments with the numbers of buildings and peaks and the zones of the published programs."""
+    """Make the six environments of the published programs.
+
+    They have the numbers of buildings and peaks, and the zones, of these programs.
+    """
     kinds = (
         ("city", make_city, 120, -1.0),
         ("city, zone", make_city, 100, 20.0),

@@ -101,7 +101,10 @@ class CountedScores:
     kept: list[Floats] = field(default_factory=list)
 
     def __call__(self, vectors: Any) -> tuple[Floats, Floats]:
-        """Return objectives (n, 2) and violations (n,); raise BudgetSpentError if there were no evaluations left."""
+        """Return objectives (n, 2) and violations (n,).
+
+        Raises BudgetSpentError if no evaluations are left.
+        """
         return self.count(self.environment.tracks(np.asarray(vectors, dtype=np.float64)))
 
     def count(self, tracks: Floats) -> tuple[Floats, Floats]:
@@ -174,7 +177,7 @@ def route_vectors(environment: Environment) -> Floats:
 
 
 def first_population(environment: Environment, size: int, seed: int, *, reads_ground: bool) -> Floats:
-    """Return the first vectors (size, d) of a search: the routes if it reads the ground, then random vectors."""
+    """Return the first vectors (size, d) of a search: routes if it reads the ground, and random vectors."""
     first = environment.first_vectors(size, np.random.default_rng(seed))
     if reads_ground:
         first[:FRONT_SIZE] = route_vectors(environment)
@@ -208,7 +211,10 @@ def search_front(scores: CountedScores, seed: int, *, reads_ground: bool) -> Non
 
 
 def make_scenario(environment: Environment) -> Scenario:
-    """Return an environment as a scenario for the Aerosonde, with its cells stretched to 20 m and heights in m."""
+    """Return an environment as a scenario for the Aerosonde.
+
+    Its cells are stretched to 20 m; its heights are in m.
+    """
     side = (MAP_CELLS - 1) * CELL_M
     axis = np.arange(-EDGE_CELLS, MAP_CELLS + EDGE_CELLS) * CELL_M
     ground = np.pad(environment.ground, EDGE_CELLS, mode="edge")
@@ -228,7 +234,10 @@ def make_scenario(environment: Environment) -> Scenario:
 
 
 def plan_and_score(scores: CountedScores, seed: int) -> None:
-    """Plan a front of 20 as `planfly plan --front` does, and score the routes of its plans at the published heights."""
+    """Plan a front of 20 as `planfly plan --front` does, and score the routes of its plans.
+
+    The routes are scored at the published heights.
+    """
     scenario = make_scenario(scores.environment)
     front = plan_front(scenario, load_uav(scenario).limits.with_margin(), FRONT_SIZE, seed=seed)
     routes = [np.asarray(one.plan.waypoints)[:, :2] / CELL_M + 1.0 for one in front.plans]
@@ -251,7 +260,10 @@ def optimise_both(model: Model, scores: CountedScores, seed: int) -> None:
 
 
 def optimise_weighted(model: Model, scores: CountedScores, seed: int) -> None:
-    """Run `planfly.optimise` once for each of 20 weights of length and height, relative to the straight line's."""
+    """Run `planfly.optimise` once for each of 20 weights of length and height.
+
+    Length and height are relative to the straight line's.
+    """
     environment, scale = scores.environment, straight_values(scores.environment)
     for number in range(FRONT_SIZE):
         weight = (number + 0.5) / FRONT_SIZE
@@ -343,7 +355,10 @@ def published_hypervolume(front: Floats) -> float:
 
 
 def gain_shares(fronts: list[Floats], straight: Floats) -> list[float]:
-    """Return the gain of each front (n, 2) over the straight path (2,), relative to that of all fronts together."""
+    """Return the gain of each front (n, 2) over the straight path (2,).
+
+    It is relative to the gain of all fronts together.
+    """
     least, most = published_hypervolume(straight[None]), published_hypervolume(np.concatenate(fronts))
     return [(published_hypervolume(front) - least) / (most - least) for front in fronts]
 

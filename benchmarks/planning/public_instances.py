@@ -83,7 +83,10 @@ class PublicInstance:
         return np.tile([longest, HALF_RANGE_RAD, self._bearing() + HALF_RANGE_RAD], WAYPOINT_COUNT)
 
     def _bearing(self) -> float:
-        """Angle of the straight line, rad, counted from east; the cost counts bearings from north, as published."""
+        """Angle of the straight line, rad, counted from east.
+
+        The published cost counts bearings from north.
+        """
         return math.atan2(self.end[1] - self.start[1], self.end[0] - self.start[0])
 
     def costs(self, vectors: Floats) -> Floats:
@@ -113,7 +116,11 @@ def decode_path(vector: Floats, ground: Floats, start: Floats, end: Floats) -> F
 
 @compiled
 def threat_cost(path: Floats, threats: Floats) -> float:
-    """Return the cost of all legs of a path (w, 4) near or in threats."""
+    """Return the cost of all legs of a path (w, 4) near or in threats.
+
+    A leg costs `COLLISION_COST` for each threat that it touches.  For each other threat it costs the number of cells by
+    which it is nearer than `DANGER_ZONE_CELLS`.
+    """
     total = 0.0
     for i in range(path.shape[0] - 1):
         east, north = path[i + 1, 0] - path[i, 0], path[i + 1, 1] - path[i, 1]

@@ -53,7 +53,9 @@ GAUSSIAN_POPULATION = 20
 
 @compiled
 def needed_rise(leg: Floats, ground: Floats, rises: Floats) -> float:
-    """Return the rise of the ends of a leg (2, 4), m, that keeps its places above the ground; infinity off the map.
+    """Return the rise of the ends of a leg (2, 4), m, that keeps its places above the ground.
+
+    The rise is infinite if the leg leaves the map, or if neither end can rise as needed.
 
     rises: 1 for an end that can rise, and 0 for the start and the end of the path.
     """
@@ -77,7 +79,7 @@ def leg_costs(
     A place is east, north and height above ground.
 
     limits: longest leg in cells, the middle of the range of bearings, rad, and the highest rise, m; a longer leg
-    costs infinity, as does a leg outside the range.
+    costs infinity, as does a leg outside the range or steeper than 45 degrees that does not lead to the path's end.
     rises: see `needed_rise`.
 
     Returns the costs (n, m) without the ground, the costs with the rise that clears the ground, and the number.
@@ -107,11 +109,13 @@ def leg_costs(
 
 
 def find_cheapest(layers: list[Floats]) -> tuple[Ints, list[Floats]]:
-    """Return the cheapest chain through tables of leg costs, and the cost of the best chain through each sample.
+    """Find the cheapest chain that has one of n samples at each waypoint, by dynamic programming.
 
-    layers: (1, n), then (n, n) for each further pair of waypoints, then (n, 1).
+    layers: costs of the legs: from the start to each sample of the first waypoint, (1, n); then between all samples of
+        each pair of waypoints, (n, n); then from each sample of the last waypoint to the end, (n, 1).
 
-    Returns the sample of each waypoint (w,), and an array (n,) for each waypoint.
+    Returns the sample of each waypoint in the cheapest chain, (w,), and for each waypoint the costs of the best chains
+    through each of its samples, (n,).
     """
     forward = [layers[0][0]]
     for table in layers[1:-1]:
@@ -161,9 +165,10 @@ class PublicPlan:
         return plain, clear
 
     def search_lattices(self, spacing: float) -> Floats:
-        """Return the cheapest path (w, 3) on two lattices with a spacing in cells: of centres and of highest places.
+        """Return the cheapest path (w, 3) on two lattices with a spacing in cells.
 
-        Decides whether the path clears the ground.
+        The places of one lattice are the centres of its cells, those of the other the highest places near them.
+        Also sets `is_clear`: True if the path clears the ground.
         """
         ground = self._instance.ground
         rows, columns = ground.shape
@@ -240,7 +245,10 @@ class PublicPlan:
         return np.clip(vector, self._instance.lower, self._instance.upper)
 
     def refine(self, vector: Floats, spent: Callable[[], int], budget: int) -> None:
-        """Search around a vector (30,) with Gaussians, each from the best one so far, until the budget is spent."""
+        """Search around a vector (30,) with Gaussians until the budget is spent.
+
+        Each Gaussian starts from the best vector so far.
+        """
         lower, width = self._instance.lower, self._instance.upper - self._instance.lower
         best, least = (vector - lower) / width, math.inf
         deviation = GAUSSIAN_DEVIATION

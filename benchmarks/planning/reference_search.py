@@ -53,7 +53,10 @@ def reference_search(task: Task) -> tuple[float, Floats | None]:
 
 
 def _best_of_routes(task: Task, routes: list[Floats], kill_distance: float) -> tuple[float, Floats | None]:
-    """Return length ratio and waypoints of the best path near routes that keeps a distance from missiles, m."""
+    """Return length ratio and waypoints of the best path near routes.
+
+    The path keeps a distance from missiles, m.
+    """
     pool = [found for route in routes if (found := _screened(task, route, kill_distance)) is not None]
     for _ in range(ROUNDS):
         pool = _distinct(pool)[:POOL]
@@ -80,7 +83,10 @@ def _best_of_routes(task: Task, routes: list[Floats], kill_distance: float) -> t
 
 
 def _with_least_margins(task: Task) -> Task:
-    """Return the task with nearly the certificate's margins in its search, instead of the planner's larger ones."""
+    """Return the task with nearly the certificate's margins in its search.
+
+    The planner's own margins are larger.
+    """
     problem = task.problem
     more, certified = SPARE, problem.certified
     reserve = problem.search.kill_margin - SEARCH_KILL_MARGIN_M

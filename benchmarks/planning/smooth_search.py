@@ -46,7 +46,11 @@ DIFFERENCE = 5.0
 
 @dataclass(frozen=True, slots=True)
 class Near:
-    """Constraints near a path: pairs of legs and spheres (n,), legs and fractions (m,) of ground samples."""
+    """Constraints that matter near a path.
+
+    legs, spheres: indices of the n pairs of a leg and a sphere that is near it, (n,) each.
+    ground_legs, ground_shares: leg and position (fraction of the leg) of the m samples near the ground, (m,) each.
+    """
 
     legs: Ints
     spheres: Ints
@@ -82,7 +86,7 @@ class Programme:
         return float(lengths.sum() / UNIT), (unit[:-1] - unit[1:]).ravel()
 
     def near(self, x: Floats) -> Near:
-        """Return the constraints near a path."""
+        """Select the constraints that matter near the path of variables (3 (w - 2),)."""
         path = self.path(x)
         count = len(path) - 1
         legs, spheres = (one.ravel() for one in np.indices((count, len(self.radii))))
@@ -94,7 +98,11 @@ class Programme:
         return Near(legs[close], spheres[close], ground_legs[low], shares[low])
 
     def _sphere_distances(self, path: Floats, legs: Ints, spheres: Ints) -> tuple[Floats, Floats, Floats]:
-        """Return distances (n,) of legs to spheres, m, fractions of the nearest points on the legs, unit normals."""
+        """Measure n pairs of a leg and a sphere at the point of the leg that is nearest to the sphere.
+
+        Returns the distances of the legs from the spheres, m, (n,), the positions of these points as fractions of their
+        legs, (n,), and the unit vectors from the centres of the spheres to these points, (n, 3).
+        """
         a, along = path[legs], path[legs + 1] - path[legs]
         to = self.centres[spheres] - a
         share = np.clip((to * along).sum(axis=1) / (along**2).sum(axis=1), 0.0, 1.0)
@@ -110,7 +118,10 @@ class Programme:
         return points[:, 2] - np.where(np.isnan(ground), 1e4, ground) - self.above, points
 
     def constraints(self, x: Floats, near: Near) -> tuple[Floats, Floats]:
-        """Return the constraints' values (c,), 0 or more if met, in units or cosines, and derivatives (c, 3 w)."""
+        """Return the constraints' values (c,) and their derivatives (c, 3 w).
+
+        A value is in units or cosines, and 0 or more if the constraint is met.
+        """
         path = self.path(x)
         count = len(path) - 1
         values, rows = [], []

@@ -47,9 +47,9 @@ def string_is_open(scenario: Scenario, a: Floats, b: Floats) -> bool:
 
 
 def shortest_on_map(scenario: Scenario) -> Floats:
-    """Return points (k, 2) of a nearly shortest route on the map from start to destination.
+    """Return the points of a nearly shortest route on the map from start to destination, m, (k, 2).
 
-    (0, 2) without one.
+    The route is the shortest on a grid, pulled taut.  Without a route the result is empty, (0, 2).
     """
     (west, east), (south, north) = scenario.bounds
     start, destination = scenario.start[:2], scenario.destination[:2]
@@ -127,7 +127,7 @@ def map_length(points: Floats) -> float:
 
 
 def climbing_length(scenario: Scenario, path: Floats, climb: float, margin: float = 0.0) -> float:
-    """Return the smallest length on the map of a route (k, 2) that climbs no more than `climb` (a tangent).
+    """Return the smallest length on the map of a route (k, 2) that climbs at most `climb` (a tangent).
 
     The ground at each place must be cleared when it is reached; a missing height is gained by a longer path before it.
     margin: height above the scenario's clearance, m.
@@ -144,7 +144,9 @@ def climbing_length(scenario: Scenario, path: Floats, climb: float, margin: floa
 
 
 def length_within(scenario: Scenario, limits: Limits, path: Floats) -> float:
-    """Return the smallest length on the map of a route (k, 2) within the slopes and the clearance of certificates.
+    """Return the smallest length on the map of a route (k, 2).
+
+    The route keeps within the slopes and the clearance of certificates.
 
     The slope is the harmonic mean of the slopes from the altitude of the start to the highest place on the route.
     """

@@ -106,7 +106,8 @@ X8 = ModelNumbers(
     throw=(math.radians(25.0), math.radians(25.0), math.radians(1.0)),
 )
 
-# Ailerons roll to the right here and to the left there.  Their motor's polynomial is power at the shaft.
+# Positive ailerons roll to the right in planfly, and to the left in the university's file.  The polynomial of its motor
+# is the power at the shaft.
 _ULTRASTICK_ASPECT = 1.27**2 / 0.3097
 ULTRASTICK = ModelNumbers(
     title="Ultra Stick 25e (University of Minnesota)",

@@ -65,7 +65,10 @@ TICK = 0.017
 
 
 def fly(aircraft: Aircraft, gains: Gains, case: Case) -> SimulatedFlight:
-    """Fly a case with these gains, and with slightly less bank reserve than flights have, so that some is left."""
+    """Fly a case with these gains, and with slightly less bank reserve than flights have.
+
+    Flights with the usual reserve then have some bank left.
+    """
     module: Any = simulation
     usual = module.BANK_RESERVE_RAD
     module.BANK_RESERVE_RAD = RESERVE
@@ -123,7 +126,10 @@ class Trial:
         self._pool.terminate()
 
     def __call__(self, gains: Gains) -> float:
-        """Return the root mean square of the flights' costs, which weights bad flights without letting one decide."""
+        """Return the root mean square of the flights' costs.
+
+        It weights bad flights without letting one decide.
+        """
         costs = self._pool.map(_cost, [(gains, k) for k in range(self._count)], chunksize=1)
         return math.sqrt(float(np.mean(np.square(costs))))
 
@@ -174,7 +180,10 @@ def search(gains: Gains, trial: Callable[[Gains], float], rounds: int, seed: int
 
 
 def write(aircraft: Aircraft, gains: Gains, rounds: int, seed: int) -> None:
-    """Write the numbers to the existing keys of the aircraft's gains file, with a comment about their origin."""
+    """Write the numbers to the existing keys of the aircraft's gains file.
+
+    A comment in the file states their origin.
+    """
     file = aircraft.folder / "gains.toml"
     chosen = "# Chosen by "
     said = (
@@ -209,7 +218,10 @@ def print_errors(name: str, found: Sequence[Errors]) -> None:
 
 
 def report(aircraft: Aircraft, make: MakeSetup, gains: Gains, fresh: Sequence[Case]) -> None:
-    """Print how the gains fly missions that the search has not seen: the standard mission and fresh random ones."""
+    """Print how the gains fly missions that the search has not seen.
+
+    They are the standard mission and fresh random missions.
+    """
     waypoints = standard() * np.array([1.0, 1.0, 1.0])
     waypoints[:, :2] *= (aircraft.airspeed / 25.0) ** 2
     if aircraft.name != "aerosonde":

@@ -41,9 +41,9 @@ SWINGS = 3.0
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """Settings of a law, and its RMS (m) on the straight legs in each training wind.
+    """Settings of a law, and its errors.
 
-    Empty if a flight failed.
+    rms: RMS distance from the straight legs in each training wind, m; empty if a flight failed.
     """
 
     gains: dict[str, float]
@@ -67,7 +67,10 @@ def settings(law: str) -> Iterator[dict[str, float]]:
 
 
 def measure(law: str, chosen: dict[str, float], setups: list[FlightSetup]) -> Setting:
-    """Fly all setups with these settings of a law."""
+    """Fly all setups with these settings of a law; return the errors of the flights.
+
+    There are no errors if a flight is not completed.
+    """
     found = []
     with flown_with(replace(load_gains(aerosonde()), **cast("Any", chosen))):
         for setup in setups:

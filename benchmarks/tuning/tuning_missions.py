@@ -51,7 +51,10 @@ class Case:
 
 
 def cases(aircraft: Aircraft, make: MakeSetup, seed: int, numbers: Iterable[int]) -> list[Case]:
-    """Make missions with random turns, slopes, speeds, wind and turbulence: a third tight, a fifth at 30 Hz."""
+    """Make missions with random turns, slopes, speeds, wind and turbulence.
+
+    A third of them is tight, and a fifth runs at 30 Hz.
+    """
     return [_case(aircraft, make, seed, number) for number in numbers]
 
 

@@ -24,10 +24,10 @@ MIN_LATE_ROWS = 8
 
 @dataclass(frozen=True, slots=True)
 class SteadyClock:
-    """Times on a clock without jumps back.
+    """Times of a log's rows after the backward jumps of its clock were removed.
 
-    time: times shifted after each jump, s, (n,).
-    jumps: times on the steady clock at which the clock went back permanently, s.
+    time: times of the rows, s, (n,); all rows after a jump are shifted.
+    jumps: time of the last row before each jump, s, on this clock.
     """
 
     time: Floats
@@ -42,7 +42,7 @@ def remove_clock_jumps(time: Floats, usual_step: float = 0.1) -> SteadyClock:
     its time.
 
     time: times of the rows in the order of the file, s, (n,).
-    usual_step: time between the rows before and after a jump, s.
+    usual_step: time that is assumed to have passed between the last row before a jump and the first row after it, s.
 
     >>> remove_clock_jumps(np.array([10.0, 11.0, *range(2, 14)]), usual_step=1.0).time.tolist()
     [10.0, 11.0, 12.0, 13.0, 14.0, 15.0, 16.0, 17.0, 18.0, 19.0, 20.0, 21.0, 22.0, 23.0]
@@ -66,12 +66,14 @@ def remove_clock_jumps(time: Floats, usual_step: float = 0.1) -> SteadyClock:
 
 
 def _find_clock_jump(late_rows: Ints, time: Floats, latest: Floats) -> int:
-    """Return the row at which the clock goes back and stays back, or -1 if it never does.
+    """Return the first row after the clock went back and stayed back, or -1 if it never did.
 
-    The next `MIN_LATE_ROWS` rows, or all rows to the end, must be late.  A single late row at the end is not a jump.
+    A row is late if its time is more than `MAX_CLOCK_LAG_S` before the latest time so far.  The clock stays back if
+    `MIN_LATE_ROWS` rows in sequence, or all rows to the end, are late.  A single late row at the end is not a jump.
 
-    late_rows: rows whose time is late by more than `MAX_CLOCK_LAG_S`.
-    latest: latest time up to each row, s.
+    late_rows: numbers of all late rows.
+    time: time of each row, s, (n,).
+    latest: latest time up to and including each row, s, (n,).
     """
     for k in late_rows.tolist():
         end_row = min(k + MIN_LATE_ROWS, time.size)
@@ -83,9 +85,9 @@ def _find_clock_jump(late_rows: Ints, time: Floats, latest: Floats) -> int:
 # ----------------------------------------------------------------------
 # Positions, gaps and glitches.
 
-# A pause between rows longer than this is a gap, s.
+# Longest pause between rows that is not a gap, s.
 MAX_STEP_S = 1.0
-# Longest pause as a ratio to the median step, if that is longer.
+# Longest pause that is not a gap, in median steps between rows; the longer of both limits applies.
 MAX_STEP_RATIO = 1.5
 # Speed that is added to `GLITCH_SPEED_RATIO` times the usual speed, m/s: a position that is reached and left at a
 # higher speed is a glitch.  GPS receivers jump by kilometers, and no aircraft gains this speed between two rows.
@@ -117,7 +119,8 @@ class CleanPositions:
     up: altitude, m, (n,); NaN if not in the log.
     faults: numbers of corrected faults.
     gaps: pauses between rows.
-    shifts: for each removed clock jump, the time from which the log's clock is shifted back, s, and the shift, s.
+    shifts: (start, shift) of each removed forward jump of the clock: all times from `start` on, s on the log's clock,
+        are moved `shift` s back.
     """
 
     time: Floats
@@ -139,8 +142,11 @@ class CleanPositions:
 def clean_positions(series: LogSeries, earlier_jumps: tuple[float, ...] = ()) -> CleanPositions:
     """Sort the rows of a log's positions, remove faulty rows, and count the faults.
 
+    Faulty are rows without a valid time or position, rows with the time of an earlier row, glitches, and small groups
+    of rows whose times are far from all others.  Forward jumps of the clock are removed without removing rows.
+
     series: latitude and longitude (deg) and altitude (m), (n, 3).
-    earlier_jumps: times of clock jumps that the reader has removed already, s.
+    earlier_jumps: times of the clock jumps that the reader of the log has removed, s; they are listed with the faults.
 
     >>> rows = np.array([[46.0, 8.0, 500.0], [46.0002, 8.0, 500.0], [46.0002, 8.0, 500.0], [47.0, 8.0, 500.0]])
     >>> more = np.array([[46.0004 + 0.0002 * k, 8.0, 500.0] for k in range(4)])
@@ -209,10 +215,11 @@ def measure_steps(lat: Floats, lon: Floats) -> Floats:
 
 
 def _find_glitches(time: Floats, values: Floats) -> Flags:
-    """Return a mask (n,): True for glitches.
+    """Return a mask (n,): True for glitches, which are rows far from the path of the vehicle.
 
-    A glitch is a row that no vehicle can reach from the row before, nor leave to the row after.  Up to
-    `MAX_GLITCH_ROWS` rows in sequence may be glitches.  Fewer than five rows have none.
+    A glitch begins with a leap that no vehicle can fly and ends with another leap, after which the vehicle is at a
+    position that it could reach from the last row before.  It has up to `MAX_GLITCH_ROWS` rows.  The first or last row
+    is also a glitch if a leap separates it from the others.  Fewer than five rows have no glitch.
 
     values: latitude and longitude (deg) and altitude (m), (n, 3).
     """

@@ -54,9 +54,12 @@ class MappedFile:
 
 
 def iterate_piece_ends(size: int, release_memory: Callable[[], None]) -> Iterator[int]:
-    """Yield the end (byte number) of each piece of a file, and call `release_memory` after its use.
+    """Yield the byte number at which each piece of a file ends, to read a large file piece by piece.
+
+    After each piece was used, `release_memory` is called.
 
     size: size of the file, bytes; all pieces but the last have `PIECE_BYTES`.
+
     >>> list(iterate_piece_ends(3, lambda: None))
     [3]
     >>> list(iterate_piece_ends(PIECE_BYTES + 1, lambda: None)) == [PIECE_BYTES, PIECE_BYTES + 1]
@@ -72,12 +75,15 @@ def iterate_piece_ends(size: int, release_memory: Callable[[], None]) -> Iterato
 # ----------------------------------------------------------------------
 # Messages: their formats, their starts, and their fields as columns.
 
+# Length of the header of a message, bytes.
 HEADER_BYTES = 3
+# Type of FMT messages, which state the formats of the other messages.
 FMT_TYPE = 128
+# Length of an FMT message, bytes.
 _FMT_BYTES = 89
 # Largest number of bytes at the end of a log that are not damage: block storage leaves old bytes in its last page.
 MAX_TRAILING_BYTES = 528
-# Format letters: numpy type, and the factor by which stored numbers are multiplied (ArduPilot,
+# Format letters: numpy type, and the factor by which a value is multiplied before it is stored (ArduPilot,
 # libraries/AP_Logger/LogStructure.h, "Format characters in the format string").
 FIELDS: dict[str, tuple[str, int]] = {
     "a": ("S64", 1),
@@ -127,7 +133,10 @@ class MessageFormat(NamedTuple):
 
     @property
     def scales(self) -> dict[str, int]:
-        """Factor by which the stored numbers of a field are multiplied, by name, for all fields with a factor."""
+        """Factors by which values are multiplied before they are stored, by field.
+
+        Fields that are stored unchanged are absent.
+        """
         letters_by_name = zip(self.columns, self.letters, strict=True)
         return {name: FIELDS[letter][1] for name, letter in letters_by_name if FIELDS[letter][1] != 1}
 
@@ -142,8 +151,8 @@ class Messages:
     """All messages of one name, in the order of the file.
 
     starts: byte at which each message begins, (n,).
-    rows: fields of each message as stored, (n,).
-    scales: factors of the scaled fields by name.
+    rows: structured array with the fields of each message as stored, (n,).
+    scales: factors by which the values of some fields were multiplied before they were stored, by field.
     """
 
     starts: Ints
@@ -178,11 +187,11 @@ class Dataflash:
     """Index of a dataflash log.
 
     data: bytes of the log.
-    starts: starts of the indexed messages, by number of the message type.
+    starts: byte numbers at which the indexed messages begin, by number of the message type.
     formats: formats by number of the message type.
-    names: names of the messages that the log contains.
-    release_memory: called regularly, to release the memory of the mapped log.
+    names: names of all messages that the log contains, indexed or not.
     damage: parts that could not be read.
+    release_memory: function that releases the memory of the mapped log; called regularly during reading.
     """
 
     data: Bytes
@@ -209,6 +218,7 @@ def index_dataflash(
     large log is small.
 
     data: bytes of the log, (n,).
+    names: names of the messages to index, such as "POS".
     release_memory: function that releases the memory of the bytes read so far; called regularly.
     """
     is_format = np.zeros(256, np.bool_)
@@ -242,8 +252,8 @@ def index_dataflash(
 class _FoundMessages(NamedTuple):
     """Requested messages of a log, and the damage of the log.
 
-    starts, kinds: start and type of each requested message, (n,).
-    counts: number of messages of each type, (256,).
+    starts, kinds: byte number of the start, and type, of each requested message, (n,).
+    counts: number of messages of each type, requested or not, (256,): entry k is for type k.
     places, size: number of damaged places, and their total size in bytes.
     cut: True if the last message is cut.
     """
@@ -332,6 +342,8 @@ _IS_READING = 4
 _IS_CUT = 5
 
 
+# The walk goes from message to message by their lengths.  In a damaged place, where no valid message begins, it goes on
+# byte by byte to the next valid message.
 @compiled
 def _walk_messages(
     data: Bytes,
@@ -347,8 +359,8 @@ def _walk_messages(
     """Find the requested messages up to byte `stop`, and return their starts (byte numbers) and types.
 
     state: progress of the walk, indexed by `_NEXT_BYTE` and so on; the walk continues from it and updates it.
-    lengths: length of each message type, bytes, (256,), updated by the FMT messages.
-    counts: number of messages of each type, (256,), which is updated.
+    lengths: length of the messages of each type, bytes, (256,); 0 if not yet known, updated by each FMT message.
+    counts: number of messages of each type, (256,), which is updated; entry k of both arrays is for type k.
     header_bytes: length of a message's header, bytes.  fmt_type: message type of FMT messages.
     max_trailing_bytes: bytes at the end that need not be a message.  is_requested: mask of the types to find, (256,).
     """

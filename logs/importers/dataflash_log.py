@@ -42,7 +42,9 @@ _HOME = 1
 def make_dataflash_missions(
     commands: Messages, time: Floats, origins: Messages, source: str
 ) -> Iterator[LoggedMission]:
-    """Yield the missions of a log in their order; an item that is logged again when it is flown is merged.
+    """Yield the missions of a log in their order.
+
+    An item that is logged again when it is flown is not repeated.
 
     commands: CMD messages.
     time: time of each CMD message, s, (n,).
@@ -199,7 +201,7 @@ class _Reader:
         )
 
     def _select_messages(self, name: str) -> Messages:
-        """Return the messages with a name; from several sensors or estimators, only the first one's."""
+        """Return the messages with a name; only those of the first sensor or estimator that logs them."""
         if name not in self._cache:
             messages = self._index.messages(name)
             for column in ("I", "C", "Inst", "Instance"):
@@ -211,10 +213,10 @@ class _Reader:
         return self._cache[name]
 
     def _find_clock_shifts(self) -> tuple[NDArray[np.int64], Floats, tuple[float, ...]]:
-        """Find the jumps of the log's clock, and the shift that corrects the time of each message.
+        """Find the backward jumps of the log's clock from the n messages POS, ATT, GPS and MODE.
 
-        Returns the byte at which each message starts, (n,), the shift to add to its time, s, (n,), and the times of the
-        jumps back, s.
+        Returns the byte at which each of these messages starts, (n,), the shift that must be added to its time, s,
+        (n,), and the times of the jumps, s.  Other messages are corrected like their neighbours in the file.
         """
         times, starts = [], []
         for name in ("POS", "ATT", "GPS", "MODE"):
@@ -240,7 +242,10 @@ class _Reader:
         return np.asarray(raw_time + shifts[np.clip(np.searchsorted(starts, messages.starts), 0, len(shifts) - 1)])
 
     def _read_table(self, name: str, columns: Iterable[str], scale: float = 1.0) -> LogSeries | None:
-        """Return fields of a message as columns, multiplied by `scale`; None if the log lacks one of them."""
+        """Return fields of the messages with a name, multiplied by `scale`.
+
+        Returns None if the log lacks a field or the times.
+        """
         columns = tuple(columns)
         messages = self._select_messages(name)
         if not messages.has(*columns) or not (messages.has("TimeUS") or messages.has("TimeMS")):
@@ -265,9 +270,11 @@ class _Reader:
         yield "throttle", next((series for series in throttles if series is not None and len(series.time)), None)
 
     def _read_first_table(self, choices: Iterable[tuple[str, tuple[str, ...]]], scale: float = 1.0) -> LogSeries | None:
-        """Return the fields of the first of several messages that the log contains; None if it has none.
+        """Read a quantity that several messages state from the first of them that the log contains.
 
-        choices: for each message its name, and the names of the fields.
+        Returns None if the log contains none of them.
+
+        choices: the messages in the order of preference, each with its name and the names of its fields.
         scale: factor by which the values are multiplied.
         """
         for name, columns in choices:
@@ -311,7 +318,8 @@ class _Reader:
     def _read_airspeed(self) -> LogSeries | None:
         """Return the true airspeed, m/s, (n, 1); None if unknown.
 
-        It is converted from the equivalent airspeed that ArduPilot logs: that of a sensor in use, or else that of CTUN.
+        It is converted from the equivalent airspeed that ArduPilot logs: the airspeed of a sensor in use (ARSP), or
+        else the airspeed in CTUN.
         """
         sensor = self._select_messages("ARSP")
         airspeed = self._read_table("ARSP", ("Airspeed",))
@@ -331,7 +339,7 @@ class _Reader:
     def _find_true_airspeed_ratio(self, time: Floats) -> Floats:
         """Return the ratio of true to equivalent airspeed at each time, (n,).
 
-        The logged ratio is used, or else the ratio in the standard atmosphere at the logged altitude.
+        The logged ratio is used, or else the ratio in the standard atmosphere at the logged altitude, or else 1.
         """
         ratio = self._read_table("CTUN", ("E2T",))
         if ratio is not None and len(ratio.time) > 1:
@@ -346,7 +354,10 @@ class _Reader:
         return np.array([eas_to_tas_ratio(float(altitude)) for altitude in altitudes])
 
     def _read_battery(self) -> LogSeries | None:
-        """Return the battery's current (A) and the energy used (Wh), (n, 2); None if neither was measured."""
+        """Return the battery's current (A) and the energy used (Wh), (n, 2); None if neither was measured.
+
+        If the log has no energy, it is integrated from voltage and current.
+        """
         battery = self._read_table("BAT", ("Curr", "EnrgTot"))
         if battery is None or not len(battery.time):
             battery = self._read_table("CURR", ("Curr", "EnrgTot"))

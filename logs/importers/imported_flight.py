@@ -58,10 +58,8 @@ class FlightPart:
 def find_flight_spans(time: Floats, lat: Floats, lon: Floats) -> list[tuple[float, float]]:
     """Return the start and end of each flight, s.
 
-    A flight is a period of at least `MIN_FLIGHT_TIME_S` with a median ground speed above `MIN_FLYING_SPEED_MPS`.  It
-    may contain slower periods of up to `MAX_SLOW_TIME_S`.
-
-    The list is empty for fewer than three rows.
+    A flight is a period of at least `MIN_FLIGHT_TIME_S` with a ground speed above `MIN_FLYING_SPEED_MPS`, measured as a
+    running median.  It may contain slower periods of up to `MAX_SLOW_TIME_S`.  Fewer than three rows have no flight.
 
     time, lat, lon: times (s) and positions (deg), (n,).
 
@@ -99,6 +97,8 @@ def find_flight_parts(
 ) -> list[FlightPart]:
     """Split the flights of a log by the missions that they followed, one part for each flight and mission.
 
+    A flight that followed no mission is one part without stretches.
+
     spans: start and end of each flight, from `find_flight_spans`.
     modes: mode changes in the log; without any, each whole flight is assumed to follow its mission.
     missions: missions in the log.
@@ -120,9 +120,10 @@ def find_flight_parts(
 
 
 def _find_stretches(start: float, end: float, modes: Sequence[ModeChange], log_end: float) -> list[MissionStretch]:
-    """Return the periods of a flight in a mode that follows the mission.
+    """Return the periods in which a flight followed its mission, and how each ended.
 
-    Without modes, the period is the whole flight.
+    In these periods the vehicle's mode was one that follows the mission, such as AUTO.  In a log without mode changes
+    the whole flight is one period.
 
     log_end: time of the last row of the log, s.
     """
@@ -193,7 +194,8 @@ class LoggedFlight:
     time: times on the log's clock, s, (n,).
     lat, lon: latitude and longitude, deg, (n,).
     up: altitude, m, (n,).
-    columns: values by the names of `logs.importers.raw_log.COLUMNS`, (n, k); NaN at times without a row nearby.
+    columns: values of each quantity of `logs.importers.raw_log.COLUMNS`, (n, k), by its name: ``columns["velocity"]``
+        is (n, 3); NaN at times where the log has no value nearby.
     holds: names of the quantities that the log contains.
     stretches: periods in which the flight followed the mission.
     mission: mission of the flight; None if the log contains none.
@@ -202,6 +204,7 @@ class LoggedFlight:
     others: start of each other flight, s, and the time for which it followed a mission, s.
     begins_in_flight, ends_in_flight: True if the first or the last row of the log is in the air: the log lacks the rest
         of the flight.
+    clock: cleaned positions of the whole log, which convert times of the log's clock to `time`.
     """
 
     raw: RawLog
@@ -333,7 +336,10 @@ def _extract_flight(
 
 
 def _interpolate_at(series: LogSeries | None, name: str, time: Floats, positions: CleanPositions) -> Floats:
-    """Return a series interpolated at other times, (n, k); NaN at times without a row nearby.
+    """Return a series interpolated at other times, (n, k); all NaN for a log without the series.
+
+    Values are NaN in long intervals without rows, and far before the first and after the last row.  Invalid rows of the
+    series are ignored.  Angles of the attitude are interpolated across their full turn.
 
     name: name of the series in `COLUMNS`.
     time: times on the clock without jumps, s, (n,).
@@ -380,9 +386,11 @@ def _interpolate_at(series: LogSeries | None, name: str, time: Floats, positions
 
 
 def with_flown_altitudes(mission: Mission, lat: Floats, lon: Floats, up: Floats) -> Mission:
-    """Return a mission in which each item with a position has the altitude of the nearest row of a flight.
+    """Set each item with a position to the altitude at which a flight passed closest to it.
 
-    lat, lon, up: positions of the flight, deg and m, (n,).
+    If no altitude of the flight is known, the altitudes are set to 0.
+
+    lat, lon, up: positions of the flight, deg and m, (n,); rows with an unknown altitude (NaN) are ignored.
 
     >>> from flight.mission.items import MissionItem
     >>> task = Mission(None, tuple(MissionItem(k, 16, 0, (0.0,) * 4, 46.0 + k, 8.0, 0.0) for k in (0, 1)))
@@ -429,7 +437,8 @@ def mean_wind(flight: LoggedFlight) -> MeanWind | None:
     """Return the mean wind while the flight followed its mission, or None if the log contains no wind.
 
     It is the mean over the whole flight if the flight never followed a mission.  The first fifth of the rows is left
-    out, because the autopilot's estimate starts at zero and converges only in the first turns.
+    out, because the autopilot's estimate starts at zero and converges only in the first turns.  The speed is limited to
+    the largest wind speed that a scenario allows.
 
     >>> from logs.importers.raw_log import example_raw_log
     >>> from logs.importers.imported_flight import make_flight

@@ -42,9 +42,9 @@ class LoggedItemGroup(NamedTuple):
 def combine_items(rows: Iterable[LoggedItem]) -> list[LoggedItemGroup]:
     """Combine logged items, in the order of the log, into missions.
 
-    An item 0 begins a new mission, even if later items are lost.  A single item that equals an item of the mission was
-    logged because it was flown.  A single item that differs was edited, and begins a changed mission.  Two incomplete
-    logs of one mission are merged.
+    An item 0 begins a new mission if the item after it shows that this mission is logged from its beginning.  Another
+    item that equals the mission's item of this number was logged because it was flown.  An item that differs from it
+    was edited, and begins a changed mission.  If a mission is logged twice, each time incompletely, both are merged.
 
     >>> waypoints = [MissionItem(k, 16, 0, (0.0,) * 4, 46.0 + k, 8.0, 75.0) for k in range(3)]
     >>> logged = [*(LoggedItem(1.0, 3, item) for item in waypoints), LoggedItem(9.0, 3, waypoints[1])]
@@ -166,10 +166,10 @@ def renumber_px4_items(items: Iterable[MissionItem]) -> tuple[MissionItem, ...]:
 
 
 def without_gaps(logged: LoggedMission, total: int, last_number: int) -> LoggedMission | None:
-    """Reduce an incomplete mission to its longest run of items without a gap.
+    """Reduce an incomplete mission to its longest run of items with consecutive numbers.
 
-    A complete mission is returned unchanged, or as None if it has fewer than two items; an incomplete mission may have
-    no items left.
+    The run ends before its first DO_JUMP to an item outside the run, so that an incomplete mission may have no items
+    left.  A complete mission is returned unchanged, or as None if it has fewer than two items.
 
     total: announced number of items, 0 if unknown.
     last_number: largest known number of an item; items are numbered from 1.

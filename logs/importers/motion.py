@@ -100,7 +100,10 @@ class MotionLog:
 
 
 def find_first_ground_position(position: Samples, velocity: Samples) -> tuple[float, float, float] | None:
-    """Return latitude, longitude (deg) and altitude (m) where a vehicle first stood still, or None.
+    """Return where a vehicle first stood still: latitude, longitude (deg) and altitude (m).
+
+    Returns None if it never stood still.  Rows outside the times of the velocities, and rows without a valid position,
+    are ignored.
 
     position: latitude and longitude (deg) and altitude (m), (n, 3).
     velocity: ground velocity, m/s, (n, 3).

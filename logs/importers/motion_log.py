@@ -16,6 +16,7 @@ from world.extras import require_extra
 from world.files import missing_text
 
 _DEGREE = math.pi / 180.0
+# Messages that are read.
 _NAMES = (
     "IMU",
     "RCOU",
@@ -35,6 +36,7 @@ _NAMES = (
     "VER",
     "ORGN",
 )
+# Fields with the number of the sensor or estimator, in logs of different releases.
 _INSTANCES = ("I", "C", "Inst", "Instance")
 
 
@@ -145,7 +147,7 @@ class _DataflashMotionReader:
         )
 
     def _select_messages(self, name: str) -> Messages:
-        """Return the messages with a name; from several sensors or estimators, only the first one's."""
+        """Return the messages with a name; only those of the first sensor or estimator that logs them."""
         messages = self._index.messages(name)
         for column in _INSTANCES:
             if name in ("IMU", "XKF1", "XKF2", "NKF1", "NKF2", "ARSP", "BAT") and messages.has(column):
@@ -154,11 +156,11 @@ class _DataflashMotionReader:
         return messages
 
     def _read_first_samples(self, choices: Iterable[tuple[str, tuple[str, ...]]], scale: float = 1.0) -> Samples:
-        """Return the fields of the first of several messages that the log has.
+        """Read a quantity that several messages state from the first of them that the log contains.
 
-        The result has no rows if the log has none of the messages.  Servo outputs that RCOU lacks are 0.
+        The result has no rows if the log contains none of them.  Servo outputs that RCOU lacks are 0.
 
-        choices: for each message its name, and the names of the fields.
+        choices: the messages in the order of preference, each with its name and the names of its fields.
         scale: factor by which the values are multiplied.
         """
         for name, columns in choices:

@@ -25,7 +25,7 @@ class LogFormat(NamedTuple):
     suffixes: suffixes of the format's files, in lower case.
     content: regular expression for the first bytes of a file.
     reader: module and function of the reader, which takes a path, returns a `RawLog` and raises LogError; it is
-    imported when needed, because each reader needs another library.
+        imported when needed, because each reader needs another library.
     extra: planfly extra with the reader's library; "" if no extra is needed.
     """
 

@@ -64,7 +64,7 @@ class MessageFormats:
         return self._count(name, frozenset())
 
     def _count(self, name: str, outer_names: frozenset[str]) -> int:
-        """Return the number of fields of a format; 1 for a plain type.
+        """Return the number of fields of a format; 1 for a plain type, and for a name without a format.
 
         The number is greater than `MAX_FIELDS` if the format has too many fields, or contains itself.
 

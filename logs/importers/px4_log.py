@@ -136,7 +136,8 @@ class _FormatCheckingFile:
 def find_damage(data: Bytes, release_memory: Callable[[], None] = lambda: None) -> Damage:
     """Find the damage of a PX4 log.
 
-    Bytes that belong to no record with a known letter are damaged.  The last record may be cut.
+    A log is a sequence of records, each with its length, the letter of its kind and its content.  Bytes that belong to
+    no record with a known letter are damaged.  The last record may be cut.
 
     data: bytes of the log, (n,).
 
@@ -167,6 +168,9 @@ _IS_CUT = 4
 @compiled
 def _walk_records(data: Bytes, stop: int, state: Ints, letters: Bytes) -> None:
     """Walk over the records up to byte ``stop``, and count damaged places and lost bytes.
+
+    The walk goes from record to record by their lengths.  In a damaged place, where no valid record begins, it goes on
+    byte by byte to the next valid record.
 
     state: progress of the walk, indexed by `_NEXT_BYTE` and so on; the walk continues from it and updates it.
     letters: letters of all kinds of records.
@@ -209,7 +213,7 @@ def _walk_records(data: Bytes, stop: int, state: Ints, letters: Bytes) -> None:
 def _read_instance_table(topic: str, data: dict[str, Any], choices: Iterable[tuple[str, ...]]) -> LogSeries | None:
     """Return fields of one instance of a topic as columns; None if the instance lacks them.
 
-    topic: name of the topic, for the result.
+    topic: name of the topic, which is stated in the result.
     data: values of the instance by field.
     choices: alternative groups of fields; the first group that the instance has is returned.
     """
@@ -221,9 +225,10 @@ def _read_instance_table(topic: str, data: dict[str, Any], choices: Iterable[tup
 
 
 class Topics:
-    """Topics of one log.
+    """Topics of one log, which are its messages by name.
 
-    Each has the values of its first instance, except batteries, whose currents are added up.
+    A topic may have several instances, one for each sensor or battery.  Only the first one is used, except for
+    batteries, whose currents are added up.
     """
 
     def __init__(self, log: ULog, source: str, damage: Damage) -> None:
@@ -384,7 +389,7 @@ class Topics:
         return "unknown"
 
     def _read_missions(self) -> Iterable[LoggedMission]:
-        """Yield the mission, which consists of the items that became current.
+        """Yield the one mission of the log, with the items that became current: PX4 logs no other items.
 
         The number of items comes from mission_result.  Nothing is yielded if the log has neither.
         """

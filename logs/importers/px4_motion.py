@@ -48,15 +48,19 @@ _AIRFRAMES = {
     8: "a multirotor",
     9: "a custom airframe",
 }
-# CA_SV_CSn_TYPE.
+# Values of CA_SV_CSn_TYPE for surfaces that are modelled: ailerons, elevators, rudders and elevons.
 _MODELLED = frozenset({1, 2, 3, 4, 5, 6, 15})
+# Those of them that are elevons.
 _ELEVONS = frozenset({5, 6})
+# Values for surfaces that cannot be modelled, because they act about several axes.
 _MIXED = {7: "a V-tail", 8: "a V-tail", 12: "a custom surface", 13: "an A-tail", 14: "an A-tail"}
+# Values for surfaces that may be ignored if they do not move.
 _FLAPS = {9: "flap", 10: "flap", 11: "airbrake", 17: "spoiler", 18: "spoiler"}
-# CA_SV_CSn_...: other controls that move a surface, and the topic of their deflection.
+# Flaps and spoilers may also deflect a surface of another type, by the factor CA_SV_CSn_FLAP or CA_SV_CSn_SPOIL: their
+# name in messages, and the topic with their setpoint.
 _ALSO_MOVE = {"FLAP": ("flaps", "flaps_setpoint"), "SPOIL": ("spoilers", "spoilers_setpoint")}
 _AXES = ("P", "R", "Y")
-# Deflection of a flap beyond which it is moved, of its travel of 2.
+# A flap moves in flight if its largest and its smallest output (-1..1) differ by more than this.
 _FLAP_MOVE_TOLERANCE = 0.05
 # vehicle_status.vehicle_type of a fixed wing.
 _FIXED_WING = 2
@@ -126,7 +130,7 @@ def read_px4_motion(path: Path, digest: str) -> MotionLog:
 
 
 def _read_samples(topics: Topics, topic: str, *choices: tuple[str, ...]) -> Samples:
-    """Return fields of a topic, sorted by time; no rows if the topic has none of the groups of fields.
+    """Return fields of a topic, sorted by time; no rows if the log lacks the topic or the fields.
 
     choices: alternative groups of fields; the first group that the topic has is returned.
     """
@@ -157,9 +161,9 @@ def _read_inertial(topics: Topics) -> Samples:
 
 
 def _read_airspeed(topics: Topics) -> tuple[Samples, Samples]:
-    """Return the measured calibrated airspeed (m/s), and the ratio of true to calibrated airspeed.
+    """Return calibrated airspeed, m/s, (n, 1), and the ratio of true to calibrated airspeed, (k, 1).
 
-    Rows whose airspeed is not from a sensor are left out.
+    Rows whose airspeed is not from a sensor are left out; rows up to 1 m/s have no ratio.
     """
     # PX4 logs calibrated airspeed since 1.12, and equivalent airspeed before; both are equal at these speeds.
     choices = [(speed, "true_airspeed_m_s") for speed in ("calibrated_airspeed_m_s", "equivalent_airspeed_m_s")]
@@ -198,9 +202,10 @@ def _find_hover_periods(topics: Topics) -> Iterable[tuple[float, float]]:
 def _read_controls(topics: Topics, parameters: Mapping[str, float]) -> tuple[Samples, bool]:
     """Return pitch, roll, yaw (fractions of travel) and throttle, (n, 4), and True if there are elevons.
 
-    The deflection of a surface is positive up or to the right.  The parameters CA_SV_CSn_TRQ_* of a surface state its
-    effect on each axis.  The deflection about an axis is the mean of all surfaces, weighted by these effects.  Raises
-    LogError for surfaces that cannot be modelled.
+    Controls are positive up or to the right.  The parameters CA_SV_CSn_TRQ_* of a surface state its effect on pitch,
+    roll and yaw.  The control about an axis is the mean deflection of all surfaces, weighted by these effects.  The
+    throttle is the mean of the forward motors.  Logs of releases before 1.14 contain the controls themselves, which are
+    then returned; without them there are no rows.  Raises LogError for surfaces that cannot be modelled.
     """
     servos = _read_actuators(topics, "actuator_servos", _SERVOS)
     motors = _read_actuators(topics, "actuator_motors", _MOTORS)
@@ -290,7 +295,7 @@ def _read_actuators(topics: Topics, topic: str, size: int) -> Samples:
 
 
 def _is_armed(topics: Topics, time: Floats) -> Flags:
-    """Return a mask (n,): True at times when the vehicle was armed; all True if the log does not state it."""
+    """Return a mask of n times: True when the vehicle was armed; all True if the log does not state it."""
     states = _read_samples(topics, "vehicle_status", ("arming_state",))
     if not len(states.time):
         return np.ones(len(time), np.bool_)

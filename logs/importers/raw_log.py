@@ -32,7 +32,7 @@ _MAX_SAMPLE_TIME_S = 10.0
 
 @dataclass(frozen=True, slots=True)
 class LogSeries:
-    """Rows of one kind in the order of the file.
+    """Rows of one quantity, such as position or attitude, in the order of the file.
 
     source: name of the logged message, such as "POS" or "vehicle_global_position".
     time: times on the log's clock, as in the file, s, (n,).
@@ -46,11 +46,12 @@ class LogSeries:
 
 
 def with_used_energy(battery: LogSeries) -> LogSeries:
-    """Return the battery's current (A) and the energy used (Wh), (n, 2).
+    """Compute the energy that a battery delivered since the first row, from its voltage and current.
 
-    A charging current counts as 0.  A sample counts for at most `_MAX_SAMPLE_TIME_S`.
+    Returns the current (A) and the energy used (Wh), (n, 2).  A charging current becomes 0.  After a pause in the log
+    the current is assumed to have flowed for at most `_MAX_SAMPLE_TIME_S`.
 
-    battery: voltage (V) and current (A), (n, 2), from which the energy is computed.
+    battery: voltage (V) and current (A), (n, 2).
 
     >>> battery = LogSeries("BAT", np.array([0.0, 1.0, 2.0]), np.array([[36.0, 0.0], [36.0, 100.0], [36.0, 100.0]]))
     >>> with_used_energy(battery).values.tolist()
@@ -78,9 +79,10 @@ class HeightSource:
 
 @dataclass(frozen=True, slots=True)
 class ModeChange:
-    """Start of a flight mode.
+    """Change to a flight mode.
 
-    time: s.
+    time: time of the change, s.
+    name: name of the new mode.
     automatic: True if the vehicle follows its mission in this mode.
     """
 
@@ -91,13 +93,13 @@ class ModeChange:
 
 @dataclass(frozen=True, slots=True)
 class LoggedMission:
-    """Mission that the vehicle had from a time on.
+    """Mission that the vehicle received, as logged.
 
-    time: s.
+    time: time from which the vehicle had it, s.
     origin: name of the log messages with the mission, such as "CMD", "MISSION_ITEM_INT" or "declared task".
     with_heights: True if the items state altitudes.
     missing: items that the log lacks; None for a complete mission.  An incomplete mission is the longest run of items
-    without a gap, and may have fewer than two items.
+        with consecutive numbers, and may have fewer than two items.
     """
 
     time: float

@@ -69,7 +69,7 @@ _LATEST_US = 4_102_444_800_000_000
 
 @dataclass
 class TelemetryReader:
-    """Decoder of the wanted messages of a log, with counts of the damage.
+    """Decoder of a log's messages of the wanted kinds, which also counts unreadable places.
 
     data: bytes of the log.
     wanted: message numbers to decode.
@@ -89,7 +89,7 @@ class TelemetryReader:
     _decoder: Any = field(default_factory=lambda: dialect.MAVLink(None))
 
     def messages(self) -> Iterator[tuple[float, Any]]:
-        """Yield the time of reception (s since 1970) and the message of each record, in the order of the file."""
+        """Yield each wanted message in the order of the file, with its time of reception, s since 1970."""
         position, end, is_in_record, piece_end = 0, len(self.data), True, PIECE_BYTES
         while position + _STAMP.size + _V1_FRAME <= end:
             if position >= piece_end:
@@ -152,7 +152,7 @@ class TelemetryReader:
 # Messages of one system in a telemetry log: frequent numeric messages are kept as rows, so that a long log stays small.
 
 
-# Fields that are kept of messages that are sent many times a second.
+# Kinds of messages that are sent many times a second, with the fields of them that are kept.
 NUMBERS = {
     "GLOBAL_POSITION_INT": ("lat", "lon", "alt", "vx", "vy", "vz"),
     "ATTITUDE": ("roll", "pitch", "yaw"),
@@ -172,9 +172,9 @@ _MAX_MESSAGES = 200_000
 
 
 class BootClock(NamedTuple):
-    """Clock of the vehicle.
+    """Clock that starts when the vehicle is switched on.
 
-    offset: time of reception that corresponds to the clock's time 0, s since 1970.
+    offset: time 0 of this clock, s since 1970.
     jumps: times at which the vehicle was switched on again, s.
     time: time of each message on this clock, s, (n,).
     """
@@ -229,7 +229,8 @@ class SystemMessages:
     def boot_clock(self) -> BootClock:
         """Return the clock of the vehicle, with the time of each message.
 
-        A message without its own time gets the time of the message before it, plus the time between their receptions.
+        A message that does not state the vehicle's time gets the time of the last message before it that does, plus the
+        time between their receptions.  If no message states it, the clock starts at the first reception.
         """
         stamps, time = np.array(self._stamps), np.array(self._boots)
         known_rows = np.flatnonzero(np.isfinite(time))
@@ -323,12 +324,13 @@ def _is_vehicle(message: Any) -> bool:
 
 
 class VehicleMessages:
-    """Messages of one vehicle, by name, on its own clock."""
+    """Messages of one vehicle, with times on the vehicle's clock."""
 
     def __init__(self, messages: SystemMessages, items: list[tuple[float, Any]], source: str) -> None:
-        """Take the messages of the vehicle, and the messages on missions.
+        """Take the messages that the vehicle sent, and the messages that transfer missions, from any sender.
 
-        items: messages on missions with their times of reception, s since 1970.
+        items: messages that transfer missions, each with its time of reception, s since 1970.
+        source: path of the log.
         """
         self._source, self._messages = source, messages
         clock = messages.boot_clock()
@@ -456,7 +458,7 @@ class VehicleMessages:
         return LogSeries(table.source, table.time, table.values * np.array([1e-3, 0.01]))
 
     def _read_measured_table(self, name: str, columns: tuple[str, ...]) -> LogSeries | None:
-        """Return fields of a battery message, only the rows with measurements; None if there are none."""
+        """Return fields of a battery message, only rows in which all were measured; None without rows."""
         table = self.table(name, columns)
         if table is None:
             return None

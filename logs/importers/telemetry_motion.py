@@ -11,11 +11,11 @@ from logs.importers.wind_triangle import estimate_wind
 from world.arrays import Floats
 from world.errors import LogError
 
-# RAW_IMU of ArduPilot is in thousandths of this, m/s^2, and of rad/s.
+# ArduPilot's RAW_IMU states accelerations in thousandths of this, m/s^2, and angular rates in thousandths of a rad/s.
 _STANDARD_GRAVITY_MPS2 = 9.80665
 # Period after which a 32-bit count of microseconds starts at 0 again, s.
 _WRAP_S = 2.0**32 * 1e-6
-# Largest difference between a message's own time and the time that its neighbours give it, s.
+# The time stated in a message is used if it differs by less than this from its time of reception, s.
 _MAX_CLOCK_DIFFERENCE_S = 2.0
 NO_SAMPLES = Samples(np.zeros(0), np.zeros((0, 1)))
 
@@ -84,7 +84,7 @@ def _select_columns(series: LogSeries | None, columns: list[int], factors: list[
 
 
 def _correct_message_times(time: Floats, microseconds: Floats) -> Floats:
-    """Return the times at which the vehicle made its messages, s, (n,), instead of their reception.
+    """Return the times at which the vehicle made its messages, as stated in the messages, s, (n,).
 
     time: times of reception on the vehicle's clock, s, (n,).
     microseconds: times in the messages since the vehicle was switched on, us, (n,); the count may wrap after 32 bits.

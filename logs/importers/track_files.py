@@ -59,7 +59,8 @@ def read_track_text(path: Path, *, xml: bool) -> str:
 def _read_bytes(path: Path) -> bytes:
     """Return the bytes of a file, or of the first `.kml` in a zipped file.
 
-    Raises LogError for a zipped file that cannot be read, or that contains no `.kml`.
+    Raises LogError for a zipped file that cannot be read, that contains no `.kml`, or whose `.kml` has more than
+    `MAX_BYTES`.
     """
     if not zipfile.is_zipfile(path):
         return path.read_bytes()
@@ -351,7 +352,7 @@ def _get_local_name(element: ElementTree.Element) -> str:
 
 
 def _pair_times_with_positions(track: ElementTree.Element, path: Path) -> tuple[list[tuple[str, str]], int]:
-    """Return the pairs of time and position of a track as texts, and the number of unpaired elements.
+    """Pair the times and positions of a track, as texts; also return how many are left over.
 
     Either all times come before all positions, or each time comes before its position.  Raises LogError if the numbers
     of times and positions differ in the first case.

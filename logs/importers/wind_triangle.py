@@ -18,6 +18,9 @@ _MIN_FRACTION = 0.5
 def estimate_wind(velocity: Samples, attitude: Samples, airspeed: Samples) -> Samples:
     """Return the wind velocity to north and east, m/s, (k, 2): the ground velocity minus the air velocity.
 
+    There is one row for each second, the mean over the `_WINDOW_S` around it, if the aircraft flew in at least half of
+    them.  Fewer than two rows of any input give no wind.
+
     The nose is assumed to point into the air flow.  A sideslip or a heading error of 3 degrees at 17 m/s therefore
     appears as 0.9 m/s of wind in straight flight, and averages out on circles.
 

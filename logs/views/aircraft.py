@@ -24,6 +24,7 @@ _DASHES: tuple[Any, ...] = ("-", (0, (7, 2)), (0, (4, 2)), (0, (2, 2)), (0, (1, 
 # Marker of each mode.
 _MARKS = {"short period": "o", "phugoid": "s", "Dutch roll": "D", "roll-spiral": "P", "roll": "^", "spiral": "v"}
 _MODE_COLORS = dict(zip(_MARKS, theme.MODES, strict=True))
+# Name, unit and factor of the values of each quantity of a step response.
 _QUANTITIES = {
     "pitch": ("pitch", "°", 180.0 / math.pi),
     "roll": ("roll", "°", 180.0 / math.pi),
@@ -204,7 +205,11 @@ def _draw_power(axes: Any, aircraft: Aircraft, speeds: Floats, trims: Sequence[T
 
 
 def _draw_roots(axes: Any, modes: Mapping[float, Sequence[Mode]], *, all_modes: bool) -> None:
-    """Draw the upper half of the root plane: all modes, or only the slow ones near the origin."""
+    """Draw the roots of the modes of motion at each airspeed in the upper half of the complex plane.
+
+    modes: modes by airspeed, m/s.
+    all_modes: True for all modes, False for only the slow ones, whose roots are near the origin.
+    """
     slow_modes = {"phugoid", "spiral", "roll-spiral"}
     labelled_modes: set[str] = set()
     for speed, speed_modes in modes.items():

@@ -37,7 +37,8 @@ class Layer:
     quiet: True for a layer in the legend but not in the read-out of the page.
     legend: common legend text of several layers; "" for the name.
     hover_texts: text of the page on each point, or one text on the whole layer; empty to show the values.
-    flight: in a map, the number of the flight whose moments are the points; the page already has them.
+    flight: number of the flight whose track a map draws by this layer; the page takes its points from the flight's
+        moments, which it has anyway.  None for all other layers.
     """
 
     kind: LayerKind
@@ -105,7 +106,10 @@ class Panel:
         return any(np.isfinite(layer.y).any() for layer in self.layers)
 
     def shown_span(self) -> tuple[float, float]:
-        """Return `span`, or else the range of values and limits, at least `min_span` wide, with an 8 % margin."""
+        """Return the range of the vertical axis that is drawn, (low, high).
+
+        It is `span`, or else the range of values and limits, at least `min_span` wide, with an 8 % margin.
+        """
         if self.span is not None:
             return self.span
         values = [value for _, value in self.limits if math.isfinite(value)]
@@ -182,7 +186,11 @@ def filled_series(name: str, role: str, along: Floats, values: ArrayLike) -> Lay
 
 
 def join_with_gaps(parts: Sequence[Floats]) -> tuple[Floats, Floats]:
-    """Join lines (k, 2) into the x and y of one layer, with a gap after each line.
+    """Join lines into the x and y of one layer, with a gap (NaN) after each line.
+
+    Lines without points are left out.
+
+    parts: points of each line, (k, 2).
 
     >>> x, y = join_with_gaps([np.zeros((2, 2)), np.ones((1, 2))])
     >>> x.tolist()
@@ -194,7 +202,7 @@ def join_with_gaps(parts: Sequence[Floats]) -> tuple[Floats, Floats]:
 
 
 def make_saturation_band(is_saturated: NDArray[np.bool_], axis_positions: Floats, span: tuple[float, float]) -> Layer:
-    """Return a layer that shades the parts of a long axis in which a control is at its limit.
+    """Return a layer that shades the parts of the horizontal axis in which a control is at its limit.
 
     is_saturated: True at rows where the control is at its limit, (t,).
     axis_positions: position of each row along the axis, (t,).
@@ -211,7 +219,7 @@ def make_saturation_band(is_saturated: NDArray[np.bool_], axis_positions: Floats
 def make_leg_marks(legs: NDArray[Any], axis_positions: Floats) -> tuple[tuple[float, str], ...]:
     """Return a mark at the start of each leg: its position along an axis, and the leg's name.
 
-    legs: number of each row's leg in messages, (t,).
+    legs: leg of each row, by its number in messages, (t,).
     axis_positions: position of each row along the axis, (t,).
     """
     starts = [0, *(np.flatnonzero(np.diff(legs)) + 1).tolist()]
@@ -221,7 +229,8 @@ def make_leg_marks(legs: NDArray[Any], axis_positions: Floats) -> tuple[tuple[fl
 def find_outline_rows(values: ArrayLike, count: int) -> Indices:
     """Return the rows of the lowest and highest value of each of `count` blocks of a long series.
 
-    A line through these rows has the same outline as the series.  All rows of a short series are returned.
+    A line through these rows has the same outline as the series.  The first and the last row are included.  All rows of
+    a short series are returned.
 
     values: (t,); NaN rows are omitted unless a block has no other rows.
     """
@@ -269,7 +278,7 @@ def numbers(values: Iterable[float], digits: int) -> list[float | None]:
 
 
 def screen_decimals(values: Floats) -> int:
-    """Return the number of decimals that resolves a ten-thousandth of the values' range, as a screen does.
+    """Return the number of decimals that drawing on a screen needs: a ten-thousandth of the values' range.
 
     >>> screen_decimals(np.array([0.0, 90.0])), screen_decimals(np.array([0.001, 0.002]))
     (3, 7)
@@ -340,7 +349,10 @@ class LegendEntry:
 
 
 def legend_entries(panels: Sequence[Panel]) -> tuple[LegendEntry, ...]:
-    """Return a legend entry for each layer name, then one for each limit label, in the panels' order."""
+    """Return the legend of panels: an entry for each text of a layer, then one for each label of a limit.
+
+    Layers with the same legend text share an entry; layers without a name or without values have none.
+    """
     layers_by_name: dict[str, list[Layer]] = {}
     for panel in panels:
         for layer in panel.layers:

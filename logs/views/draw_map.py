@@ -48,7 +48,7 @@ _LINE = 0.145
 
 
 def draw_map(chart: MapChart) -> Figure:
-    """Draw the top view: north up, equal scales, axes in m labelled in km from the scenario's origin."""
+    """Draw the top view: north up, equal scales, axes in km from the scenario's origin."""
     with clean_style():
         handles = [make_legend_handle(entry) for entry in legend_entries([chart.panel])]
         # A legend of four columns.
@@ -137,7 +137,7 @@ def _draw_colour_bar(figure: Figure, colours: Any, norm: Any, levels: Floats, co
     """Draw the colour bar of the ground's altitude in the column right of the map.
 
     colours, norm: matplotlib's colour map and normalisation of altitudes.
-    levels: altitudes between colours, m AMSL.
+    levels: altitudes of the contours, m AMSL; some of them label the bar.
     column, top: left edge of the column, and distance of the bar from the figure's top, inches.
     """
     figure_height = float(figure.get_figheight())

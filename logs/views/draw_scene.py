@@ -38,7 +38,7 @@ _MAX_CELLS = 130
 _MAX_TRACK = 1600
 # Smallest ratio of the shorter to the longer side of the drawn ground.
 _MIN_SIDE_RATIO = 0.3
-# Additional azimuth of the view of a narrower scene, rad.
+# Angle by which the viewer moves round a narrower scene, towards its end, rad.
 _NARROW_SCENE_AZIMUTH_RAD = math.radians(45.0)
 # With more waypoints than this, only every n-th waypoint is numbered.
 _MAX_NUMBERS = 40
@@ -48,7 +48,7 @@ _MAX_NAMES = 30
 
 @dataclass(frozen=True, slots=True)
 class Projection:
-    """A parallel projection.
+    """Parallel projection of positions to the picture; the viewer looks down at the angle `_ELEVATION`.
 
     azimuth: direction from the center to the viewer, rad, counter-clockwise from east.
     center: position shown at the center of the picture, m, (3,).
@@ -74,7 +74,10 @@ class Projection:
 
     @property
     def toward(self) -> Floats:
-        """Step towards the viewer to east, north and up, (3,), m; its horizontal length is 1 m."""
+        """Vector from any position towards the viewer, to east, north and up, m, (3,).
+
+        Its horizontal length is 1 m.
+        """
         return np.array([math.cos(self.azimuth), math.sin(self.azimuth), math.tan(_ELEVATION) / self.stretch])
 
 
@@ -294,7 +297,7 @@ def _draw_paths(
     failed: Failures,
     placer: LabelPlacer,
 ) -> list[Any]:
-    """Draw route (w, 3), track, waypoints with poles to the ground, and failures; return handles for the legend."""
+    """Draw route (w, 3), waypoints on poles, track and failures; return handles for the legend."""
     _, samples = route_samples(route, max(float(route_distance(route)[-1]) / 600.0, 1.0))
     if terrain is not None:
         ground = terrain.height(route[:, 0], route[:, 1])
@@ -381,7 +384,7 @@ def _draw_labels(
     last = len(route) - 1
 
     def write(text: str, point: Floats, rank: LabelRank, role: str = "ink") -> None:
-        """Write one label at a projected point."""
+        """Write a label at a point in picture coordinates, as from `Projection.project`."""
         write_label(placer, Label(text, float(point[0]), float(point[1]), rank, role))
 
     # The same words as on the map.

@@ -98,7 +98,7 @@ _MAX_PANEL_TITLE_LINES = 2
 
 @contextmanager
 def clean_style() -> Iterator[None]:
-    """Use matplotlib's defaults and the settings above instead of the user's matplotlibrc.
+    """Use matplotlib's defaults and planfly's settings for pictures instead of the user's matplotlibrc.
 
     The previous settings are restored at the end.
 
@@ -412,7 +412,7 @@ def _set_place_ticks(axes: Any, panel: Panel) -> None:
 def draw_layers(axes: Any, panel: Panel, min_zorder: float = 2.0) -> None:
     """Draw the layers of a panel, the lowest first, and its limit lines between bands and other layers.
 
-    min_zorder: zorder of the lowest layer.
+    min_zorder: matplotlib's zorder of the lowest layer.
     """
     for label, value in panel.limits:
         role_style = theme.ROLE_STYLES["limit"]
@@ -434,7 +434,7 @@ def draw_layers(axes: Any, panel: Panel, min_zorder: float = 2.0) -> None:
 
 
 def _make_dash_pattern(role_style: theme.RoleStyle, dashed: bool = False) -> Any:
-    """Return matplotlib's line style of a role, with dashes in units of the line width; "-" for a solid line."""
+    """Return the line style of a role for matplotlib: dashes in line widths, or "-" for a solid line."""
     pattern = role_style.dash or ((8.0, 3.5) if dashed else ())
     return (0, tuple(part / max(role_style.width, 0.1) for part in pattern)) if pattern else "-"
 
@@ -461,7 +461,10 @@ def _draw_line(axes: Any, layer: Layer, role_style: theme.RoleStyle, **options: 
 
 
 def _draw_band(axes: Any, layer: Layer, role_style: theme.RoleStyle, **options: Any) -> None:
-    """Draw a layer as filled bands between its two edges, with gaps where an edge is unknown."""
+    """Draw a layer as filled bands between its two edges, with gaps where an edge is unknown.
+
+    A layer without a lower edge is filled down to 0.
+    """
     lower_edge = layer.lower_edge if layer.lower_edge is not None else np.zeros(len(layer.y))
     is_known = np.isfinite(layer.x) & np.isfinite(layer.y) & np.isfinite(lower_edge)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], is_known, [False]]).astype(np.int8)))

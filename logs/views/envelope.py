@@ -18,9 +18,11 @@ _MAX_DOTS = 2000
 
 @dataclass(frozen=True, slots=True)
 class EnvelopeLine:
-    """Steepest steady path angles (°) at one altitude (m AMSL) over true airspeed (m/s), (120,).
+    """Steepest steady path angles at one altitude, over true airspeed.
 
-    Descents have negative angles.
+    amsl: altitude, m AMSL.
+    airspeed: true airspeeds, m/s, (120,).
+    climb, descent: path angle at each airspeed, degrees, (120,); angles of descents are negative.
     """
 
     amsl: int
@@ -30,7 +32,7 @@ class EnvelopeLine:
 
 
 def sample_envelope_lines(setup: FlightSetup) -> list[EnvelopeLine]:
-    """Return the envelope at the lowest and the highest altitude of the route."""
+    """Return the envelope at the lowest and the highest altitude of the route; once if both are equal."""
     envelope, altitudes = setup.envelope, setup.route.positions[:, 2]
     speeds = np.linspace(envelope.airspeed[0], envelope.airspeed[-1], 120)
     lines = []

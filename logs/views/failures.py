@@ -23,8 +23,10 @@ _MAX_LABELS = 16
 
 @dataclass(frozen=True, slots=True)
 class Failures:
-    """Rules that failed, by leg and by waypoint number (each rule once, in the verdict's order).
+    """Rules that failed, by place.
 
+    legs, waypoints: names of the failed rules by the number of the leg or waypoint, as in ``{7: ("slope",)}``; each
+        rule once, in the verdict's order.
     threats: missiles and radars whose range was entered, each once.
     places: failing legs and waypoints by kind and number, as in the verdict.
     """
@@ -180,7 +182,7 @@ def threat_radius(threats: Threats, place: Place) -> float:
 
 
 def find_rows_inside_threats(failed: Failures, threats: Threats, track: Track) -> NDArray[np.bool_]:
-    """Return a mask (t,): True for rows of the track inside a sphere whose rule fails."""
+    """Return a mask (t,): True for rows of the track inside the sphere of a threat whose rule fails."""
     is_inside = np.zeros(len(track), dtype=bool)
     for place in failed.threats:
         offsets = track.position - threats.position[place.index or 0]

@@ -162,7 +162,7 @@ def _make_fixed_caption(text: str) -> Callable[[Subject], str]:
 
 
 def _name_autopilot(subject: Subject) -> str:
-    """Name the autopilot whose returns are drawn, as the words before "model" in a caption."""
+    """Name the autopilot whose returns are drawn, as before "model" in a caption: "the ArduPlane"."""
     return "the autopilot's" if subject.returns is None else f"the {subject.returns.returns.autopilot}"
 
 

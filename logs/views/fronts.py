@@ -1,4 +1,7 @@
-"""Chart a front of plans: all plans from above, and the objectives of each over its length."""
+"""Chart a front of plans: all plans from above, and the objectives of each over its length.
+
+A front is a set of plans of which none is better than another in every objective.
+"""
 
 import math
 from dataclasses import dataclass
@@ -20,7 +23,7 @@ LEAST_LENGTH = 0.01
 
 @dataclass(frozen=True, slots=True)
 class _NamedPlan:
-    """Best plan in one objective: its number from 0, name and role."""
+    """Plan of a front that is best in one objective: its index in the front, and its name and role."""
 
     row: int
     name: str

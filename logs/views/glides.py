@@ -17,9 +17,10 @@ _ROLES_AND_NAMES: dict[Reach, tuple[str, str]] = {reach: (f"reach-{reach}", reac
 
 
 def glide_chart(setup: FlightSetup, drawn_returns: DrawnReturns, track: Track | None) -> MapChart | None:
-    """Return a map of the glide footprint, and of the path coloured by the destination in reach.
+    """Map the glide footprint, and the path, coloured by the best destination in gliding reach.
 
-    Return None if glides were not judged.
+    The footprint consists of the areas from which home or another site can be reached without an engine.  Return None
+    if glides were not judged.
 
     track: the flown track; None for glides from the planned path.
     """
@@ -65,7 +66,7 @@ def _describe_glide(glide: Glide, drawn_returns: DrawnReturns) -> str:
 def make_footprint_layers(drawn_returns: DrawnReturns, extent: Extent) -> list[Layer]:
     """Return layers of the glide footprint; [] if none was computed.
 
-    They are the areas by the lowest height above ground from which a site can be reached, and flat ground.
+    There is an area for each height above ground from which a site can be reached, and one of flat ground.
     """
     footprint = drawn_returns.glides.footprint
     if footprint is None:
@@ -81,7 +82,10 @@ def make_footprint_layers(drawn_returns: DrawnReturns, extent: Extent) -> list[L
 
 
 def make_area_layer(name: str, role: str, parts: tuple[Part, ...]) -> Layer:
-    """Make a layer of areas with holes; NaN separates their rings."""
+    """Make a layer of areas with holes; NaN separates their rings.
+
+    parts: rings of each area, (k, 2), m: first its outline, then its holes.
+    """
     gap = np.full((1, 2), np.nan)
     x, y = np.vstack([points for part in parts for ring in part for points in (ring, gap)])[:-1].T
     return Layer("area", name, role, x, y, hover_texts=(name,))

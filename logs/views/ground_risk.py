@@ -22,9 +22,9 @@ _BAND_NAMES = (
 
 
 class RiskVolume(NamedTuple):
-    """A volume of the ground risk.
+    """Volume around a mission that an assessment of the ground risk considers.
 
-    name: name of the volume.
+    name: name of the volume, such as "flight geography".
     role: role in `logs.theme`.
     area: area on the map, m.
     height: height above ground, m; None for an area on the ground.

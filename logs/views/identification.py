@@ -35,7 +35,7 @@ def equation_chart(equation: Equation) -> Chart:
 def prediction_chart(predicted: PredictedLog) -> Chart:
     """Chart measured quantities and the identified model's predictions, one panel for each quantity.
 
-    The predictions were made half a second before.
+    Each value was predicted from the measurements half a second earlier.
     """
     panels = tuple(
         Panel(

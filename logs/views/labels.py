@@ -34,10 +34,14 @@ _DIRECTIONS = ((1, 1), (-1, 1), (1, -1), (-1, -1), (0, 1), (0, -1), (1, 0), (-1,
 
 @dataclass(slots=True)
 class LabelPlacer:
-    """Greedy placement in pixels on one axes, whose limits and position must be final.
+    """Places labels on axes one after another, each where it covers least.
 
-    lines: (n, 2) pixel positions that labels should not cover.  boxes: areas of the labels already placed.
-    points: pixel positions of these labels' points.
+    Labels that were placed earlier are not moved.
+
+    axes: matplotlib's axes, whose limits and position must be final.
+    lines: positions that labels should not cover, pixels, (n, 2).
+    boxes: areas of the labels already placed, pixels.
+    points: position that each of these labels names, pixels.
     """
 
     axes: Any
@@ -95,7 +99,7 @@ class LabelPlacer:
                 cost = self._compute_box_cost(box) + order_cost + 0.05 * direction_rank + 1.5 * ring
                 if cost < best_cost:
                     best_box, best_cost, best_ring = box, cost, ring
-        if optional and any(_do_overlap(best_box, other) for other in self.boxes):
+        if optional and any(_boxes_overlap(best_box, other) for other in self.boxes):
             return
         self.boxes.append(best_box)
         self.points.append((point_x, point_y))
@@ -149,9 +153,10 @@ class LabelPlacer:
         )
 
     def _compute_order_cost(self, box: Box, x: float, y: float) -> float:
-        """Return the cost of a label that stands in another order to near labels than their points do.
+        """Return the cost of a label that is on the wrong side of near labels.
 
-        A reader could assign such labels to the wrong points.  A framed label has a line to its point instead.
+        If a point is left of another point, but its label right of the other label, a reader could assign both labels
+        to the wrong points.  This is not needed for a framed label, which has a line to its point.
 
         box: box of the label, pixels.
         x, y: point of the label, pixels.
@@ -174,7 +179,7 @@ class LabelPlacer:
         if box[0] < frame.x0 or box[1] < frame.y0 or box[2] > frame.x1 or box[3] > frame.y1:
             cost += 60.0
         for other_box in self.boxes:
-            if _do_overlap(box, other_box):
+            if _boxes_overlap(box, other_box):
                 cost += _OVERLAP_COST
         if len(self.lines):
             is_covered = (
@@ -187,6 +192,6 @@ class LabelPlacer:
         return cost
 
 
-def _do_overlap(first: Box, second: Box) -> bool:
+def _boxes_overlap(first: Box, second: Box) -> bool:
     """Return True if two boxes (left, bottom, right, top) overlap."""
     return first[0] < second[2] and second[0] < first[2] and first[1] < second[3] and second[1] < first[3]

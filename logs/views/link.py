@@ -18,10 +18,10 @@ from logs.views.map import Extent, MapChart, NamedWind, end_labels, map_extent, 
 from logs.views.returns import path_layers
 from world.arrays import Floats
 
-# Margin above the fade margin below which the map calls the link weak, dB.
+# The map calls a link weak if its signal is less than this above the fade margin, dB.
 WEAK_MARGIN_DB = 6.0
 LinkQuality = Literal["kept", "weak", "lost", "unknown"]
-# Fraction of the first Fresnel zone that is free of ground for a loss close to that of free space.
+# If this fraction of the first Fresnel zone is free of ground, the loss is close to the loss in free space.
 _CLEAR_FRACTION = 0.6
 # Largest clearance, in radii of the first Fresnel zone, that the chart shows: more makes no difference.
 _MAX_SHOWN_CLEARANCE = 3.0
@@ -64,7 +64,9 @@ class DrawnLink:
 
 
 def compute_link(setup: FlightSetup, along: LinkAlongPath, antenna: Floats, *, is_flown: bool) -> DrawnLink | None:
-    """Compute the data for pictures of a radio link; None if link, terrain or path is missing.
+    """Compute the data for pictures of a radio link that was measured along a path.
+
+    Return None without a link, a terrain, or a position on the path.
 
     along: the link along the path.
     antenna: position of the station's antenna, m, (3,).
@@ -79,7 +81,7 @@ def compute_link(setup: FlightSetup, along: LinkAlongPath, antenna: Floats, *, i
 
 
 def compute_scenario_link(setup: FlightSetup, track: Track | None) -> DrawnLink | None:
-    """Compute the data of the pictures of the scenario's radio link along a flight.
+    """Measure the scenario's radio link along a flight or plan, and compute the data for its pictures.
 
     Return None without a link, a terrain, or a known position of the station.
 
@@ -99,7 +101,7 @@ def compute_scenario_link(setup: FlightSetup, track: Track | None) -> DrawnLink 
 
 def link_chart(setup: FlightSetup, drawn: DrawnLink) -> Chart:
     """Chart the link's margin, diffraction loss, Fresnel clearance and distance over time."""
-    link_along_path, points = drawn.along, drawn.along.points
+    along, points = drawn.along, drawn.along.points
     name, role = ("flown", "flown") if drawn.is_flown else ("planned path", "planned")
 
     def make_panel(
@@ -110,7 +112,7 @@ def link_chart(setup: FlightSetup, drawn: DrawnLink) -> Chart:
         limits: names and values of the limit lines.
         note: note on values that are not shown.
         """
-        return Panel(title, unit, (series(name, role, link_along_path.time, values),), limits=limits, note=note)
+        return Panel(title, unit, (series(name, role, along.time, values),), limits=limits, note=note)
 
     clearance = np.clip(points.fresnel_clearance, -_MAX_SHOWN_CLEARANCE, _MAX_SHOWN_CLEARANCE)
     zone_limits = (("line of sight", 0.0), (f"{100.0 * _CLEAR_FRACTION:.0f} % of the first zone", _CLEAR_FRACTION))
@@ -127,7 +129,10 @@ def link_chart(setup: FlightSetup, drawn: DrawnLink) -> Chart:
 
 
 def link_map(setup: FlightSetup, drawn: DrawnLink) -> MapChart:
-    """Return a map of the path and of the coverage, coloured by the quality of the link, and of the station."""
+    """Map a radio link: its quality along the path, the areas of a weak or lost link, and the station.
+
+    The areas apply to the height of the flight.
+    """
     scenario, route, along = setup.scenario, setup.route.positions, drawn.along
     points, antenna = along.points, drawn.antenna
     qualities = [link_quality(float(margin)) for margin in points.margin]

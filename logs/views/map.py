@@ -47,7 +47,7 @@ class NamedWind:
 class DrawnTrack:
     """A flown track, its name and its role.
 
-    flight: number of the flight in the page's data, which hold its moments.
+    flight: index of the flight in the page's data, which contain the flight's moments.
     """
 
     label: str
@@ -185,7 +185,7 @@ def scenario_map(
     labels: labels that take precedence over the names of threats and zones.
     extent: range as from `map_extent`.
     route: waypoints (w, 3), m, whose ends are start and destination, and whose altitudes determine the filled sections
-    of missiles.
+        of missiles; None to use the start and destination of the scenario.
     failing_threats: indices of the threats whose rule fails.
     """
     east, north = extent
@@ -278,13 +278,15 @@ def _make_waypoint_layers(
 
 
 def _name_ends(scenario: Scenario, route: Floats | None) -> tuple[tuple[str, Floats], tuple[str, Floats]]:
-    """Return start and destination, by name: the ends of the route, or the scenario's without a route."""
+    """Return start and destination, each as its name and position; the scenario's if there is no route."""
     first, last = (scenario.start, scenario.destination) if route is None else (route[0], route[-1])
     return ("start", first), ("destination", last)
 
 
 def end_labels(scenario: Scenario, route: Floats | None, stops: Sequence[int]) -> list[Label]:
-    """Return the labels of start and destination, with the numbers of their waypoints; one label if they coincide.
+    """Return the labels of start and destination, with the numbers of their waypoints.
+
+    Returns one label if start and destination coincide.
 
     stops: number of each waypoint of the route.
     """

@@ -154,8 +154,8 @@ def _draw_ends(axes: Any, scenario: Scenario, paths: Sequence[Floats]) -> list[A
 def draw_convergence(histories: Mapping[int, Mapping[str, Sequence[Floats]]]) -> Figure:
     """Draw the number of searches with a safe path, and the length ratios of safe paths, over generations.
 
-    histories: by number of threats and algorithm, the history (g, 3) of each search: length ratio, kill exposure and
-    violations of the best path yet.
+    histories: ``histories[30]["umda"]`` has one array (g, 3) for each search with umda among 30 threats; its rows are
+        generations, its columns length ratio, kill exposure and violations of the best path so far.
 
     >>> history = np.array([[1.4, 0.2, 1.0], [1.2, 0.0, 0.0], [1.1, 0.0, 0.0]])
     >>> figure = draw_convergence({30: {"umda": [history]}})

@@ -44,9 +44,12 @@ def band_chart(bands: Sequence[Band], title: str, *, by_time: bool = True) -> Ch
 
 
 def _with_gaps(axis_values: Floats, *columns: Floats) -> tuple[Floats, ...]:
-    """Insert NaN into an axis and its columns where the axis jumps from one segment of a log to the next.
+    """Insert NaN between the segments of a log, so that no line joins them.
 
-    Returns the axis, then the columns.
+    A segment ends where the axis jumps.  Returns the axis, then the columns.
+
+    axis_values: position of each row along the axis, (n,).
+    columns: values of each row, (n,) each.
     """
     steps = np.diff(axis_values)
     jumps = np.flatnonzero(steps > _MAX_STEP_RATIO * np.median(steps)) + 1

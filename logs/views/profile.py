@@ -50,7 +50,8 @@ def profile_chart(
     at the progress of the flight along the route, which never decreases.
 
     stops: number of each waypoint, (w,), shown at the first of those with the same number; None numbers all waypoints.
-    above_ground: (w,) m, as in `flight.mission.route.Route`; None if no leg follows the ground.
+    above_ground: height above ground at the end of each leg, m, (w,), as in `flight.mission.route.Route`; None if no
+        leg follows the terrain.
 
     >>> from logs.recording.example_log import example_log
     >>> setup = example_log().setup
@@ -104,7 +105,7 @@ def _make_chart(
     """Make the chart of the profile from its panel.
 
     waypoint_distances: distance of each waypoint along the route, m.
-    stop_starts: waypoints at which a stop begins.
+    stop_starts: index of the first waypoint of each stop, as from `stop_rows`.
     """
     path = "the straight line from start to destination" if is_straight else "the planned path"
     title = f"{shorten(scenario.name, 60)}: heights along the path"
@@ -134,7 +135,9 @@ def _compute_planned_altitudes(
     ground: Floats,
     scenario: Scenario,
 ) -> Floats:
-    """Return the planned altitude at each route sample, m AMSL, (s,), including terrain-following legs.
+    """Return the planned altitude at each route sample, m AMSL, (s,), also on terrain-following legs.
+
+    On such a leg the height above ground changes linearly from its start to its end; other legs are straight.
 
     waypoint_distances: distance of each waypoint along the route, m.
     height_above_ground: height above ground at the end of each leg, m, (w,); NaN if it does not follow the terrain.
@@ -278,7 +281,10 @@ def _make_waypoint_labels(
 def _make_limit_lines(
     scenario: Scenario, min_altitude: float, max_altitude: float
 ) -> tuple[tuple[tuple[str, float], ...], str]:
-    """Return ceiling and floor as horizontal lines, and a note if the ceiling is outside the picture."""
+    """Return ceiling and floor as horizontal lines, and a note if the ceiling is outside the picture.
+
+    A mission without a scenario has neither.
+    """
     if scenario.external:
         return (), ""
     ceiling, floor = f"ceiling, {scenario.ceiling:.0f} m AMSL", f"floor, {scenario.floor:.0f} m AMSL"

@@ -53,15 +53,16 @@ def split_judged_path(
     time_of: Callable[[Element], float],
     key_of: Callable[[Element], Key],
 ) -> list[tuple[Key, list[PathPoint[Element]]]]:
-    """Split the path into segments by the key of the judged element that is nearest in time.
+    """Split the path into segments by what was judged there, such as the outcome of a return.
 
-    Returns the key and the points of each segment, in order of time; [] without elements.  Each segment but the last
-    also has the first point of the next segment.
+    Each point of the path gets the judged element that is nearest in time; a segment ends where the key of the element
+    changes.  Returns the key and the points of each segment, in order of time; [] without elements.  Each segment but
+    the last also has the first point of the next segment.
 
     track: the flown track; None for the planned path.
-    elements: judged elements, in order of time; each time has one element.
-    time_of: time of an element, s.
-    key_of: key of an element.
+    elements: judged elements, such as returns, in order of time; each time has one element.
+    time_of: function that returns the time of an element, s.
+    key_of: function that returns the key of an element, such as its outcome.
     """
     if not elements:
         return []
@@ -84,8 +85,8 @@ def path_layers(
 
     segments: key and elements of each segment of the path.
     roles_and_names: role and name of each key, in the order of the layers.
-    position_of: coordinates of an element.
-    text_of: hover text of an element.
+    position_of: function that returns the coordinates of an element on the chart.
+    text_of: function that returns the hover text of an element.
     """
     layers = []
     for role, name in dict.fromkeys(roles_and_names.values()):
@@ -99,7 +100,7 @@ def path_layers(
 
 
 def returns_map(setup: FlightSetup, drawn_returns: DrawnReturns, track: Track | None) -> MapChart:
-    """Return a map of the worst returns, and of the path, coloured by the outcome of returns from it.
+    """Return a map of the path, coloured by the outcome of returns from it, and of the worst returns.
 
     track: the flown track; None for returns from the planned path.
     """

@@ -133,7 +133,7 @@ def scene_data(view: SceneView) -> dict[str, object]:
 
 
 def _make_zone_walls(setup: FlightSetup) -> dict[str, object]:
-    """Return the zones as JSON data: name, kind, and rings with the floor and ceiling altitude at each corner.
+    """Return the zones as JSON data: name, kind, and rings with floor and ceiling at each corner.
 
     The result is empty without zones.
     """

@@ -1,4 +1,7 @@
-"""Chart the photo lines of a survey from above: usable parts, lost parts, and the track."""
+"""Chart the photo lines of a survey from above: usable parts, lost parts, and the track.
+
+A photo line is a straight part of a survey along which the camera takes pictures.
+"""
 
 import numpy as np
 

@@ -27,9 +27,9 @@ _CIRCLE_ANGLES_RAD = np.linspace(0.0, 2.0 * np.pi, 73)
 
 
 def threat_circles(threats: Threats, route: Floats | None, failing_threats: frozenset[int]) -> tuple[Layer, ...]:
-    """Return layers of missiles and radars from above: circles of spheres, and filled missile sections.
+    """Return layers of missiles and radars from above: the circle of each sphere, and a dot at each unit.
 
-    A section is the sphere's circle at the altitude of the nearest path point.
+    Each missile also has a filled circle, the section of its sphere at the altitude of the nearest path point.
 
     route: waypoints (w, 3), m, or None to show only the spheres.
     failing_threats: indices of the threats whose rule fails.
@@ -185,7 +185,7 @@ def threat_cuts(
 ) -> tuple[list[Layer], list[Label]]:
     """Return layers of the sections of missile and radar spheres with a vertical plane, and their labels.
 
-    Radars come first.
+    Radars come first.  At most `_MAX_CUT_NAMES` threats are labelled.
 
     plane: vertical plane along the path.
     labelled_elsewhere: indices of threats with their own labels.
@@ -302,14 +302,14 @@ class ZoneCut:
     """Part of the vertical plane through a path that a zone forbids.
 
     zone: the zone.
-    bottom, top: (s,) m AMSL at each sample of the path.
-    where: (s,) bool, True at samples with a forbidden range.
+    bottom, top: lower and upper end of the forbidden altitudes at each sample of the path, m AMSL, (s,).
+    is_forbidden: True at samples with forbidden altitudes, (s,).
     """
 
     zone: Zone
     bottom: Floats
     top: Floats
-    where: NDArray[np.bool_]
+    is_forbidden: NDArray[np.bool_]
 
 
 def zone_cuts(zones: tuple[Zone, ...], plane: PathPlane) -> list[ZoneCut]:
@@ -336,7 +336,7 @@ def zone_cuts(zones: tuple[Zone, ...], plane: PathPlane) -> list[ZoneCut]:
                 (*whole_range, ~is_over_zone),
             ]
         cuts += [ZoneCut(zone, bottom, top, is_forbidden & (top > bottom)) for bottom, top, is_forbidden in bands]
-    return [cut for cut in cuts if cut.where.any()]
+    return [cut for cut in cuts if cut.is_forbidden.any()]
 
 
 def zone_bands(zones: tuple[Zone, ...], plane: PathPlane) -> tuple[list[Layer], list[Label]]:
@@ -345,10 +345,10 @@ def zone_bands(zones: tuple[Zone, ...], plane: PathPlane) -> tuple[list[Layer], 
     for cut in zone_cuts(zones, plane):
         is_exclusion = cut.zone.kind == "exclusion"
         legend = "zone to keep out of" if is_exclusion else "outside a zone to stay in"
-        top = np.where(cut.where, cut.top, np.nan)
+        top = np.where(cut.is_forbidden, cut.top, np.nan)
         layers.append(Layer("band", zone_text(cut.zone), "zone", plane.kilometres, top, cut.bottom, legend=legend))
         if is_exclusion:
-            middle = int(np.flatnonzero(cut.where)[cut.where.sum() // 2])
+            middle = int(np.flatnonzero(cut.is_forbidden)[cut.is_forbidden.sum() // 2])
             amsl = 0.5 * float(cut.bottom[middle] + cut.top[middle])
             labels.append(Label(zone_text(cut.zone), float(plane.kilometres[middle]), amsl, "name", "zone", (0, 0)))
     return layers, labels[:_MAX_CUT_NAMES]

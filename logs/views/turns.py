@@ -15,7 +15,7 @@ from world.arrays import Floats
 _MARGIN = 0.12
 # A limit above the largest value times this ratio is omitted.
 _MAX_LIMIT_RATIO = 4.0
-# Rule, kind of place, title and unit.
+# Panels of the chart: rule, kind of place, title and unit.
 PLACE_PANELS = (
     ("turn", "waypoint", "turn", "°"),
     ("slope", "leg", "slope", "°"),
@@ -37,7 +37,7 @@ class PlaceValue:
 
 
 def list_place_values(findings: Sequence[Finding], rule: str) -> list[PlaceValue]:
-    """Sort the findings of a rule by the number of their waypoint or leg; other findings are left out."""
+    """Return the values of a rule's findings, sorted by the number of the waypoint or leg."""
     place_rows = []
     for finding in findings:
         place = finding.place

@@ -221,7 +221,12 @@ def _draw_pictures(
     modes: Mapping[float, tuple[Mode, ...]],
     steps: tuple[StepResponse, ...],
 ) -> dict[str, bytes]:
-    """Draw the pictures of an aircraft, and return them as PNG by file name."""
+    """Draw the pictures of an aircraft, and return them as PNG by file name.
+
+    trims: trimmed level flight at each airspeed.
+    modes: modes of motion, keyed by airspeed, m/s.
+    steps: responses to steps of the controls.
+    """
     # Imported here: only pictures need matplotlib.
     from logs.views.aircraft import draw_envelope, draw_step_responses, draw_trims
     from logs.views.drawing import png_bytes

@@ -79,7 +79,10 @@ class CampaignFlight:
 
 
 def _with_stored_options(options: CampaignOptions | WindsOptions, directory: OutputDirectory) -> CampaignOptions:
-    """Return the options of a campaign; those that are not given have the values of a resumed campaign."""
+    """Add the options of a resumed campaign, from its table, to the options that the user gave.
+
+    An option that the user gave replaces the stored option.
+    """
     stored = read_stored_settings(directory.folder / directory.table).get("options", {}) if directory.resume else {}
     # A wind is stored as a list.
     values = {name: tuple(value) if name == "wind" and value else value for name, value in stored.items()}
@@ -222,14 +225,14 @@ def continued_goal(
 
 
 def _report_flight_count(goal: Goal, folder: Path) -> None:
-    """Report the number of flights of a campaign that is resumed without one, and the number's source."""
+    """Report the number of flights of a resumed campaign if the user stated none, and where it is from."""
     stored_count = read_stored_settings(folder / CAMPAIGN_DATABASE).get("flights")
     origin = "the number of the resumed campaign" if goal.flights == stored_count else "the default"
     report_line(f"number of flights: {'at most ' if goal.stops else ''}{goal.flights:,}, {origin}")
 
 
 def _warn_of_too_few_flights(goal: Goal) -> None:
-    """Report a target probability that a campaign's flights cannot show, even if all of them are flyable."""
+    """Warn if a campaign has too few flights to show its target, even if all of them are flyable."""
     estimator, best = Estimator(goal), Tally(goal.flights, 0)
     if estimator.estimate(best).answer == "undecided":
         needed_text = count_text(estimator.deciding_flights(best) or MAX_DECIDING_FLIGHTS, "flight")

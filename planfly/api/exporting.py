@@ -178,7 +178,7 @@ def export(
 
 
 def _find_chosen_autopilot(autopilot: str | None, params: str | Path | None) -> str:
-    """Return the name of the autopilot that the user names, or for which a parameter file was written.
+    """Return the name of the autopilot that the user named, directly or by its parameter file.
 
     Return "" without either.  Raises ArgumentError for an unknown autopilot, and ParameterError for a file that belongs
     to no autopilot.
@@ -230,6 +230,7 @@ def _with_missing_ends_note(
 
     autopilot: name of the autopilot that the user named, which replaces that of the source; "" if the user named none.
     params: parameter file of the named autopilot, whose requirement applies.
+    targets: files to write; without a mission file among them there is no note.
     """
     source_autopilot = source.mission.autopilot if source.autopilot is None else source.autopilot.checks.dialect
     has_items = any(target.suffix.lower() in _MISSION_SUFFIXES for target in targets)
@@ -382,7 +383,7 @@ def _read_mission(path: Path, options: MissionOptions, *, needs_world: bool, nee
 
 
 def _with_zones(source: _SourceContent, scenario: Scenario) -> _SourceContent:
-    """Add a scenario's zones to the fences of a source's mission, and note zones that a fence lacks."""
+    """Add a scenario's zones as fences to a source's mission, and note zones that a fence cannot state."""
     fence_items, notes = zone_fences(scenario.zones, scenario.origin)
     mission = replace(source.mission, fences=number_items([*source.mission.fences, *fence_items]))
     return replace(source, mission=mission, fence_notes=tuple(notes))

@@ -71,8 +71,8 @@ class IdentifiedAircraft:
     climb: lower end, estimate and upper end (95 %) of the climb angle at cruise and full throttle, degrees.
     sink: lower end, estimate and upper end (95 %) of the sink angle at cruise and idle, degrees.
     power: lower end, estimate and upper end (95 %) of the power of level flight at cruise, W.
-    predicted: predictions up to a second ahead by constant rates, the base and the identified model, of the check log,
-        or of `logs` without a check log.
+    predicted: predictions of the check log, or of `logs` without one, up to a second ahead: by constant rates, by the
+    base and by the identified model.
     without_current: logs without battery current, if other logs have it; then the current of no log is used.
     slow: logs with few rows per second.
     wide: numbers with a wide interval, each with the flight that would narrow the interval.
@@ -203,7 +203,7 @@ def _load_base(base: str | Path) -> Aircraft:
 
 
 def _check_stated_numbers(stated_numbers: dict[str, float], prior: Aircraft) -> None:
-    """Raise FlightError if a number that the user states is out of its range, or too far from the base aircraft's.
+    """Raise FlightError for a stated number that is implausible, or too different from the base aircraft.
 
     Each must be in `_RANGES`, and mass and span within a factor of `_MAX_SIZE_RATIO` of the base aircraft.
 

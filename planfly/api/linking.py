@@ -175,7 +175,10 @@ def link(
 
 
 def _write_pictures(result: LinkResult, folder: Path, *, overwrite: bool) -> LinkResult:
-    """Write the pictures and the coverage of a link into a folder, and return the result with their files."""
+    """Write the pictures and the coverage of a link into a folder, and return the result with their files.
+
+    The result is returned unchanged if the link was not computed along a path.
+    """
     if result.along is None or result.antenna is None:
         return result
     # Imported here: only pictures need matplotlib.

@@ -108,7 +108,7 @@ def _convert_to_plain_values(values: Any) -> Any:
 
 
 def _without_other_autopilot(entries: dict[str, Any], base: FlightTable, changes: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the entries of [flight] without those of the base's autopilot, if the changes name another one.
+    """Remove the base's autopilot from the entries of [flight] if the changes name another autopilot.
 
     entries: entries of the base with its defaults, such as the release of the autopilot.
     """

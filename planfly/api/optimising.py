@@ -138,7 +138,11 @@ class Optimiser:
         self._is_asked = False
 
     def _update_front(self, points: Floats, scores: Floats) -> None:
-        """Merge points into the front, which keeps only non-dominated points, sorted by the first objective."""
+        """Merge points into the front, which keeps only non-dominated points, sorted by the first objective.
+
+        points: evaluated points, (n, d).
+        scores: violations and then values of these points, (n, v + m).
+        """
         all_points, all_scores = np.concatenate([self._points, points]), np.concatenate([self._scores, scores])
         front = np.flatnonzero(ranks(all_scores, self._levels) == 0)
         order = front[np.argsort(all_scores[front, self._violation_count], kind="stable")][: self._max_points]

@@ -97,7 +97,7 @@ _END_TOLERANCE_M = 1.0
 
 
 def _check_waypoints(scenario: Scenario, waypoints: ArrayLike, options: PlanOptions) -> Floats:
-    """Return the user's waypoints as an array (w, 3), m.
+    """Check the user's waypoints, and return them as an array (w, 3), m.
 
     Raises ArgumentError for another shape, for a value that is not finite or outside the map, for a path that does not
     lead from the scenario's start to its destination, and for an option of a search.

@@ -215,6 +215,8 @@ def _choose_judged_start(
     The default is the end of the part from which the aircraft was identified, or the middle of a log that was not used
     for the identification.  Raises LogError if the aircraft was identified from the whole log, and PlanflyError for a
     start within the part from which it was identified.
+
+    records: usable segments of the log.
     """
     first_time, last_time = motion.inertial.time[[0, -1]].tolist()
     used = _find_used_end(aircraft, motion.sha256, first_time)
@@ -247,7 +249,7 @@ def _find_used_end(aircraft: Aircraft, sha256: str, start: float) -> float | Non
 
 
 def draw_flight_variations(aircraft: Aircraft, count: int = DRAWS) -> list[DrawnFlight]:
-    """Draw variations of aircraft, wind, turbulence and position for flights that predict a logged flight.
+    """Draw variations of aircraft, wind, turbulence and position, one set for each predicting flight.
 
     The quantities are drawn as in a campaign with planfly's own dispersions, with two differences: the wind varies by
     the error of a logged wind instead of a forecast, and all levels of turbulence are equally likely.  The position

@@ -119,6 +119,8 @@ def _play_frames(
     """Yield flight time and instrument lines at `_FRAME_RATE_HZ` until the end.
 
     speed: multiple of real time.
+    start_time, end_time: flight times, s.
+    width: characters in a line, or a function that returns them for each frame.
     """
     clock, flight_time = RunningClock(), start_time
     while True:

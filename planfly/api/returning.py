@@ -281,9 +281,10 @@ class _ReturnsRequest(NamedTuple):
 def _check_request(
     every: float, suggest: bool, out: str | Path | None, sitl: str | Path | None, points: int, *, overwrite: bool
 ) -> _ReturnsRequest:
-    """Check the options of `returns`, which describes them, and convert them to a request.
+    """Check the options of `returns`, and collect them in a request.
 
-    Raises PlanflyError for a folder that is a file or is not empty, and for a program that is not ArduPlane.
+    The arguments are described by `returns`.  Raises PlanflyError for a folder that is a file or is not empty, and for
+    a program that is not ArduPlane.
     """
     program = None if sitl is None else check_program(sitl)
     if program is not None:

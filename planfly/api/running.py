@@ -249,7 +249,7 @@ def _fly_rounds(
 
 
 def _record_round(task: _RunTask, plan: Plan, number: int) -> Round:
-    """Write a plan and its mission, fly and record the plan if it is feasible, and write the report."""
+    """Write a plan, its mission and its verdict into the run's folder; fly and draw a feasible plan."""
     # Imported here: only the report needs matplotlib.
     from logs.views.report.page import write_report
 

@@ -310,7 +310,7 @@ def _write_results(result: SurveyResult, out: str | Path | None, overwrite: bool
 
 
 def _format_remedy_parameters(setup: FlightSetup, remedy: SurveyRemedy) -> str:
-    """Return the text of the user's parameter file with the value of the remedy's parameter.
+    """Return the user's parameter file as text, with the remedy's value of its parameter.
 
     If the scenario names no parameter file, the text contains only this parameter.
     """

@@ -54,7 +54,9 @@ def window_page(result: WindowResult, figure: Figure, command: str) -> AnswerPag
 
 
 def battery_page(result: BatteryResult, figure: Figure, command: str) -> AnswerPage:
-    """Return the page of a battery: chart of the capacities, deciding parts of the flight, and energy of each leg.
+    """Return the page of a battery search: its chart, what decides the capacity, and energy by leg.
+
+    The end of the mission or a return decides the capacity in the flights in which it needs the most energy.
 
     figure: chart of the capacities.
     command: command line that repeats the search; "" if there is none.

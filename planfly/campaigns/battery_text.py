@@ -14,7 +14,11 @@ _MAX_LISTED = 3
 
 
 def answer_line(result: BatteryResult) -> str:
-    """Return a line with the smallest sufficient battery, or with the reason why there is none."""
+    """Return a line with the smallest sufficient battery and its confidence interval.
+
+    If there is none, the line gives the reason: returns that do not arrive, or a battery that would need too much
+    energy to carry itself. If flights are not judged, the line says why.
+    """
     goal = result.goal
     flown_text = "in the mission and in every return" if result.has_returns else "in the mission (without returns)"
     flown_text += " that arrives" if any(row.blocked_returns for row in result.rows) else ""
@@ -54,7 +58,7 @@ def _unknown_reason(result: BatteryResult) -> str:
 
 
 def battery_lines(result: BatteryResult) -> list[str]:
-    """Return the lines below the answer: the aircraft's battery, deciding parts, energy of the legs, and method.
+    """Return the lines below the answer: own battery, what decides the capacity, energies and method.
 
     Return [] if no flight completed the mission.
     """
@@ -98,11 +102,13 @@ def leg_names(result: BatteryResult) -> list[str]:
 
 
 def decision_rows(result: BatteryResult) -> list[tuple[str, str, str]]:
-    """Return a row (part, flights, share) for each part of a flight that decides the battery.
+    """Return a row (part, flights, share) for each part of the flight that decides the battery.
+
+    The end of the mission or a return decides the battery of a flight if it needs the most energy.  The most frequent
+    part comes first.
 
     part: the end of the mission, or a return.
     flights, share: number and percentage of the flights in which this part decides.
-    The most frequent part comes first.
     """
     names, total = leg_names(result), len(result.completed)
     return [

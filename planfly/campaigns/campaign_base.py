@@ -184,7 +184,7 @@ def open_campaign(
 
 
 def campaign_of_setup(setup: FlightSetup, dispersions: Dispersions) -> CampaignBase:
-    """Return the base of a campaign that flies the mission of a setup, with the draws stored with its aircraft.
+    """Make a campaign base from a flight setup; each of its flights flies the setup's mission.
 
     Raises SpreadError if the aircraft cannot fly at the medians of the dispersions.
     """
@@ -258,7 +258,7 @@ _VARIED_PROPERTIES = {"aero/drag-factor": "drag", "aero/control-factor": "contro
 
 
 def with_aircraft_draws(dispersions: Dispersions, aircraft: Aircraft) -> Dispersions:
-    """Add the draws of aircraft properties that are stored next to the aircraft's model, if there are any.
+    """Add the draws of the aircraft's properties, if the aircraft's folder has a file of them.
 
     A dispersions file is used unchanged if it names other draws, or disperses drag or control power itself.
     """
@@ -407,7 +407,7 @@ def vary_terrain(terrain: Terrain, error: float, strip: LandingStrip | None, str
 
 
 def _terrain_error_at_home(base: CampaignBase, varied_terrain: Terrain) -> float:
-    """Return the height of a flight's terrain minus the height of the campaign's terrain at home, m.
+    """Return the height error of a flight's terrain at home, relative to the campaign's terrain, m.
 
     The result is 0 if home is off the terrain.
     varied_terrain: terrain of the flight.

@@ -36,6 +36,8 @@ def flatten_inputs(document: Mapping[str, Any]) -> dict[str, Any]:
 def describe_differences(stored: Mapping[str, Any], current: Mapping[str, Any]) -> str:
     """Describe the inputs that differ, with both values if they are short; return "" if none differs.
 
+    stored, current: inputs by name, as `flatten_inputs` returns them.
+
     >>> describe_differences({"seed": 1, "wind.speed_mps": 5.0}, {"seed": 1, "wind.speed_mps": 8.0, "landing": "a"})
     'wind.speed_mps 8.0 instead of 5.0, landing a (not stated before)'
     """
@@ -45,7 +47,10 @@ def describe_differences(stored: Mapping[str, Any], current: Mapping[str, Any]) 
 
 
 def difference_texts(stored: Mapping[str, Any], current: Mapping[str, Any]) -> list[str]:
-    """Return a text for each input that differs, as in `describe_differences`."""
+    """Return a text for each input that differs, as in `describe_differences`.
+
+    stored, current: inputs by name.
+    """
     names = [name for name in dict.fromkeys((*stored, *current)) if stored.get(name) != current.get(name)]
     # A number that was converted between units differs by rounding: name it only if nothing else differs.
     rounded_names = {

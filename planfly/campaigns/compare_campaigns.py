@@ -139,6 +139,8 @@ def _count_outcomes(
 
     path: file of the campaign's table.
     compared_rows: rows of the compared flights in the table, (n,).
+    table: columns of the campaign's table, by name.
+    settings: stored settings of the campaign, with its goal.
     """
     outcomes = table["outcome"].tolist()
     tally = Tally(*map(outcomes.count, OUTCOMES))
@@ -159,6 +161,8 @@ def _paired_rows(first: Mapping[str, NDArray[Any]], second: Mapping[str, NDArray
     """Return the rows of the flights that both campaigns have, (n,) for each campaign.
 
     n is 0 if the draws of any of these flights differ, because the flights are then not paired.
+
+    first, second: columns of the tables of both campaigns, by name.
     """
     _, first_rows, second_rows = np.intersect1d(first["flight"], second["flight"], return_indices=True)
     for name in ("seed", *NAMES):

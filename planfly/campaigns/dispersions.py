@@ -413,7 +413,11 @@ def standard_population(dispersions: Dispersions, count: int) -> Floats:
 
 
 def _draw_fractions(seed: int, index: int) -> tuple[Floats, int]:
-    """Draw a cumulative probability, 0 to 1, for each quantity, and the seed used within the flight."""
+    """Draw a cumulative probability, 0 to 1, for each quantity, and the seed used within the flight.
+
+    seed: seed of the campaign.
+    index: number of the flight, from 0.
+    """
     random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(index,)))
     return random.random(len(QUANTITIES)), int(random.integers(2**63))
 
@@ -422,6 +426,8 @@ def _standardise(dispersions: Dispersions, fractions: Floats) -> Floats:
     """Convert cumulative probabilities of the varying quantities, (n, v), to standardised values, (n, d).
 
     The values are in standard deviations from the mean.  A quantity with only one value has no column.
+
+    fractions: a row for each flight, a column for each varying quantity.
     """
     quantiles = (np.arange(_QUANTILE_COUNT) + 0.5) / _QUANTILE_COUNT
     columns = []

@@ -85,6 +85,7 @@ def failure_lines(by_rule: Iterable[RuleFailures], mission_fault: str = "") -> l
     """Return a line for each failed rule: number of failed flights, and the three most frequent places.
 
     mission_fault: text for failures of the mission as a whole, which have no place; "" if there is none.
+    by_rule: failures by rule and place.
     """
     lines = []
     for failures in by_rule:

@@ -24,7 +24,7 @@ _MAX_FALL_S = 600.0
 
 
 def plate_drag(aircraft: Aircraft) -> float:
-    """Return the drag per mass and airspeed squared of a fall with the wing broadside to the air, 1/m."""
+    """Return the drag of a fall with the wing broadside to the air, per mass and airspeed squared, 1/m."""
     return 0.5 * _AIR_DENSITY * _PLATE_DRAG_COEFFICIENT * aircraft.wing_area / aircraft.mass
 
 

@@ -96,6 +96,8 @@ class EnergyRow(FlightRow):
         """Return the smallest nominal capacity that leaves a fraction of the battery unused, Wh.
 
         It is inf if a return does not arrive with any battery, and NaN if an energy is unknown.
+
+        reserve: fraction of the battery that is to be left.
         """
         if self.unknown_returns and not math.isinf(self.return_energy):
             return math.nan
@@ -237,7 +239,7 @@ class BatteryResult:
 
     @property
     def own_probability(self) -> Interval:
-        """Bounds of the probability that the aircraft's battery keeps the reserve, at the goal's confidence."""
+        """Bounds of the probability that the aircraft's own battery suffices, at the goal's confidence."""
         from scipy import stats
 
         two_sided = 1.0 - 2.0 * (1.0 - self.goal.confidence)
@@ -260,7 +262,7 @@ class BatteryResult:
 
     @property
     def decisions(self) -> tuple[BatteryDecision, ...]:
-        """Parts of a flight that decide the battery, the most frequent first."""
+        """The end of the mission or returns from a leg, with the number of flights that it decides."""
         # Key -1 stands for flights that are decided by the mission, not by a return.
         times_by_leg: dict[int, list[float]] = {}
         for row in self.completed:
@@ -274,7 +276,10 @@ class BatteryResult:
 
     @property
     def leg_energies(self) -> Floats:
-        """Median energy of each leg over the flights that complete the mission, Wh, (legs,); (0,) if none does."""
+        """Median energy of each leg, Wh, (legs,), over the flights that complete the mission.
+
+        The shape is (0,) if no flight completes the mission.
+        """
         rows = [row.leg_energies for row in self.completed]
         if not rows:
             return np.zeros(0)
@@ -339,7 +344,7 @@ def find_battery(base: CampaignBase, goal: BatteryGoal, workers: Workers, advanc
 def fly_energy_campaign(
     base: CampaignBase, goal: BatteryGoal, workers: Workers, mass_factor: float, advance: Advance
 ) -> tuple[EnergyRow, ...]:
-    """Fly the flights of a campaign, and return rows with the energy of each, in the order of the draws.
+    """Fly the flights of a campaign; return a row with the energies of each, in the order of the draws.
 
     mass_factor: factor on the mass of the aircraft's model.
     advance: called after each flight with the number of flights done, their total and a text.
@@ -368,6 +373,8 @@ def quantile_of_capacities(rows: tuple[EnergyRow, ...], goal: BatteryGoal) -> tu
     The capacity is a quantile of the capacities that the flights need; its interval follows from order statistics.
     The capacity or a bound is inf if no battery is enough.  All three are NaN if too few flights have a known energy to
     reach the goal's probability.
+
+    rows: the flights, each with its energies.
     """
     from scipy import stats
 

@@ -114,7 +114,7 @@ class ExcursionRow(FlightRow):
 def fly_for_excursions(
     base: CampaignBase, index: int, wind: GivenWind | None = None, *, path: BaseGeometry, interval: float, glide: bool
 ) -> ExcursionRow:
-    """Fly one flight of a campaign; find the area below flight and returns, and the area of falls from them.
+    """Fly one flight of a campaign; find the area that it and its returns cross, and the area of falls.
 
     index: number of the flight, from 0.
     wind: mean wind that replaces the scenario's wind, or None.
@@ -248,7 +248,7 @@ def _return_paths(setup: FlightSetup, track: Track, interval: float, *, glide: b
 
 
 def turn_of_return(path: Floats, target: Position, radius: float) -> Floats:
-    """Return the first part of a return, m, (n, 3), up to where the aircraft heads for its target.
+    """Return the positions of a return until the aircraft heads for its target, m, (n, 3).
 
     path: positions of the return, m, (n, 3).
     target: center of the loiter at the end of the return, m.
@@ -285,7 +285,9 @@ def turn_areas(
 
 
 def areas_between(paths: list[Floats]) -> list[BaseGeometry]:
-    """Return the areas between successive returns, which contain the returns that start between them.
+    """Return an area for each pair of successive returns, bounded by the paths of the two.
+
+    It contains the returns that start between the two.
 
     paths: positions of each return, m, (k, 3).
     """
@@ -477,6 +479,8 @@ def find_ground_risk(base: CampaignBase, goal: GroundRiskGoal, workers: Workers,
 def with_ground_class(result: GroundRiskResult) -> GroundRiskResult:
     """Return a result with the population of its footprint and its ground risk class.
 
+    The class stays None if the population is not known.
+
     Raises PlanflyError for a population raster that cannot be used.
     """
     goal, aircraft = result.goal, result.aircraft
@@ -494,7 +498,7 @@ def with_ground_class(result: GroundRiskResult) -> GroundRiskResult:
 
 
 def nominal_path(base: CampaignBase) -> BaseGeometry:
-    """Return the path of the flight without variations together with the lines of the route, on the map, m.
+    """Return the nominal paths on the map, m: the flight without variations, and the planned route.
 
     Raises FlightError if the flight ends where it starts.
     """

@@ -239,7 +239,7 @@ def fly_departure(
 ) -> FlightRow:
     """Fly one flight of one departure.
 
-    index: number of the departure times `flights`, plus the number of the flight.
+    index: number of the departure multiplied by `flights`, plus the number of the flight; both numbers are from 0.
     wind: always None, because the forecast states the wind of a departure.
     scenarios: for each departure, its scenario in each member of the forecast.
     flights: number of flights of each departure.

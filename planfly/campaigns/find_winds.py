@@ -157,9 +157,9 @@ class WindsResult:
 
     @property
     def flown_bounds(self) -> tuple[tuple[float | None, float | None], ...]:
-        """Strongest wind without a failure up to it, and weakest wind with a failure, of each direction, m/s.
+        """For each direction, the strongest wind without failures up to it and the weakest with one, m/s.
 
-        None if there is no such wind.  Flights that are lost or not judged in full are left out.
+        Each is None if there is no such wind.  Flights that are lost or not judged in full are left out.
         """
         left_out = {*self.lost, *(number for number, _ in self.undecided)}
         bounds = []
@@ -314,7 +314,11 @@ def find_winds(
 
 
 class _Search:
-    """Flights requested in each round, and their results."""
+    """State of a search for winds: the flights of all rounds, and their results.
+
+    A round is a group of flights that are flown in parallel; their winds depend on the results of earlier rounds.  A
+    direction is open as long as its boundary needs more flights.
+    """
 
     def __init__(self, goal: WindsGoal, base: CampaignBase) -> None:
         self.goal, self._base = goal, base
@@ -348,7 +352,11 @@ class _Search:
         return requests[: max(0, self.goal.flights - len(self.flown))]
 
     def _is_open(self, index: int) -> bool:
-        """Return True if a direction needs more flights; its boundary is computed only at intervals."""
+        """Return True if a direction needs more flights.
+
+        The boundary takes long to compute, so it is computed only at some numbers of flights; between them the result
+        is True.
+        """
         direction = self.directions[index]
         count = len(direction.speeds)
         if count < self._next_check[index]:
@@ -390,7 +398,7 @@ class _Search:
         return min(remaining, self.goal.flights - len(self.flown))
 
     def result(self) -> WindsResult:
-        """Return the result of the search."""
+        """Return the result of the search so far: boundaries, flights and the failures of each direction."""
         boundaries = tuple(direction.boundary() for direction in self.directions)
         conditions = replace(self._base.conditions(), wind_mps=None, wind_from_deg=None)
         calm_failures = self._calm_failures(boundaries)
@@ -434,6 +442,8 @@ class _Search:
         """Return the failures in the weakest flown wind of the directions whose boundary is calm air.
 
         Return None if no boundary is calm air, or if the weakest flown wind is stronger than `NEARLY_CALM_MPS`.
+
+        boundaries: boundary of each direction.
         """
         calm_directions = {number for number, boundary in enumerate(boundaries) if boundary.estimate < CALM_MPS}
         numbered_flights = [

@@ -47,7 +47,7 @@ MarginalPass = tuple[str, Place, float]
 
 
 def find_marginal_passes(findings: Iterable[Finding], scenario: Scenario, track: Track) -> tuple[MarginalPass, ...]:
-    """Return the marginal passes of a flight: findings whose margin is less than the scale of their rule.
+    """Return the findings that a flight passed narrowly: the margin is less than the rule's scale.
 
     Each is a tuple of rule, place, and margin as a fraction of the rule's scale, 0 to 1.  Passes close to the sphere of
     a missile's kill radius follow at the end.
@@ -264,7 +264,7 @@ def scale_margin(rule: str, margin: MinimumMargin) -> float | None:
 
 
 def _column_fields() -> dict[str, Column]:
-    """Return the `Column` with which each stored field of `FlightRow` is annotated, keyed by field name, in order."""
+    """Return the stored fields of `FlightRow` in order, by name, each with the `Column` that annotates it."""
     hints = get_type_hints(FlightRow, include_extras=True)
     hint_args = {name: get_args(hint) for name, hint in hints.items()}
     return {name: args[-1] for name, args in hint_args.items() if args and isinstance(args[-1], Column)}
@@ -320,7 +320,10 @@ def fly_one(base: CampaignBase, index: int, wind: GivenWind | None = None, log: 
 
 
 def find_unjudged_rules(verdict: Verdict, setup: FlightSetup) -> tuple[tuple[str, str], ...]:
-    """Return the unjudged rules of a verdict, each with a text that states places and reason; () if a rule failed."""
+    """Return the rules that a verdict does not judge, each with a text on places and reason.
+
+    Returns () if a rule failed.
+    """
     if not (verdict.flyable or verdict.undecided):
         return ()
     texts = dict(unjudged_parts(verdict.findings, setup))
@@ -347,7 +350,7 @@ def list_failed_findings(verdict: Verdict) -> tuple[tuple[str, Place], ...]:
 
 
 def find_minimum_margins(findings: tuple[Finding, ...]) -> tuple[tuple[str, MinimumMargin], ...]:
-    """Return the minimum margin of each judged rule that has one, in the order of the verdict.
+    """Return the smallest margin of each judged rule, in the order of the verdict.
 
     The margin of the rule `threat` is the distance outside the nearest missile's sphere.
 

@@ -154,6 +154,7 @@ def draw_probability(bins: Sequence[SpeedBin], target: float | None) -> Figure:
     """Draw the fraction of flyable flights against wind speed, with its interval and number of flights.
 
     target: required probability, drawn as a line, or None.
+    bins: flights by ranges of wind speed, see `group_by_speed`.
     """
     with clean_style():
         figure = new_figure(4.2)
@@ -481,6 +482,8 @@ def _draw_wind_areas(axes: Any, directions: Sequence[ChartDirection], max_speed:
     """Draw the areas of winds in which a mission is and is not flyable, and the boundary between them.
 
     The sectors next to a direction that is not judged are grey.
+
+    max_speed: maximum wind of the search, m/s.
     """
     angle = np.radians([direction.from_deg for direction in directions] + [directions[0].from_deg + 360.0])
     circle = [*directions, directions[0]]

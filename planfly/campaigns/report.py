@@ -139,7 +139,7 @@ def _draw_pictures(base: CampaignBase, summary: CampaignSummary, store: Store) -
 
 
 def _draw_tracks(base: CampaignBase, store: Store) -> list[tuple[Figure, str]]:
-    """Draw the clearance fan and the crossings of the flights that have a track; return each figure with its title.
+    """Draw the flown heights along the path and the positions at waypoints; return figures and titles.
 
     Return [] if no flight has a track.  There is no clearance fan without terrain.
     """
@@ -475,14 +475,17 @@ def _speed_text(speed: float, max_speed: float) -> str:
 
 
 def _interval_text(lower: float, upper: float, max_speed: float) -> str:
-    """Return an interval of the boundary as text; bounds beyond the maximum wind are "over" that wind."""
+    """Return an interval of the boundary as text; bounds beyond the maximum wind are "over" that wind.
+
+    lower, upper, max_speed: m/s.
+    """
     if lower >= max_speed - 1e-9:
         return f"over {max_speed:g}"
     return f"{lower:.1f} to {f'over {max_speed:g}' if upper >= max_speed - 1e-9 else f'{upper:.1f}'}"
 
 
 def _unsettled_lines(winds: WindsResult) -> list[str]:
-    """Return lines that state which part of a search is not judged, and why; [] if all of it is judged."""
+    """Return lines that say which directions of a search are not judged, and why; [] if all are judged."""
     reasons = winds.reasons
     word, total = "not judged" if all(reasons) else "not judged in full", len(reasons)
     lines = []
@@ -547,7 +550,11 @@ def _lines_without_failures(winds: WindsResult) -> list[str]:
 
 
 def _flown_bound_lines(winds: WindsResult) -> list[str]:
-    """Return what the flights of each direction without a boundary show, with neighbouring directions in one line."""
+    """Return lines on the flown winds of the directions whose boundary is not stated.
+
+    Neighbouring directions with the same text share a line.  Returns [] if all boundaries are stated, or if only calm
+    air was flown.
+    """
     if winds.is_only_calm or all(winds.estimated):
         return []
     texts = [
@@ -566,7 +573,11 @@ def _flown_bound_lines(winds: WindsResult) -> list[str]:
 
 
 def _bounds_text(flyable: float | None, failed: float | None) -> str:
-    """Return the text of the strongest wind without a failure and of the weakest wind with one, m/s."""
+    """Return the text of the strongest wind without a failure and of the weakest wind with one, m/s.
+
+    flyable: strongest wind without a failure up to it; None if there is none.
+    failed: weakest wind with a failure; None if there is none.
+    """
     if failed is None:
         return "not enough flights" if flyable is None else f"at least {flyable:.1f} m/s"
     return f"below {failed:.1f} m/s" if flyable is None else f"between {flyable:.1f} and {failed:.1f} m/s"

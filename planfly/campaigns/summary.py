@@ -171,7 +171,11 @@ class CampaignSummary:
 
 
 def summarise_campaign(base: CampaignBase, goal: Goal, estimate: Estimate, store: Store) -> CampaignSummary:
-    """Summarise a campaign in one pass through its table."""
+    """Summarise the flights in a campaign's table: failures, margins and the worst flights.
+
+    base: the campaign's conditions; without dispersions, they show the faults of the mission itself.
+    estimate: the estimate from all flights of the table.
+    """
     by_rule = count_failures(store.failures())
     worst_rows = tuple(store.worst_flights(WORST_FLIGHT_COUNT))
     # Margin of each flight by rule: NaN if the rule was not judged, -inf if the flight failed the rule by an
@@ -239,6 +243,9 @@ def _deciding_rules(margins: Mapping[str, Floats], by_rule: tuple[RuleFailures, 
 
     Without failures, it is the rule with the smallest ratio of mean margin to standard deviation.  Returns () if no
     margin is known.
+
+    margins: margin of each flight, (n,), for each rule.
+    by_rule: failures by rule and place.
     """
     if by_rule:
         return deciding_rules(by_rule)
@@ -254,7 +261,13 @@ def _deciding_rules(margins: Mapping[str, Floats], by_rule: tuple[RuleFailures, 
 def _rank_rules(
     store: Store, margins: Mapping[str, Floats], by_rule: tuple[RuleFailures, ...]
 ) -> tuple[RankedRule, ...]:
-    """Return the ranking of the rules; it includes failed rules without a margin."""
+    """Return the rules in the order of how close the flights came to failing them.
+
+    Rules that flights failed come first, the most flights first; they are included even without a margin.
+
+    margins: margin of each flight, (n,), for each rule: NaN if not judged, -inf if failed by an unknown margin.
+    by_rule: failures by rule and place.
+    """
     failed_counts = {failures.rule: failures.flights for failures in by_rule}
     ranked = []
     for rule, rule_margins in margins.items():
@@ -270,7 +283,7 @@ def _rank_rules(
 
 
 def _margin_unit(store: Store, rule: str) -> str:
-    """Return the unit of a rule's margins in a table, taken from the first flight that has one."""
+    """Return the unit of a rule's margins: that of the first flight with one, or else the usual unit."""
     words = RULE_WORDS[rule]
     place_json = store.first_text(words.place_column)
     if place_json is not None:
@@ -530,7 +543,7 @@ def _flyable_text(tally: Tally) -> str:
 
 
 def _drivers_text(entry: DecidingRule) -> str:
-    """Return a sentence on the quantities that explain most of the variance of a deciding rule's margin."""
+    """Return a sentence on the causes of the variance of a deciding rule's margin."""
     if not entry.sensitivities:
         return f"At least {MIN_FLIGHTS_FOR_INDEX} judged flights are needed to find what the margin depends on"
     if not entry.drivers:

@@ -50,7 +50,7 @@ ARRAY_COLUMNS = tuple(name for name, column in COLUMN_FIELDS.items() if column.k
 
 
 def _row_columns() -> dict[str, str]:
-    """Return the SQL type of each column, keyed by name, in the order of the fields of `FlightRow`."""
+    """Return the SQL types of a row's columns by name, in the order of the fields of `FlightRow`."""
     columns = {"seed": "INTEGER NOT NULL", **dict.fromkeys(NAMES, "REAL NOT NULL")}
     for name in FlightRow.__dataclass_fields__:
         if name in COLUMN_FIELDS:
@@ -247,7 +247,10 @@ class LockedTable:
                 )
 
     def _repair_file(self, stored_settings: dict[str, str]) -> None:
-        """Rewrite the file with the undamaged flights, and report the damaged flights."""
+        """Rewrite a damaged file with its undamaged flights, and report the damaged flights.
+
+        stored_settings: entries of the file's table ``campaign``, of which "settings" states the number of flights.
+        """
         # A search may have been resumed with fewer flights than the table contains; all of them are kept.
         requested_count = json.loads(stored_settings["settings"]).get("flights", _MAX_FLIGHTS)
         # Largest flight number that can be read from either end of a damaged table; -1 without any.
@@ -503,7 +506,7 @@ class Store(LockedTable):
 
 
 def _check_column(name: str) -> str:
-    """Return the name of a column; raise KeyError for an unknown name, which must not get into a query."""
+    """Return the name of a column unchanged; raise KeyError for any other text, because it enters a query."""
     if name not in COLUMN_NAMES:
         raise KeyError(name)
     return name
@@ -652,7 +655,7 @@ def read_table(path: Path) -> dict[str, NDArray[Any]]:
 
 
 def with_place_numbers(columns: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
-    """Return a table's columns with kind, index and item of each place in columns of their own, instead of JSON.
+    """Replace each column of places in JSON by three columns: kind, index and item of the place.
 
     The item of a leg is the item to which it leads.  Missing numbers are NaN.
     """
@@ -707,9 +710,11 @@ def read_path_arrays(path: Path) -> dict[str, NDArray[np.float32]]:
 
 
 def _read_arrays(connection: sqlite3.Connection, name: str, entry_shape: tuple[int, ...]) -> NDArray[np.float32]:
-    """Return the arrays of a column, (n, m, *entry_shape), where m is the length of the longest array.
+    """Return a column of arrays, one row per flight: (n, m) numbers or (n, m, 2) pairs, padded with NaN.
 
-    Shorter arrays are padded with NaN.
+    m is the length of the longest array of a flight.
+
+    entry_shape: shape of an entry: () for a number, (2,) for a pair.
     """
     count, size = connection.execute(f"SELECT COUNT(*), MAX(LENGTH({name})) FROM flights").fetchone()
     arrays = np.full((count, (size or 0) // np.dtype(np.float32).itemsize), np.nan, dtype=np.float32)

@@ -12,7 +12,10 @@ TIME_FORMAT = "%Y-%m-%d %H:%M"
 
 
 def answer_line(result: WindowResult) -> str:
-    """Return the answer in one line: the result for the requested departure, or the windows."""
+    """Return the answer in one line, for the requested departure if there is one, and for all windows.
+
+    The text for a requested departure is go, no go, or not judged. It is given with the number of flyable flights.
+    """
     goal, departure = result.goal, result.asked
     windows = ", ".join(_window_text(*window) for window in result.windows)
     open_text = f"take-off windows: {windows} UTC" if windows else "no take-off time is open"

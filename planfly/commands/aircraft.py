@@ -203,7 +203,7 @@ def _make_folder(args: argparse.Namespace) -> int:
 
 
 def _print_parameters(args: argparse.Namespace) -> None:
-    """Print the values of a parameter file that were used, and those that the data sheet overrides."""
+    """Print the values that were used from a parameter file, and those that the data sheet overrides."""
     from planfly.workflow.data_sheets import overridden_texts, read_aircraft_parameters
 
     stated = read_aircraft_parameters(Path(args.params))
@@ -263,6 +263,9 @@ def _identify(args: argparse.Namespace) -> int:
 
 def _print_predictions(result: "IdentifiedAircraft", check: str | None) -> None:
     """Print each model's rms errors 0.5 s ahead, and the whiteness of the identified model's innovations.
+
+    Innovations are errors of predictions one step ahead.  Those of a complete model are white, which means not
+    correlated in time.
 
     check: log that was predicted, or None for the logs of the identification.
     """

@@ -141,7 +141,7 @@ def _add_shared_options(parser: CommandParser) -> None:
 
 
 def add_flights_options(parser: CommandParser) -> None:
-    """Add the target of a command that flies many flights, and the options of these flights and of their workers."""
+    """Add the target and the options that all commands with many flights have in common."""
     with_completer(
         parser.add_argument(
             "target",
@@ -181,7 +181,11 @@ def add_flights_options(parser: CommandParser) -> None:
 
 
 def campaign(args: argparse.Namespace) -> int:
-    """Fly a campaign, resume one, or fly one of its flights again."""
+    """Fly a campaign, resume one, or fly one of its flights again; return the exit code.
+
+    The code follows from the answer on the target; it is also INCOMPLETE if there is no target and a flight is
+    undecided.
+    """
     from planfly.api import campaigns
 
     folder = _result_folder(args, "campaign")
@@ -233,7 +237,7 @@ def _result_folder(args: argparse.Namespace, kind: str) -> Path:
 
 
 def _repeat_flight(args: argparse.Namespace, folder: Path) -> int:
-    """Repeat one flight of the campaign in a folder, with a log; return the exit code of the flight's outcome.
+    """Fly one flight of a campaign again, with a log; return the exit code of its outcome.
 
     Raises PlanflyError if --json or --junit is also given.
     """

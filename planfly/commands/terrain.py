@@ -56,7 +56,7 @@ def add_terrain_parser(command_line: LineParser) -> None:
 
 
 def terrain(args: argparse.Namespace) -> int:
-    """Write the terrain of an area."""
+    """Write the terrain of an area, and warn about missing tiles and pixels without data."""
     from planfly.api import cutting_terrain
 
     result = call_api(cutting_terrain.terrain, args, out=args.out or "dem.tif")

@@ -102,7 +102,7 @@ class _Probe:
         self._pressure_force = read("aero/qbar-psf")() * 47.88025898033584 * self._area
 
     def base_model(self, motor: Motor, *, has_torque_reaction: bool) -> BaseModel:
-        """Return the values of the model, with `motor` as its motor.
+        """Measure the numbers of the JSBSim model, and return them with `motor`.
 
         has_torque_reaction: True if the propeller's torque rolls the aircraft.
         """
@@ -209,7 +209,7 @@ class _Probe:
     def _evaluate_coefficients(
         self, alpha: float, beta: float = 0.0, rates: Floats | None = None, surfaces: Floats | None = None
     ) -> Floats:
-        """Return (6,): coefficients of drag, lift, side force, roll, pitch and yaw moment, at closed throttle.
+        """Evaluate drag, lift, side force, roll, pitch and yaw moment, as coefficients (6,), without throttle.
 
         alpha, beta: angles of attack and sideslip, rad.
         rates: angular rates p, q, r, rad/s, zero by default.
@@ -231,7 +231,10 @@ class _Probe:
 
 
 def is_flying_wing(aircraft: Aircraft) -> bool:
-    """Return True if a model has elevons, which it mixes from elevator and aileron."""
+    """Return True if a model has elevons, which it mixes from elevator and aileron.
+
+    Returns False for a model that cannot be parsed.
+    """
     root = _parse_model(aircraft)
     return root is not None and any(actuator.get("name") == "elevon/left-rad" for actuator in root.iter("actuator"))
 
@@ -268,6 +271,8 @@ def _read_propeller_disc(functions: dict[str, ElementTree.Element], volts: float
     """Return the propeller disc of a model, from its JSBSim functions by name.
 
     Raises KeyError or ValueError for functions of another form.
+
+    volts: nominal voltage of the battery, V.
     """
     exit_function, thrust_function, power = (
         functions[f"motor/{name}"] for name in ("exit-mps", "thrust-n", "battery-power-w")
@@ -286,6 +291,8 @@ def _read_electric_motor(functions: dict[str, ElementTree.Element], volts: float
     """Return the electric motor of a model, from its JSBSim functions by name.
 
     Raises KeyError, ValueError, IndexError or StopIteration for functions of another form.
+
+    volts: nominal voltage of the battery, V.
     """
 
     def read_numbers(name: str) -> list[float]:

@@ -100,7 +100,7 @@ def check_power(estimate: Estimate, records: Sequence[FlightRecord], base: BaseM
 def check_estimate(estimate: Estimate, base: BaseModel, outputs: dict[str, int], source: str) -> None:
     """Raise LogError for an estimate with an implausible value.
 
-    Implausible are a reversed control, a lift slope or a parameter outside its limits, and a mass that changes.
+    A reversed control, a lift slope or a parameter outside its limits, and a mass that changes are implausible.
 
     outputs: servo output number of each control that has its own output.
     source: name of the logs, for the one-line message.
@@ -139,7 +139,7 @@ def check_estimate(estimate: Estimate, base: BaseModel, outputs: dict[str, int],
 
 
 def estimate_mass_change(estimate: Estimate, base: BaseModel) -> tuple[float, float]:
-    """Return the change of mass within the logs, as a fraction of the mass, and its standard deviation.
+    """Estimate the change of mass within the logs, as a fraction, and its standard deviation.
 
     An aircraft that burns fuel or drops a load needs less and less angle of attack than its assumed mass requires.  The
     change is the trend of the measured minus the predicted angle of attack, divided by the predicted angle above zero

@@ -90,7 +90,7 @@ class Identified:
     until: float | None = None
 
     def performance(self) -> tuple[Performance, Performance]:
-        """Return the performance of the estimate, with arrays (1,), and of all draws, with arrays (512,)."""
+        """Return the performance of the estimate, in arrays (1,), and that of the draws, in arrays (512,)."""
         best, samples = (
             performance(self.numbers, values, self.cruise, DENSITY) for values in (self.estimate.values, self.draws)
         )
@@ -141,7 +141,7 @@ def make_identification(
 
 
 def make_folder_files(identified: Identified, name: str, battery: tuple[float, float]) -> dict[str, str]:
-    """Return the text of each file of an identified aircraft's folder by file name, except the HTML page.
+    """Return the files of an identified aircraft's folder, except the HTML page: text by file name.
 
     The mission of manoeuvres starts at the home position of the last log that has one; without a home position it is
     left out.
@@ -361,6 +361,7 @@ def _format_quantity(name: str, unit: str, numbers: tuple[float, float, float, f
 
     numbers: prior, standard deviation of the prior, estimate, standard deviation of the estimate, and the fraction of
         the prior variance that the logs removed.
+    reason: sentence that says what the quantity is.
     """
     prior, prior_sd, value, sd, log_share = numbers
     return [

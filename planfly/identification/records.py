@@ -410,7 +410,11 @@ def _has_current(log: MotionLog) -> bool:
 
 
 def _find_vtol_rows(log: MotionLog, grid: Floats, pulses: Floats) -> Flags:
-    """Return a boolean mask (n,): True where lifting motors run or a VTOL mode is set."""
+    """Return a boolean mask (n,): True where lifting motors run or a VTOL mode is set.
+
+    grid: times, (n,), s.
+    pulses: pulses of the m servo outputs, (n, m), us.
+    """
     rows = np.zeros(len(grid), np.bool_)
     for (start, number), (end, _) in zip(log.modes, (*log.modes[1:], (np.inf, 0)), strict=False):
         if number in _VTOL_MODES:
@@ -431,6 +435,10 @@ def _find_settled_flight(log: MotionLog, grid: Floats, equivalent_airspeed: Floa
 
     Gaps are pauses in sensors, surface commands, airspeed or wind.  The first `_SETTLING_TIME_S` of each segment are
     False.
+
+    grid: times, (n,), s.
+    equivalent_airspeed: airspeed at each time, (n,), m/s.
+    pulses: pulses of the m servo outputs, (n, m), us.
     """
     # ARSPD_FBW_MIN is the name until ArduPlane 4.4, and 9 m/s its default.
     min_airspeed = log.parameters.get("AIRSPEED_MIN", log.parameters.get("ARSPD_FBW_MIN", 9.0))

@@ -347,6 +347,8 @@ _RULES_OF_UNFINISHED_PATHS = ("completion", "loiter", "waypoint", "turn", "surve
 def describe_unfinished_flight(basis: str, end_reason: str, verdict: Verdict) -> tuple[StatusText, ...]:
     """Return texts with the verdict on the flown part of a path that the aircraft left before its end.
 
+    Findings of `_RULES_OF_UNFINISHED_PATHS` are left out.
+
     basis: basis of the verdict, such as "flown in GUIDED".
     """
     failed_findings = [finding for finding in verdict.failed if finding.rule not in _RULES_OF_UNFINISHED_PATHS]

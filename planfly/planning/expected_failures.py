@@ -33,7 +33,9 @@ _STRIP_STEP_M = 10.0
 
 
 def expected_failures(plan: Plan, uav: Uav) -> tuple[str, ...]:
-    """Return the known causes of failures of a safe plan, each with a remedy; () if the plan is not safe.
+    """Return the reasons to expect that flights of a safe plan fail, each with a remedy.
+
+    The result is empty for a plan that is not safe, and if no reason is known.
 
     >>> from planfly.workflow.uav import load_uav
     >>> from planner.search.plan_path import plan_path
@@ -49,10 +51,11 @@ def expected_failures(plan: Plan, uav: Uav) -> tuple[str, ...]:
 
 
 def _loose_limits_text(plan: Plan, uav: Uav) -> str:
-    """Name the first part of a plan that the numbers in [limits] allow, but not the aircraft or its autopilot.
+    """Warn if the numbers in [limits] allow a turn or slope that the aircraft or its autopilot cannot fly.
 
-    Return "" if there is none.  The aircraft limits turns and slopes.  The autopilot limits slopes by its climb and
-    sink rates; a plan uses a part of these rates, beyond which a flight passes in some gusts and fails in others.
+    Returns "" if the plan stays within the limits of both.  The aircraft limits turns and slopes.  The autopilot limits
+    slopes by its climb and sink rates, of which a plan uses only a part: a steeper flight passes in some gusts and
+    fails in others.  The text names the first part of the plan that exceeds a limit.
     """
     limits = uav.limits
     slope_limits = replace(limits, max_climb=None, max_dive=None)

@@ -120,7 +120,7 @@ def _gusts_displace_aircraft(plan: Plan, uav: Uav) -> bool:
 def _gust_displacements(
     scenario: Scenario, autopilot: Autopilot
 ) -> list[tuple[Gust, Callable[[float, Turbulence], float]]]:
-    """Return pairs of a kind of gust and the function that computes its altitude displacement, m.
+    """Return the kinds of gusts to consider, each with the function that computes its displacement, m.
 
     The function's arguments are the climb or sink rate that the aircraft holds in reserve (m/s) and the turbulence.
     Updrafts are considered only if the scenario has zones or a maximum height.
@@ -240,7 +240,12 @@ def limits_in_gusts(plan: Plan, uav: Uav, unused_fraction: float = _UNUSED_CLIMB
 
 
 def limits_for_alternatives(plan: Plan, uav: Uav) -> Limits:
-    """Return search limits for alternatives to a safe plan: the tightest limits that this plan meets."""
+    """Return search limits for alternatives to a safe plan, as strict as this plan allows.
+
+    The limits with a margin for gusts at the ground, missiles and zones are tried first, then those with a margin at
+    the ground only.  If the plan meets none of them, or gusts do not displace the aircraft, the limits have no such
+    margin.
+    """
     limits = uav.limits.with_margin()
     if not _gusts_displace_aircraft(plan, uav):
         return limits
@@ -258,6 +263,8 @@ def limits_for_alternatives(plan: Plan, uav: Uav) -> Limits:
 class _Parts(NamedTuple):
     """Path whose legs are cut into short parts near its ends, with the altitude margin that gusts need.
 
+    A point has two margins, because the leg before a waypoint may need more than the leg after it.
+
     gust: the kind of gusts.
     points: ends of the parts, (p, 3) m.
     legs: leg of each part, (p - 1,).
@@ -273,7 +280,7 @@ class _Parts(NamedTuple):
 
 
 def find_shortfalls(plan: Plan, uav: Uav) -> list[Shortfall]:
-    """Find the places where each kind of gust displaces the aircraft deepest into each kind of hazard.
+    """Find for each kind of gust and hazard the place where the aircraft is displaced deepest into it.
 
     Hazards are the required clearance, the maximum height, missiles and zones.  Only displacements into a hazard are
     returned.
@@ -355,7 +362,8 @@ def _heights_at_ends(problem: Problem, parts: _Parts) -> list[tuple[str, float, 
 def _clearance_shortfall(problem: Problem, parts: _Parts) -> Shortfall | None:
     """Return the deepest displacement by a downdraft into the required clearance.
 
-    The depth is 0 m if no displacement reaches into the clearance.
+    A shortfall at the start or the destination is returned first, because no other path avoids it.  The depth is 0 m if
+    no displacement reaches into the clearance.
     """
     data = problem.certified
     hazard_text = f"into the clearance of {data.clearance:g} m"
@@ -380,9 +388,8 @@ def _clearance_shortfall(problem: Problem, parts: _Parts) -> Shortfall | None:
 def _max_height_shortfall(problem: Problem, parts: _Parts) -> Shortfall | None:
     """Return the place where an updraft lifts the aircraft highest above ground.
 
-    Returns None without a maximum height.
-
-    The depth is the height above the maximum height, negative if the aircraft stays below.
+    A place at the start or the destination is returned first, because no other path avoids it.  The depth is the height
+    above the maximum height, negative if the aircraft stays below.  Returns None without a maximum height.
     """
     data, max_height = problem.certified, problem.certified.airspace.max_height
     if max_height == math.inf:
@@ -450,7 +457,11 @@ def _gust_paths(parts: _Parts) -> list[Floats]:
 
 
 def _shortfall_text(shortfall: Shortfall, plan: Plan, uav: Uav) -> str:
-    """Describe a shortfall and its remedies in one line."""
+    """Describe a shortfall and its remedies in one line.
+
+    The remedies are less turbulence, a better aircraft, and a change of the height that limits the path, if there is
+    one.
+    """
     ability_text = "climbs better" if shortfall.gust == "downdrafts" else "sinks faster"
     remedies = f"Less turbulence, an aircraft that {ability_text}"
     is_below_height_limit = shortfall.gust == "updrafts" and not shortfall.is_threat

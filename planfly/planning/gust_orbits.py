@@ -39,8 +39,9 @@ def limit_waypoint_orbits(
 ) -> Plan:
     """Return a plan with few enough waypoints that gusts rarely make the aircraft orbit at one of them.
 
-    This is the given plan if it has few enough waypoints, otherwise a plan with fewer waypoints.  If none is found, the
-    given plan is returned as not safe, with the reason in its certificate.
+    This is the given plan if it has few enough waypoints, otherwise a plan with fewer waypoints.  In gusts its corners
+    must stay in the corridor, too.  If no such plan is found, the given plan is returned as not safe, with the reason
+    in its certificate.
 
     search: function that plans a scenario in the same way as the plan; None to search for no other path.
     search_limits: limits within which the plan was made; None for the limits of the aircraft.
@@ -89,10 +90,7 @@ def _with_problem(plan: Plan, problem: str) -> Plan:
 
 
 def _is_safe_in_gusts(plan: Plan, uav: Uav) -> bool:
-    """Return True if a plan has few enough expected orbits, and its corners stay in the corridor.
-
-    At most `MAX_EXPECTED_ORBITS` are accepted.
-    """
+    """Return True if gusts cause at most `MAX_EXPECTED_ORBITS`, and all corners stay in the corridor."""
     if expected_orbits(plan, uav.autopilot, uav.limits.with_margin()) > MAX_EXPECTED_ORBITS:
         return False
     return max(_corner_excursions(plan, uav), default=0.0) <= _plan_corridor_half_width(plan, uav)

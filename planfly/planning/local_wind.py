@@ -144,6 +144,7 @@ def _ground_speed_ratio(scenario: Scenario, airspeed: float, samples: Floats, co
 
     samples: (n, 4) east, north and altitude, m, and time after take-off, s.
     courses: (n,) rad, or (c, 1) to combine each of c courses with each sample.
+    airspeed: m/s.
     """
     local_winds = scenario.wind_velocities(samples[:, :3], samples[:, 3])
     mean_winds = scenario.wind.velocities_at(np.ascontiguousarray(samples[:, 2]))

@@ -49,7 +49,7 @@ class SeededPlan:
 
     threats: number of threats in the problem.
     waypoints: world coordinates, m, (w, 3).
-    violations, objectives: counts and values on the paper's points.
+    violations, objectives: counts and values at the points where the paper evaluates a path, six per leg.
     certified: True if the continuous check passes and no missile reaches the path.
     kill_probability, detection_probability: values of `exposure_probability`.
     history: length ratio, kill exposure and violations of the best path after each generation, (g, 3).
@@ -166,7 +166,7 @@ def plan_once(threats: int, algorithm: str, seed: int) -> SeededPlan:
 def plan_section(
     problems: Sequence[int], seeds: int, algorithm: str, jobs: int | None = None, advance: Advance | None = None
 ) -> list[SeededPlan]:
-    """Make the plans of section V of the paper, in the order of problem, algorithm and seed 1..seeds.
+    """Make all plans of section V of the paper, ordered by problem, algorithm and seed, from seed 1 on.
 
     The order does not depend on the number of processes.
 
@@ -266,7 +266,10 @@ def _table_row(group: list[SeededPlan]) -> TableRow:
 
 
 def _seed_values(group: list[SeededPlan], value: Callable[[SeededPlan], float]) -> Floats:
-    """Return the value of each plan of a group, (n,).  value: function that computes the value of one plan."""
+    """Return a value of each plan of a group, (n,).
+
+    value: function that computes the value of one plan.
+    """
     return np.array([value(seeded_plan) for seeded_plan in group])
 
 

@@ -95,7 +95,10 @@ def return_setup(world: ReturnWorld, start: Record, landing: LandingStart | None
 def positions_from_start(track: Track, start: Record) -> Floats | None:
     """Return the positions (t, 3) of a flight from the start of the return to the end, m.
 
-    Returns None if the flight does not reach the start of the return, or passes it too high or too low.
+    The return starts at the row nearest to `start`, among the rows of the first 100 s; the lead-in before it is
+    shorter.  Returns None if the flight does not reach the start of the return, or passes it too high or too low.
+
+    start: a record of `flight.autopilots.simulated_returns.RETURN_START`.
     """
     start_position = np.array([float(start["east"]), float(start["north"])])
     distances = np.hypot(*(track.position[: round(2.0 * LEAD_IN_LENGTH_M / 10.0 * 60.0), :2] - start_position).T)

@@ -208,9 +208,9 @@ def _worst_first_key(candidate: SimulatedReturn) -> tuple[int, float]:
 
 
 def _is_lead_in_clear(world: ReturnWorld, row: Record) -> bool:
-    """Return True if the straight lead-in to a start stays high enough above the ground.
+    """Return True if the straight lead-in to a start is high enough above the ground to be flown.
 
-    The minimum is `_MIN_LEAD_IN_HEIGHT_M`.
+    Each point must be more than `_MIN_LEAD_IN_HEIGHT_M` above the ground.  Returns True without a terrain.
 
     row: a row of `ReturnStarts.rows`.
     """

@@ -83,7 +83,7 @@ def _start_process(folder: Path) -> "subprocess.Popen[str]":
 def _feed_process(
     process: "subprocess.Popen[str]", remaining_units: "deque[str]", lines: "queue.SimpleQueue[str]"
 ) -> None:
-    """Send a process the names of units, one after another, and queue the lines that the process prints.
+    """Send unit names to a process, one after another, and queue the lines that it prints.
 
     `_END_OF_OUTPUT` is queued when no unit remains or the process has died.
     """
@@ -121,7 +121,8 @@ _compiled_units: set[str] = set()
 def compile_and_report(all_units: Sequence[str]) -> None:
     """Compile the units that this process has not compiled, with a progress report.
 
-    If the cache cannot be written, only the reason is reported, and each kernel is compiled when it is called.
+    If the cache cannot be written, only the reason is reported, and each kernel is compiled when it is called.  The
+    same holds, without a reason, for an embedded Python, which has no executable to start processes with.
 
     all_units: units of `planfly.kernel_units`, the unit that takes longest first.
     """

@@ -105,7 +105,7 @@ def autosave_text(
 
 
 def settings_data(context: EditContext) -> Json:
-    """Return the settings of an editing context as data, with the name of the scenario to which they belong."""
+    """Return the settings of an editing context as plain data, and the name of their scenario."""
     spec = context.scenario.to_json()
     # An area made around a mission is not saved; it is made again when the mission is restored.
     names = [table for table in _SAVED_TABLES if table in spec and (table != "area" or not context.scenario.external)]
@@ -201,7 +201,7 @@ def read_autosave(
 
 
 def set_autosave_aside(file: Path) -> Path:
-    """Rename an autosave file so that it is not overwritten; return its new path, named by a digest of the content."""
+    """Rename an autosave file so that it is kept; return its new path, which has a digest in its name."""
     digest = hashlib.sha256(file.read_bytes()).hexdigest()[:8]
     return file.replace(file.with_name(f"{file.stem}-earlier-{digest}{file.suffix}"))
 
@@ -279,6 +279,9 @@ def _replace_entries(saved_spec: Json, opened_spec: Json, table: str, keys: tupl
     """Replace entries in a table of a saved scenario by the entries of the opened scenario.
 
     Returns a text with both values for each entry that was different.
+
+    table: name of the table, such as "flight".
+    keys: keys of the entries in this table.
     """
     replaced, saved, opened = [], saved_spec.setdefault(table, {}), opened_spec.get(table, {})
     for key in keys:

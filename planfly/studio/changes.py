@@ -58,6 +58,7 @@ class PlaceResult(NamedTuple):
         return "" if self.value is None else quantity_text(self.value, self.unit)
 
 
+# Worst result of each rule at each place; the keys are rule and place.
 _Results = dict[tuple[str, PlaceKey], PlaceResult]
 
 
@@ -75,9 +76,10 @@ class FlightResults(NamedTuple):
 
 
 def flight_results(mission: Mission, route: Route, findings: Iterable[Finding], seconds: float) -> FlightResults:
-    """Collect the worst result of each rule at each place of a flight, over all laps that were flown.
+    """Collect a flight's result for each rule and place; the worst one if a place was flown repeatedly.
 
     seconds: duration of the flight, s.
+    findings: findings of the flight's verdict.
     """
     item_contents = tuple((float(item.command), item.lat_deg, item.lon_deg, item.alt) for item in mission.items)
     order = {item.seq: k for k, item in enumerate(mission.items)}
@@ -119,7 +121,7 @@ def flight_results(mission: Mission, route: Route, findings: Iterable[Finding], 
 
 
 def _is_decided_by_plan(finding: Finding) -> bool:
-    """Return True if the margin of a flown place belongs to its planned value, not to its flown value."""
+    """Return True if the margin at a flown place was computed from the planned value, not the flown value."""
     if finding.margin is None or finding.limit is None or finding.planned is None or finding.flown is None:
         return False
     planned_error, flown_error = (
@@ -139,7 +141,10 @@ def _severity_key(result: PlaceResult) -> tuple[bool, int, float]:
 
 
 def _place_key(place: Place, route_items: Sequence[int], order: dict[int, int]) -> tuple[PlaceKey, str]:
-    """Return a key of a place that uses positions in the mission, and a description with item numbers.
+    """Return a key and a description of a place; the key has the positions of its items in the mission.
+
+    An edit renumbers items, so the key has their positions in the list of items instead of their numbers.  The
+    description has the numbers.
 
     route_items: item number of each waypoint.
     order: position of each item number in the mission.
@@ -313,7 +318,7 @@ def _quantity_name(rule: str) -> str:
 
 
 def _value_changes(old_results: _Results, new_results: _Results) -> list[str]:
-    """Return lines on continued failures whose value changed, then on rules whose smallest margin changed.
+    """Return lines on values that changed: of failures that continue, and of the closest place of a rule.
 
     At most `_MAX_VALUE_CHANGES` lines of each kind are returned, the largest changes of margin first.
     """

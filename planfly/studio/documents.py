@@ -319,13 +319,20 @@ def _lost_settings(opened_setup: FlightSetup, context: EditContext) -> tuple[str
 
 
 def _lost_parameters(context: EditContext) -> tuple[str, ...]:
-    """Return a line on the autopilot parameters set in the studio, which only a parameter file can store."""
+    """Return a line on the autopilot parameters set in the studio, which only a parameter file can store.
+
+    Returns () if no parameter was set.
+    """
     count = len(context.parameters.values)
     return (f"{count_text(count, 'parameter')} set in the studio: only a .parm contains them",) if count else ()
 
 
 def _saved_plan(name: str, context: EditContext, judged_mission: JudgedMission) -> SavedFile:
-    """Return the mission as a plan of its scenario, with the current certificate of its path."""
+    """Return the mission as a plan of its scenario, with the current certificate of its path.
+
+    A plan whose certificate still applies is returned as it is. A new plan is certified; the losses say what it does
+    not keep of the mission, and why it is not feasible.
+    """
     plan = judged_mission.setup.plan
     if plan is not None:
         return SavedFile(name, plan_json(plan).encode())

@@ -122,7 +122,10 @@ class EditContext(MissionContext):
         return with_end_courses(route, self.scenario, uav.limits)
 
     def part_setup(self, mission: Mission, route: Route) -> FlightSetup:
-        """Return a setup for judging a route, which may be only a part of the mission's route."""
+        """Return a setup for judging a route, which may be only a part of the mission's route.
+
+        Unlike the setup of a flight, it is made without checks, and without path and notes.
+        """
         uav = self.uav_for_mission(mission)
         return FlightSetup(
             scenario=self.scenario,

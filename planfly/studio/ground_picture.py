@@ -88,7 +88,10 @@ def _sample_heights(terrain: Terrain, east: Range, north: Range, pixels: int) ->
 
 
 def _tint_by_height(heights: Floats, min_height: float, max_height: float, *, dark: bool) -> Floats:
-    """Return the colour for each altitude (rows, columns, 3): red, green and blue from 0 to 1."""
+    """Return the colour for each altitude (rows, columns, 3): red, green and blue from 0 to 1.
+
+    heights: altitudes, (rows, columns), m; the palette extends from `min_height` to `max_height`.
+    """
     ramp = np.array([theme.rgb(text) for text in (theme.GROUND_DARK if dark else theme.GROUND)])
     ramp_position = np.nan_to_num((heights - min_height) / (max_height - min_height)) * (len(ramp) - 1)
     return np.stack([np.interp(ramp_position, np.arange(len(ramp)), ramp[:, k]) for k in range(3)], axis=-1)

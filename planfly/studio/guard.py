@@ -38,6 +38,9 @@ def request_refusal(scope: Scope, port: int) -> tuple[int, str]:
 
     Returns (0, "") if the request is accepted.
 
+    scope: description of the request by ASGI: type, method, path and headers.
+    port: port of the studio.
+
     >>> scope = {"type": "http", "method": "GET", "path": "/", "headers": [(b"host", b"evil.test:80")]}
     >>> request_refusal(scope, 80)
     (421, 'this host is not served here')
@@ -66,6 +69,8 @@ def _is_page_visit(scope: Scope, headers: list[tuple[bytes, str]]) -> bool:
     """Return True if a browser opens the page itself.
 
     This is allowed from any site, because the page has no data without a token.
+
+    headers: names and values of the request's headers, in lower case.
     """
     header_values = dict(headers)
     is_document = (

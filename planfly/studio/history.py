@@ -10,7 +10,10 @@ MAX_STEPS = 1_000
 
 
 class ParameterChange(NamedTuple):
-    """Change of an autopilot parameter by an edit; a value of None is the one that is not set in the studio."""
+    """Change of an autopilot parameter by an edit.
+
+    old, new: values before and after the edit; None if the studio sets no value.
+    """
 
     name: str
     old: float | None

@@ -197,6 +197,8 @@ def _extend_span(route: Route, first: int, last: int) -> tuple[int, int]:
     """Return a span extended on both sides by at least `MOVE_REACH_M` and `MOVE_REACH_LEGS`.
 
     A loiter is included completely or not at all.
+
+    first, last: first and last waypoint of the span.
     """
     distance = np.concatenate([[0.0], np.cumsum(leg_runs(route.positions))])
     start = min(

@@ -313,7 +313,10 @@ class Jobs:
 
 
 def paths_json(plans: Sequence[FrontPlan]) -> list[Json]:
-    """Return page data of planned paths to choose from; each names the quantities in which it is best."""
+    """Return page data of the planned paths to choose from.
+
+    Each path names the quantities in which it is the best of them, such as "shortest".
+    """
     quantities = {
         "shortest": [plan.length for plan in plans],
         "least seen by radars": [plan.exposure for plan in plans],

@@ -99,7 +99,7 @@ def _is_waypoint_move(old_item: MissionItem, new_item: MissionItem) -> bool:
 def _has_one_stop_per_item(route: Route, mission: Mission, scenario: Scenario) -> bool:
     """Return True if each position item is one stop of the route.
 
-    The altitude of each stop must not depend on other items.
+    The altitude of a stop must not depend on other items, either.
     """
     if any(value is not None for value in (route.rtl_start, route.direct_landing_start, route.landing_ground)):
         return False

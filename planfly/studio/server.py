@@ -274,7 +274,10 @@ class Server:
         return {**self.session.mission_message(), "planning": self.jobs.is_planning_first_path(self.session)}
 
     async def _send_ground(self, page: Page) -> None:
-        """Send the terrain of the current world to a page, once for each world and each color scheme."""
+        """Send the terrain of the current world to a page, once for each world and each color scheme.
+
+        Nothing is sent for a world without terrain.
+        """
         terrain, world_message = self.session.context.scenario.terrain, self.session.world_message()
         key = (hash(json.dumps(world_message["shown"])), page.dark)
         if terrain is None or page.sent_ground == key:
@@ -300,7 +303,11 @@ class Server:
     # Messages of a page.
 
     async def _handle_message(self, page: Page, text: str) -> None:
-        """Handle a message. Raises ValueError for a message that is not understood."""
+        """Handle a message.
+
+        An error that the user can mend is sent to the page. An edit of a mission that has changed since is not made;
+        the page is sent the current mission. Raises ValueError for a message that is not understood.
+        """
         try:
             message = read_message(text)
         except ValidationError as error:
@@ -361,7 +368,10 @@ class Server:
                 await self._change_session(message)
 
     async def _change_session(self, message: messages.Message) -> None:
-        """Change the session as a message requests, send the result to every page, and start a flight."""
+        """Change the session as a message requests, send the result to every page, and start a flight.
+
+        If the message changes nothing, nothing is sent or started.
+        """
         session = self.session
         async with self._change_lock:
             rev, world_rev = session.rev, session.world_rev
@@ -378,7 +388,11 @@ class Server:
                 await self._send_ground(page)
 
     def _apply_change(self, message: messages.Message) -> None:
-        """Change the session as a message requests; called in the judging thread."""
+        """Change the session as a message requests; called in the judging thread.
+
+        A file that is opened replaces the document, which is autosaved first if needed. Opening, undo and redo discard
+        the results of jobs. A parameter file from the folder only changes the settings.
+        """
         session = self.session
         match message:
             case messages.Move() | messages.Insert() | messages.Delete() | messages.Raise() | messages.Apply():

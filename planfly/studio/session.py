@@ -96,7 +96,8 @@ class Session:
     must_autosave: True if options of the command replaced autosaved settings, so that the autosave is written again.
     unused_text: text on autosaved edits that were set aside because the mission file has changed; "" if there are none.
     aircraft_folders: folders of the user's own aircraft that the session has flown, by name.
-    named_parameters: for each autopilot that was flown with a parameter file, the scenario's entries of both, by name.
+    named_parameters: [flight] entries of each autopilot that was flown with a parameter file, by its name; they apply
+    again when this autopilot is chosen again.
     """
 
     document: Document
@@ -183,7 +184,7 @@ class Session:
 
     @property
     def undo_text(self) -> str:
-        """Text of the next undo, which may be the opening of a document; "" if there is nothing to undo."""
+        """Text of the next undo, which may be "open" and a document; "" if there is nothing to undo."""
         return self.history.undo_text or (f"open {self.document.name}" if self.earlier_states else "")
 
     @property
@@ -414,7 +415,10 @@ class Session:
         ), f"insert an item after {previous_item.seq}"
 
     def _delete_items(self, indices: list[int]) -> tuple[Mission, str]:
-        """Return the mission without some items, and a description of the edit."""
+        """Return the mission without some items, and a description of the edit.
+
+        indices: indices in the mission's list of items.
+        """
         mission = self.mission
         for index in sorted(set(indices), reverse=True):
             mission = edits.delete_item(mission, index)
@@ -507,7 +511,10 @@ class Session:
     # Page data, and files.
 
     def mission_message(self) -> Json:
-        """Return the message with the current mission and its verdict, with the suggestions that passed a trial."""
+        """Return the message with the current mission and its verdict, as the page shows them.
+
+        It also has the texts of undo and redo and the notes, and the suggestions that passed a trial, if any.
+        """
         tried = self.tried.get("geometric")
         return {
             "kind": "sheet",
@@ -548,7 +555,8 @@ class Session:
     def save(self, form: str) -> SavedFile:
         """Return the mission as a file of a format. Raises PlanflyError if the format cannot store it.
 
-        A mission without a file to overwrite is then no longer unsaved.
+        If there is no file to overwrite, the mission then counts as saved, unless the file is only a map or a parameter
+        file.
         """
         saved_file = save_document(self.document, self.context, self.judged, form)
         if form in KINDS and form != "kml" and not self.file_kind:

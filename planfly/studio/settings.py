@@ -82,7 +82,7 @@ class ChangedParameters:
         return parameters_text(self.values, title)
 
     def with_values(self, values: Mapping[str, float | None]) -> "ChangedParameters":
-        """Return the parameters with other values by name; None no longer sets a parameter."""
+        """Return the parameters with other values by name; a value of None removes a parameter."""
         merged = {name: value for name, value in (self.values | dict(values)).items() if value is not None}
         typed = tuple(name for name in dict.fromkeys((*self.typed, *values)) if name in merged)
         return ChangedParameters(merged, self.file if merged else "", self.unused if merged else (), typed)
@@ -105,20 +105,23 @@ class ChangedParameters:
 
 
 def own_aircraft(scenario: Scenario) -> dict[str, str]:
-    """Return the folder of a scenario's aircraft by the aircraft's name; empty for an embedded aircraft."""
+    """Return {name: folder} of a scenario's aircraft if it has its own folder; {} if it is built in."""
     folder = scenario.flight.aircraft
     return {Path(folder).name: folder} if names_folder(folder) else {}
 
 
 def autopilot_parameters(scenario: Scenario, uav: Uav) -> dict[str, dict[str, str]]:
-    """Return the entries that fly a scenario's parameter file, by its autopilot; empty without a parameter file."""
+    """Return the [flight] entries of a scenario that name its parameter file and autopilot.
+
+    They are keyed by the name of the autopilot.  The result is empty without a parameter file.
+    """
     table = scenario.flight.model_dump(include={"autopilot", "params", "arduplane_version", "px4_version"})
     entries = {key: str(value) for key, value in table.items() if value is not None}
     return {uav.autopilot.name: entries} if "params" in entries else {}
 
 
 def error_in_page_words(error: PlanflyError, settings: Settings, scenario_name: str) -> PlanflyError:
-    """Return an error of a change of settings that names the settings by their labels on the page.
+    """Rewrite an error about changed settings with the labels that the settings have on the page.
 
     The scenario's name, which may be the name of the mission file, is omitted.
 

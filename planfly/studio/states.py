@@ -137,7 +137,8 @@ def finding_state(finding: Finding, *, unjudged: bool = False) -> State | None:
 def _closeness(finding: Finding, tolerance: float = 0.0) -> float:
     """Return the margin of a finding divided by the margin below which a value is near its limit.
 
-    The latter is a tenth of the limit, but at most the scale of the rule's margin.
+    A value is near its limit within a tenth of the limit, but at most within the scale of the rule's margin.  Returns
+    infinity for a rule that has neither.
 
     tolerance: added to the margin, in the finding's unit.
     """

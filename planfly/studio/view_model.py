@@ -119,7 +119,7 @@ def _threats_json(threats: Threats) -> list[Json]:
 
 
 def _zones_json(scenario: Scenario, mission: Mission, setup: FlightSetup) -> list[Json]:
-    """Return page data of the scenario's zones and then of the mission's fence zones.
+    """Return page data of the zones: first those of the scenario, then those of the mission's fence.
 
     Findings number the zones in this order.
     """
@@ -205,7 +205,10 @@ def items_json(context: EditContext, mission: Mission) -> list[Json]:
 
 
 def commands_json(mission: Mission) -> list[Json]:
-    """Return page data of items without a place on the map, such as speeds and jumps, which are not editable."""
+    """Return page data of items without a place on the map, such as speeds and jumps.
+
+    The page shows them, but cannot edit them.
+    """
     places = set(movable_indices(mission))
     return [
         {"k": k, "seq": item.seq, "text": _command_text(item)}
@@ -249,14 +252,22 @@ def route_json(mission: Mission, route: Route, first: int, last: int) -> Json:
 
 
 def _leg_paths(points: Floats, legs: NDArray[np.int64], first: int, last: int) -> list[list[float]]:
-    """Return the path of each leg as a flat list of east, north, up, east, north, up, ..., m."""
+    """Return the path of each leg as a flat list, m: east, north, up of the first point, then the next.
+
+    points: points of the path, (p, 3), m.
+    legs: number of the leg on which each point lies, (p,).
+    first, last: first and last waypoint; the legs between them are returned.
+    """
     edges = np.searchsorted(legs, np.arange(first, last + 1))
     rounded_points = np.round(points, 1)
     return [rounded_points[start : end + 1].ravel().tolist() for start, end in pairwise(edges.tolist())]
 
 
 def states_json(states: PlaceStates, first: int, last: int) -> Json:
-    """Return page data of the legs and corners between two waypoints, each as its state, text and closeness."""
+    """Return page data of the legs and corners between two waypoints, each as its state, text and closeness.
+
+    first, last: numbers of the two waypoints in the route.
+    """
     return {
         "legs": [_state_data(states.legs.get(k, _OK_STATE)) for k in range(first, last)],
         "corners": [_state_data(states.corners.get(k, _OK_STATE)) for k in range(first, last + 1)],
@@ -359,7 +370,7 @@ def profile_json(scenario: Scenario, setup: FlightSetup) -> Json:
                 "role": "zone",
                 "name": cut.zone.name,
                 "x": round_to_json(distance),
-                "top": round_to_json(np.where(cut.where, cut.top, np.nan)),
+                "top": round_to_json(np.where(cut.is_forbidden, cut.top, np.nan)),
                 "low": round_to_json(cut.bottom),
             }
             for cut in zone_cuts(scenario.zones, view)

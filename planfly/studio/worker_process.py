@@ -204,6 +204,8 @@ class WorkerProcess:
     def _kill_if_stuck(self, pipe: Connection, number: int) -> None:
         """Kill a process that still works on a cancelled task; a new process will get the newest task.
 
+        Does nothing if the task has ended in the meantime.
+
         pipe: pipe to the process.
         number: number of the cancelled task.
         """

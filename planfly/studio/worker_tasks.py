@@ -48,6 +48,8 @@ def fly(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any
 
     The findings have no suggestions.  "judged" is the pickled flight for `try_flown_suggestions`, or empty if nothing
     failed.
+
+    payload: the editing context, and the mission.
     """
     context, mission = payload
     setup = context.setup(mission)
@@ -72,7 +74,12 @@ def fly(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any
 
 
 def try_planned_suggestions(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any]:
-    """Try the suggestions of a mission's geometric verdict; return those that pass, as `try_flown_suggestions`."""
+    """Try the suggestions of a mission's geometric verdict, without flights.
+
+    The result is that of `try_flown_suggestions`.
+
+    payload: the editing context, and the mission.
+    """
     context, mission = payload
     return _try_suggestions(context, context.judge(mission), advance)
 
@@ -90,7 +97,7 @@ def try_flown_suggestions(payload: tuple[EditContext, bytes], advance: Advance) 
 
 
 def _try_suggestions(context: EditContext, judged_mission: JudgedMission, advance: Advance) -> dict[str, Any]:
-    """Try the suggestions of a verdict; return those that pass, as described in `try_flown_suggestions`."""
+    """Try the suggestions of a verdict; the result is that of `try_flown_suggestions`."""
 
     def report_and_continue() -> bool:
         """Report that suggestions are tried; return False, so that the trials are not aborted."""

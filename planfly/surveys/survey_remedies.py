@@ -309,9 +309,10 @@ class _Trials:
     # The remedies, one change each.
 
     def try_photo_spacing(self) -> SurveyRemedy | None:
-        """Try the longest whole distance between photos with the required front overlap at the lowest planned place.
+        """Try photos at shorter distances along the lines, so that the front overlap is as required.
 
-        Returns None if the front overlap does not fail, or if the flight does not pass.
+        The distance is the longest one, in whole m, with the required overlap where the route is lowest above the
+        ground.  Returns None if the front overlap does not fail, or if the flight does not pass.
         """
         if not any(finding.check == FRONT_OVERLAP for finding in self._verdict.failed):
             return None
@@ -330,7 +331,7 @@ class _Trials:
         return SurveyRemedy("trigger", "", current, shortest, "m", *flight) if self._is_remedy(flight) else None
 
     def try_height(self) -> SurveyRemedy | None:
-        """Try the lowest height, in whole m, at which the photos that are flown have the required overlaps.
+        """Try the lines higher, by the fewest whole metres that give the flown photos the required overlaps.
 
         Returns None if no overlap fails, or if the flight does not pass.
         """
@@ -385,7 +386,9 @@ class _Trials:
         return SurveyRemedy("gates", "", 0.0, 1.0, "", *flight) if self._is_remedy(flight) else None
 
     def find_stride(self, max_turn_around: float) -> SurveyRemedy | None:
-        """Find the smallest interleave stride that passes, with turn-around distances below `max_turn_around`.
+        """Find the smallest interleave stride n that passes: every n-th line is flown first, then the others.
+
+        Only turn-around distances below `max_turn_around` are tried.
 
         max_turn_around: turn-around distance that passes without interleaving, which is also the lead-in to the first
         line, m; infinity if no distance passes.
@@ -412,6 +415,9 @@ class _Trials:
 
         The search is a bisection.  A distance is too long if the flight runs out of energy before its end.
         turn_arounds: distances to try, in increasing order, m.
+
+        stride: interleave stride; 1 flies the lines in order.
+        lead_in: distance before the first line if it is longer than the turn-around distance, m.
         """
         order_text = "" if stride == 1 else f"every {ordinal_text(stride)} line, "
         flights: dict[float, _TrialFlight | None] = {}
@@ -600,6 +606,8 @@ class _Trials:
     def try_default_airspeed(self) -> SurveyRemedy | None:
         """Try longer turn-around distances with the default airspeed, if the mission sets a too low airspeed.
 
+        Returns None if the mission sets none, or if no distance passes.
+
         An airspeed is too low if it is below the minimum airspeed of the aircraft.
         """
         mission, default_airspeed = self._setup.mission, self._uav.airspeed
@@ -658,9 +666,9 @@ class _Trials:
 
 
 def missing_height(measure: OverlapMeasure) -> float:
-    """Return the height that the lowest photos need for the required overlaps, m; 0 if nothing is missing.
+    """Return the climb with which the lowest photos have the required overlaps, m.
 
-    The distances between photos and between lines stay as flown.
+    The distances between photos and between lines stay as flown.  Returns 0 if the overlaps are large enough.
     """
     camera, missing = measure.camera, 0.0
     for overlap, required, distance, width, height in (

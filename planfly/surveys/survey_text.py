@@ -38,6 +38,8 @@ def is_line_unknown(measure: LineMeasure | None) -> bool:
 def lines_headline(measures: list[LineMeasure | None]) -> str:
     """Return one line with the number of usable photo lines, and the worst line if some are not usable.
 
+    measures: measure of each line, in the order flown; None for a line that was not flown.
+
     >>> lines_headline([None, None])
     '0 of 2 photo lines can be used; line 1 is the worst: not flown'
     """
@@ -161,7 +163,11 @@ def count_line_photos(lines: Sequence[LineMeasure | None]) -> int:
 
 
 def usable_segments_text(survey: Survey, lines: Sequence[LineMeasure | None]) -> str:
-    """Describe the length lost at the ends of the lines, which indicates the needed turn-around distance."""
+    """Describe the length lost at the ends of the lines, which indicates the needed turn-around distance.
+
+    If no line has a usable part, the text says that instead.
+    lines: None for a line that was not flown.
+    """
     usable_lines = [measure for measure in lines if measure is not None and measure.usable > 0.0]
     if not usable_lines:
         return (

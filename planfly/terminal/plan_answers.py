@@ -109,7 +109,10 @@ def front_answer(front: "Front", folder: Path, code: int) -> FrontAnswer:
 
 
 def fewer_plans_line(front: "Front") -> str:
-    """Return a line that explains why a front has fewer plans than requested."""
+    """Return a line that explains why a front has fewer plans than requested.
+
+    Either the search was stopped, or no further plan gains a noticeable amount in any of the objectives.
+    """
     if front.ended != "completed":
         cause = "the time budget" if front.ended == "budget" else "an interruption"
         unit = "evaluation" if front.evaluations == 1 else "evaluations"

@@ -130,7 +130,7 @@ def _rule_summary(rule: RuleFindings) -> str:
 
 
 def autopilot_lines(verdicts: Mapping[str, Verdict]) -> list[str]:
-    """Return the lines of a table of verdicts, followed by the main lines of each verdict.
+    """Return a table of several autopilots' verdicts as lines, and the main lines of each verdict.
 
     The table has a row for each rule and a column for each autopilot.
 

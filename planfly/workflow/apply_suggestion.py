@@ -36,7 +36,7 @@ _SPHERE_MARGIN_M = 15.0
 # Tried shares of a change of a leg's rise that are made at the leg's end, in this order.  None: the share depends on
 # the leg's position in the route.
 _END_FRACTIONS = (None, 1.0, 0.0, 0.5, 0.05, 0.1, 0.2, 0.8, 0.9, 0.95)
-# Smallest assumed share of the waypoints' move by which the nearest point of their legs moves.
+# Smallest share of the waypoints' move that the nearest point of their legs is assumed to follow; it limits the move.
 _MIN_MOVE_SHARE = 0.2
 
 
@@ -106,7 +106,7 @@ def apply_suggestion(
 
 
 def _open_places(verdict: Verdict) -> dict[tuple[str, Place], bool]:
-    """Return a mapping from rule and place of each failed or undecided finding to True if it failed."""
+    """Return the rule and place of each failed or undecided finding, mapped to True if the finding failed."""
     open_findings = (*undecided_findings(verdict.findings), *verdict.failed)
     return {(finding.rule, finding.place): finding.ok is False for finding in open_findings}
 
@@ -155,7 +155,7 @@ class _Choice:
     max_moves: greatest number of waypoints to move away from a missile; None for all.
     radially: True if each of these waypoints moves in its own direction from the missile.
     end_fraction: share of a change of a leg's rise that is made at the leg's end; the rest is made at its start.  None
-        for a half, and for all of it at the end of the leg that does not end the route.
+    makes half of the change at each end, but on the first or last leg of the route all of it at the inner waypoint.
     """
 
     max_moves: int | None = None
@@ -179,7 +179,7 @@ class _EditedMission:
         self.offsets: dict[int, Floats] = {}
 
     def item_index(self, waypoint: int) -> int | None:
-        """Return the index of a waypoint's item in the mission's list, or None if the waypoint has no item."""
+        """Return the index of a waypoint's item in the list of items; None for a waypoint without an item."""
         seq = int(self.route.items[waypoint])
         indices = [index for index in movable_indices(self.mission) if self.mission.items[index].seq == seq]
         return indices[0] if indices else None
@@ -264,7 +264,7 @@ def _lengthen_leg(edited: _EditedMission, change: Change, _finding: Finding) -> 
 
 
 def _reduce_rise(edited: _EditedMission, change: Change, _finding: Finding) -> None:
-    """Reduce the climb or descent of a leg by moving one or both of its ends."""
+    """Reduce the climb or descent of a leg to the wanted rise, by moving one or both of its ends."""
     leg = _changed_leg(change, edited.route)
     excess = float(edited.current_position(leg + 1)[2] - edited.current_position(leg)[2]) - change.wanted
     is_first, is_last = leg == 0, leg + 1 == edited.route.legs
@@ -276,7 +276,10 @@ def _reduce_rise(edited: _EditedMission, change: Change, _finding: Finding) -> N
 
 
 def _change_airspeed(edited: _EditedMission, change: Change, _finding: Finding) -> None:
-    """Change the airspeed on a leg, on both legs of a waypoint, or on the whole route."""
+    """Change the airspeed on a leg, on both legs of a waypoint, or on the whole route.
+
+    If the suggestion allows a range of airspeeds, the middle of the range is set.
+    """
     place, route = change.place, edited.route
     airspeed = change.wanted if change.most is None else 0.5 * (change.wanted + change.most)
     legs = range(route.legs)
@@ -292,7 +295,10 @@ def _change_airspeed(edited: _EditedMission, change: Change, _finding: Finding) 
 
 
 def _make_turn_gentler(edited: _EditedMission, change: Change, _finding: Finding) -> None:
-    """Make a turn gentler by moving the waypoint towards the line between its neighbours."""
+    """Make a turn gentler by moving the waypoint towards the line between its neighbours.
+
+    The waypoint is not moved if it is an end of the route, or if no move makes the turn gentle enough.
+    """
     points, index = edited.waypoint_positions(), change.place.index
     if index is None or not 0 < index < edited.route.legs:
         return
@@ -332,14 +338,17 @@ def _change_altitude(edited: _EditedMission, change: Change, finding: Finding) -
 
 
 def _set_home_altitude(edited: _EditedMission, change: Change, _finding: Finding) -> None:
-    """Set the altitude of home, relative to which the altitudes of items are stated."""
+    """Set the altitude of home; items with an altitude above home move with it."""
     if edited.mission.home is not None and edited.mission.home.alt != change.wanted:
         edited.mission = replace(edited.mission, home=replace(edited.mission.home, alt=change.wanted))
         edited.is_changed = True
 
 
 def _set_altitude_frame(edited: _EditedMission, change: Change, _finding: Finding) -> None:
-    """Change the altitude frame of items that fit the terrain only in the other frame; keep their numbers."""
+    """Change the altitude frame of the items that seem misread, but not their numbers.
+
+    An item seems misread if it fits the terrain only in the other frame.
+    """
     scenario, mission, frame = edited.requirements.setup.scenario, edited.mission, Frame(int(change.wanted))
     below_ground, too_high = find_misread_altitudes(mission, scenario.origin, scenario.terrain)
     items, readings = list(mission.items), too_high if frame == Frame.GLOBAL else below_ground
@@ -351,6 +360,8 @@ def _set_altitude_frame(edited: _EditedMission, change: Change, _finding: Findin
 
 def _follow_ground(edited: _EditedMission, change: Change, _finding: Finding) -> None:
     """State the altitude of a leg's end as a height above terrain.
+
+    The mission is not changed without a terrain, or if the end has no item.
 
     If the start of the leg is below the required height, it is raised in its own altitude frame, because another leg
     leads to it.
@@ -404,7 +415,10 @@ def _move_inside_area(edited: _EditedMission, change: Change, _finding: Finding)
 
 
 def _move_away_from_missile(edited: _EditedMission, change: Change, finding: Finding) -> None:
-    """Move the waypoints near a missile so that the nearest point of their legs moves away from it."""
+    """Move the waypoints near a missile so that the nearest point of their legs moves away from it.
+
+    The mission is not changed if no leg violates the missile's sphere.
+    """
     missile = edited.context.scenario.threats.position[change.place.index or 0, :2]
     legs, points = violated_legs(edited.requirements, finding), edited.waypoint_positions()
     if not legs:
@@ -452,7 +466,10 @@ def _move_sideways(edited: _EditedMission, change: Change, finding: Finding) -> 
 
 
 def _land_from_other_end(edited: _EditedMission, _change: Change, _finding: Finding) -> None:
-    """Turn the items of the last landing sequence by half a turn about the landing point."""
+    """Turn the last landing sequence by half a turn about the landing point.
+
+    The landing then leads over the strip in the opposite direction.  A mission without a landing is not changed.
+    """
     mission, movable = edited.mission, movable_indices(edited.mission)
     landings = [index for index in movable if mission.items[index].command in LANDINGS]
     waypoints = {edited.item_index(waypoint): waypoint for waypoint in range(edited.route.legs + 1)}

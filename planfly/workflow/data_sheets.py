@@ -124,7 +124,10 @@ def read_aircraft_parameters(file: Path) -> AircraftParameters:
 
 
 def _arduplane_value(entries: Mapping[str, Entry], name: str) -> tuple[float, float, str] | None:
-    """Return value, default and text ("NAME value") of an ArduPlane parameter; None if not in the file."""
+    """Return value, default and text ("NAME value") of an ArduPlane parameter; None if not in the file.
+
+    entries: entries of the parameter file, by name; it may state the parameter under its former name.
+    """
     definition = next((candidate for candidate in DEFINITIONS.values() if candidate.name == name), None)
     if definition is None or name not in _USED_PARAMETERS:
         return None
@@ -137,7 +140,11 @@ def _arduplane_value(entries: Mapping[str, Entry], name: str) -> tuple[float, fl
 
 
 def _px4_value(entries: Mapping[str, Entry], name: str) -> tuple[float, float, str] | None:
-    """Return value, default (in ArduPlane's unit) and text of a PX4 parameter; None if not in the file."""
+    """Return value, default (in ArduPlane's unit) and text of a PX4 parameter; None if not in the file.
+
+    entries: entries of the parameter file, by PX4's names.
+    name: ArduPlane's name of the parameter.
+    """
     px4_name, factor = (_PX4_STALL[0], 1.0) if name == "AIRSPEED_STALL" else FROM_ARDUPILOT[name]
     if px4_name not in entries:
         return None
@@ -365,7 +372,8 @@ def _make_uncertainty(sized: SizedAircraft, aircraft: Aircraft) -> tuple[Uncerta
 def climb_deviation(sized: SizedAircraft) -> float:
     """Return the standard deviation of the climb at full throttle, rad.
 
-    A climb that is stated at less throttle is less certain at full throttle, but not less than a guess.
+    It is small for a climb that the sheet states at full throttle, and large for a guessed climb.  A climb that is
+    stated at less throttle is extrapolated to full throttle; this increases the deviation, at most to that of a guess.
     """
     if "climb" in sized.guessed:
         return GUESSED_CLIMB_SD_RAD
@@ -818,7 +826,11 @@ def _trim_throttle_lines(file_parameters: Mapping[str, float], performance: Perf
 
 
 def _climb_names(stated: AircraftParameters) -> list[str]:
-    """Return the file's names of the climb rate and its throttle if that is not full throttle; otherwise []."""
+    """Return the names of the climb rate and its throttle in a file, if the rate is not at full throttle.
+
+    They are the names that the file uses for TECS_CLMB_MAX and THR_MAX.  Returns [] unless both differ from their
+    defaults; the default of THR_MAX is full throttle.
+    """
     names = ("TECS_CLMB_MAX", "THR_MAX")
     return [stated.texts[name].split()[0] for name in names] if stated.values.keys() >= set(names) else []
 

@@ -346,7 +346,7 @@ def _describe_mission_change(flight: LoggedFlight, mission: Mission, options: Lo
 
 
 def _vehicle_events(flight: LoggedFlight) -> tuple[LogEvent, ...]:
-    """Return the vehicle's messages and mode changes of the flight and the 60 s before, in order of time.
+    """Return the vehicle's messages and mode changes in the flight and the 60 s before, in time order.
 
     Events before the first row get the time of the first row.  A flight without rows has no events.
     """
@@ -453,7 +453,7 @@ def fly_draws(
 
 
 def start_after_takeoff(setup: FlightSetup, track: Track) -> FlightSetup:
-    """Replace the take-off of a mission by a waypoint where the flight reached the take-off's altitude.
+    """Replace a take-off item by a waypoint at the place where the flight had climbed to its altitude.
 
     A model's flight starts in the air, and a mission does not state the course of its take-off: the autopilot chooses
     it.  The setup is returned unchanged if the mission has no take-off, or if the first segment of the flight did not

@@ -92,7 +92,10 @@ def make_plan(
 
 
 def _complete_in_gusts(plan: Plan, uav: Uav, search: Search) -> Plan:
-    """Return a plan that is safe in gusts, or the given plan marked as not safe."""
+    """Return a plan that is safe in gusts, or the given plan marked as not safe.
+
+    search: plans a path in a scenario within limits.
+    """
 
     def limit_orbits(candidate: Plan, search_limits: Limits) -> Plan:
         """Return a plan whose waypoints are few enough to avoid orbits in gusts."""
@@ -126,6 +129,8 @@ def finish_plan(plan: Plan, uav: Uav, *, continues: bool = False, keeps_waypoint
 
 def _add_ground_phases(plan: Plan, uav: Uav, old_plan: Plan | None = None, *, continues: bool) -> Plan:
     """Add departure and approach to a plan, and complete its certificate.
+
+    The departure and the approach are those that the scenario requires.
 
     The certificate then names the hazards near the final loiter, and the slopes and turns that cannot be flown in the
     local wind.

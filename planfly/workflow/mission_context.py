@@ -144,6 +144,8 @@ class MissionContext:
         """Return the positions of planned items, (n, 3) m AMSL.
 
         A landing has the altitude of the item before it.
+
+        indices: indices of the items in the mission.
         """
         items = [mission.items[k] for k in indices]
         east, north = to_map(self.scenario.origin, [item.lat_deg for item in items], [item.lon_deg for item in items])

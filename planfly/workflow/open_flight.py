@@ -42,7 +42,8 @@ from world.scenario import Scenario, embedded_names, with_ground_at
 
 # Name of a plan without a file, in messages about its mission.
 PLAN_FILE = "plan.json"
-# Fraction of the battery's charge by which the capacity that an autopilot counts from may differ without a note.
+# Largest difference between the capacity that an autopilot assumes and the battery's charge, as a fraction of this
+# charge; a larger one is noted.
 MAX_CAPACITY_DIFFERENCE = 0.2
 _MAH_PER_AH = 1000.0
 
@@ -112,7 +113,7 @@ def _open_plan(
     fences: NamedFences,
     terrain: str | None,
 ) -> FlightSetup:
-    """Make the setup of a plan in its own scenario, or of its mission in the scenario that the options name.
+    """Make the flight setup of a plan, in its own scenario or in another scenario that the options name.
 
     program: autopilot program that flies the mission; None for a simulated autopilot.
     engine: choice between the compiled flight model and JSBSim.
@@ -249,7 +250,10 @@ def make_setup(
 
 
 def planned_duration(route: Route, mission: Mission) -> float:
-    """Return the duration of a flight without wind, s; a loiter takes at least the time that its item states."""
+    """Return the duration of a flight without wind, s.
+
+    A loiter takes at least the time that its item states.
+    """
     leg_times = np.linalg.norm(np.diff(route.positions, axis=0), axis=1) / route.leg_airspeeds
     stops = route.stops
     is_loiter = stops[1:] == stops[:-1]
@@ -292,7 +296,7 @@ def with_landing_parameters(autopilot: Autopilot, mission: Mission) -> Autopilot
 
 
 def _capacity_notes(failsafes: Iterable[BatteryFailsafe], battery: float, volts: float) -> tuple[str, ...]:
-    """Return a note on each failsafe whose battery capacity differs from that of the aircraft's battery.
+    """Note the battery failsafes that assume another capacity than the aircraft's battery has.
 
     Such a failsafe acts too early or too late.  If several monitors share the load, each has its own battery, so
     nothing is noted.

@@ -118,7 +118,11 @@ def check_output_folder(folder: Path, overwrite: bool) -> None:
 
 
 def prepare_folder(folder: Path, files: tuple[str, ...] = RUN_FILES) -> None:
-    """Make a folder if it is missing, and remove old results of planfly from it, but no other file."""
+    """Make a folder if it is missing, and remove old results of planfly from it, but no other file.
+
+    files: names of the results.  With `RUN_FILES`, the results of earlier rounds and the pictures of a report are
+    removed, too.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     rounds = sorted(folder.glob("round-[0-9]*")) if files is RUN_FILES else []
     if files is RUN_FILES:

@@ -282,7 +282,10 @@ def autopilot_log_path(log: Path, program: Path) -> Path:
 
 
 def _record_and_judge(task: _FlightTask, requirements: RouteRequirements, flight: RunningFlight) -> FlownMission:
-    """Fly to the end, record the flight if a log is named, and judge the recorded rows."""
+    """Fly to the end or to a limit, record the flight if a log is named, and judge the recorded rows.
+
+    If the task asks for it, the verdict is explained by reference flights, and the log also gets returns.
+    """
     flight.max_ticks = min(flight.max_ticks, task.limits.max_ticks(flight.dt))
     builder, end_reason, length = TrackBuilder(), "", flight.path.length
     with ExitStack() as open_logs:

@@ -45,9 +45,9 @@ PassesWithAutopilot = Callable[[Autopilot], bool]
 def find_passing_parameter(
     autopilot: Autopilot, findings: tuple[Finding, ...], passes: PassesWithAutopilot
 ) -> DecidingParameter | None:
-    """Find the first parameter that makes the flight pass at another value, and its nearest passing value.
+    """Find an autopilot parameter with which a failed flight passes, and its nearest value that passes.
 
-    Returns None if no parameter does.
+    The autopilot lists the parameters to try, the candidates.  Returns None if none of them makes the flight pass.
 
     findings: findings of the flight that failed.
     passes: function that flies with the given autopilot and returns True if the flight passes; called about 20 times.
@@ -111,6 +111,8 @@ def _nearest_passing_value(
 
     The search begins at `farthest`; if this value fails, it begins halfway, because a parameter can also be changed too
     much.  Returns None if both fail.
+
+    passes: function that flies with a value of the parameter and returns True if the flight passes.
     """
     step_count = int(abs(farthest - current) / step + 1e-6)
     sign = 1.0 if farthest > current else -1.0
@@ -127,6 +129,8 @@ def _deviation_at_failure(failed_finding: Finding, findings: tuple[Finding, ...]
 
     The result is also None for an altitude error in the other direction, which does not explain the failure: an
     aircraft that is too near to the ground may be above its leg.
+
+    findings: all findings of the flight, whose facts state the errors.
     """
     place, rule = failed_finding.place, failed_finding.rule
     if rule == "corridor":
@@ -232,9 +236,10 @@ def passes_with_margin(trial_findings: Sequence[Finding], failed_findings: Seque
 
 
 def _suggested_parameter(verdict: Verdict, passed_trials: Sequence[PassedTrial]) -> DecidingParameter | None:
-    """Return the parameter whose suggested value alone makes a flight pass; None without such a suggestion.
+    """Return the parameter that a passed suggestion changes, if it changes nothing else; otherwise None.
 
-    The parameter acts on the failing leg, so that it is better advice than any other parameter.
+    Such a parameter acts on the failing leg, so it is better advice than a parameter found by other flights.  The
+    verdict must have exactly one failed finding.
     """
     if len(verdict.failed) != 1:
         return None

@@ -53,7 +53,7 @@ _MAX_STEPS = 10
 _MAX_FAILED_FINDINGS = 40
 # Greatest number of legs of a mission with trials and a reference flight: each judges all legs, 2 s for a thousand.
 MAX_TRIED_LEGS = 5000
-# Changes by a step, m, and of a parameter in m, which are enlarged while the finding fails.
+# Kinds of changes that are a step in m, or a parameter in m; the step is enlarged until the finding passes.
 _STEP_KINDS = frozenset(("height", "descent", "inset", "distance", "north", "east", "south", "west", "parameter"))
 # Changes of the energy carried or needed, as a ratio or a percentage.
 _ENERGY_KINDS = frozenset(("battery", "tank", "duration"))
@@ -229,7 +229,7 @@ def judge_mission_geometry(setup: FlightSetup, requirements: RouteRequirements |
 
 
 def has_geometric_suggestion(setup: FlightSetup) -> bool:
-    """Return True if a geometric trial of a change of the planned route passes."""
+    """Return True if a suggested change makes a failed finding pass, judged without a flight."""
     return any(finding.suggestions for finding in judge_mission_geometry(setup).failed)
 
 
@@ -264,9 +264,9 @@ class SuggestionTrials:
         self._flights_left = min(MAX_TRIAL_FLIGHTS, max_explaining_flights(self.judged.setup) - 1)
 
     def find_passing(self) -> list[PassedTrial]:
-        """Try the first suggestion of each finding, then the second and so on.
+        """Try the first suggestion of each finding, then the second and so on; return those that pass.
 
-        Returns the suggestions that pass.
+        A suggestion is left out if a part of its changes passes by itself.
         """
         requests = [
             (number, rank, finding)
@@ -422,8 +422,9 @@ class SuggestionTrials:
 def _has_margin(finding: Finding, suggestion: Suggestion, verdict: Verdict) -> bool:
     """Return True if a suggestion makes a finding pass with a margin for simulation and navigation errors.
 
-    A parameter passes the finding's stop with `ALTITUDE_ERROR_M` to spare.  A move away from a zone keeps the
-    navigation error as its distance from this zone.
+    A changed parameter must leave a margin of `ALTITUDE_ERROR_M` in all findings of the same rule and place.  A finding
+    on a zone requires that the path stays further from the zone than the navigation error.  Other suggestions need no
+    margin.
 
     verdict: verdict on the mission with the suggestion applied.
     """
@@ -441,7 +442,10 @@ def _has_margin(finding: Finding, suggestion: Suggestion, verdict: Verdict) -> b
 
 
 def _zone_shortfall(finding: Finding, verdict: Verdict) -> float:
-    """Return by how much a path passes the zone of a finding closer than the navigation error, m; 0 if it does not."""
+    """Return the distance by which a path passes the zone of a finding too closely, m.
+
+    Returns 0 if no other finding of the verdict names this zone as the nearest zone.
+    """
     for other in verdict.findings:
         facts = {fact.what: fact.value for fact in other.facts if other.rule == "fence"}
         if "nearest zone" in facts and facts["nearest zone"] == finding.place.index:
@@ -455,7 +459,7 @@ def suggested_parameters(suggestion: Suggestion) -> dict[str, float]:
 
 
 def _has_passing_part(passed_trials: Sequence[PassedTrial], finding: Finding, suggestion: Suggestion) -> bool:
-    """Return True if a part of a finding's suggestion passes by itself, whatever the sizes of its changes."""
+    """Return True if some changes of a finding's suggestion pass without the others."""
 
     def change_keys(changes: Suggestion) -> set[object]:
         """Return what identifies changes, except their sizes."""
@@ -500,7 +504,7 @@ def _larger_suggestion(finding: Finding, suggestion: Suggestion, verdict: Verdic
 
 
 def _add_needed_change(suggestion: Suggestion, open_finding: Finding) -> Suggestion | None:
-    """Add to a suggestion the change of the same kind that an open finding needs; None without such a change."""
+    """Enlarge a suggestion by what an open finding still needs; None if it needs another kind of change."""
     kinds = {change.what for change in suggestion}
     for needed_suggestion in open_finding.suggestions:
         if {change.what for change in needed_suggestion} == kinds:

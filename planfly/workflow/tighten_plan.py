@@ -100,7 +100,7 @@ def tighten_limits(scenario: Scenario, verdict: Verdict) -> tuple[Scenario, list
 
 
 def _limits_table(spec: Spec) -> Spec:
-    """Return the table of limits of a scenario's content, which is added if missing."""
+    """Return the [limits] table of a scenario's content; add an empty one if it is missing."""
     return spec.setdefault("limits", {})
 
 
@@ -140,7 +140,8 @@ def _tighten_slopes(spec: Spec, failed_findings: list[Finding]) -> list[Tighteni
 def _tighten_turns(spec: Spec, scenario: Scenario, failed_findings: list[Finding]) -> list[Tightening]:
     """Tighten the turns in `spec` if turns or corners failed.
 
-    The limit of the scenario is replaced by the limit of the aircraft; if it already is, the bank limit is lowered.
+    A limit that the scenario states is replaced by the limit of the aircraft.  If the limit is already the aircraft's,
+    the bank limit is lowered, but not below `MIN_BANK_DEG`.
     """
     if not any(finding.rule in ("turn", "waypoint", "corridor") for finding in failed_findings):
         return []
@@ -176,7 +177,10 @@ def _raise_clearance(spec: Spec, scenario: Scenario, failed_findings: list[Findi
 
 
 def _lower_max_height(spec: Spec, scenario: Scenario, failed_findings: list[Finding]) -> list[Tightening]:
-    """Lower the maximum height above ground in `spec` if the flight exceeded it and can fly lower."""
+    """Lower the maximum height above ground in `spec` if the flight exceeded it and can fly lower.
+
+    Returns this change in a list; [] if nothing is changed.
+    """
     current = scenario.limits.max_height_m
     excesses = [
         -finding.margin for finding in failed_findings if finding.rule == "height" and finding.margin is not None
@@ -191,7 +195,10 @@ def _lower_max_height(spec: Spec, scenario: Scenario, failed_findings: list[Find
 
 
 def _widen_zone_margin(spec: Spec, scenario: Scenario, failed_findings: list[Finding]) -> list[Tightening]:
-    """Widen the margin around zones in `spec` if the flight violated a zone and the plan itself did not."""
+    """Widen the margin around zones in `spec` if the flight violated a zone and the plan itself did not.
+
+    Returns this change in a list; [] if nothing is changed.
+    """
     flight_violations = [
         finding for finding in failed_findings if finding.rule == "fence" and not (finding.planned or 0.0) > ROUNDING_M
     ]
@@ -206,7 +213,7 @@ def _widen_zone_margin(spec: Spec, scenario: Scenario, failed_findings: list[Fin
 
 
 def _enlarge_missile_spheres(spec: Spec, failed_findings: list[Finding]) -> list[Tightening]:
-    """Enlarge the kill radii in `spec` of missiles whose spheres only the flight, not the plan, entered."""
+    """Enlarge the kill radii in `spec` of the missiles that the flight came too close to, unlike the plan."""
     changes = []
     for finding in failed_findings:
         if finding.planned:
@@ -266,7 +273,10 @@ def refine(
 
 
 def _next_step_remark(verdict: Verdict, was_flown: bool, is_last: bool, changes: list[Tightening]) -> str:
-    """Return the remark on the step after a round: `NEXT_ROUND_REMARK` or the reason to end."""
+    """Return the remark on the step after a round: `NEXT_ROUND_REMARK` or the reason to end.
+
+    changes: limits that were tightened after the round.
+    """
     if verdict.flyable:
         return "done: the plan is flyable"
     if verdict.undecided:

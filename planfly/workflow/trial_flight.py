@@ -79,7 +79,7 @@ class Trial:
 
 
 def max_explaining_flights(setup: FlightSetup) -> int:
-    """Return the maximum number of flights of a setup's length that may explain its verdict.
+    """Return the number of flights, reference and trial flights, that may explain a setup's verdict.
 
     >>> from logs.recording.example_log import example_log
     >>> max_explaining_flights(example_log().setup) > 100

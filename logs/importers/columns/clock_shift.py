@@ -34,9 +34,11 @@ def find_clock_shift(
 ) -> ClockShift:
     """Find the time shift of the first signal with the best correlation to the second signal.
 
-    The signals are linearly interpolated.  The correlation is 0 if the signals have too little time in common or do
-    not vary.
+    Shifts are tried first in coarse steps, then in fine steps around the best one.  The signals are linearly
+    interpolated.  The correlation is 0 if the signals have too little time in common or do not vary.
 
+    time, values: times, s, and values of the first signal, (n,).
+    other_time, other_values: the same for the second signal, (m,).
     max_shift: largest shift in either direction, s.
 
     >>> time = np.arange(0.0, 100.0, 0.1)

@@ -36,13 +36,16 @@ _FROZEN_S = 20.0
 _FROZEN_RUNS = 10.0
 # Least mean wind whose direction is checked, m/s.
 _CLEAR_WIND_MPS = 2.5
-# Range of the logged wind's component along the wind that follows from the velocities, as a fraction of the latter.
+# Accepted range of the logged wind, relative to the wind that follows from ground velocity, airspeed and heading; the
+# component along the latter is compared.
 _WIND_RATIO_RANGE = (0.4, 1.7)
 # Least number of rows in flight that are compared.
 _MIN_ROWS = 40
 # Range of the median specific force along the axis down in flight, m/s^2; a circle at 60 degrees of bank has -19.6.
 _FORCE_RANGE_MPS2 = (-20.0, -4.0)
-# Minimum mean alignment of the heading, or of the reversed heading, with the ground course that shows its sign.
+# Limit of the absolute mean of exp(i angle), which is 1 for a constant angle and about 0 for one that takes all values.
+# If the angle is course minus heading, more than this shows that both turn together; if it is the heading, that the
+# flight has no turns.
 _CLEAR_ALIGNMENT = 0.7
 # Largest mean angle between heading and ground course, rad.
 _MAX_HEADING_DIFFERENCE_RAD = math.radians(50.0)
@@ -56,7 +59,8 @@ _SENSORS = (
     *("roll", "pitch", "yaw", "roll_rate", "pitch_rate", "yaw_rate", "airspeed", "current"),
     *("acceleration_forward", "acceleration_right", "acceleration_down"),
 )
-# Minimum standard deviation from which a quantity must follow its partner, SI units and rad.  The lateral acceleration
+# A quantity must follow the partner of its pair if one of them has a larger standard deviation than this, SI units and
+# rad.  The lateral acceleration
 # is not listed: in a turn without sideslip it is less than the noise of a receiver's velocities.
 _LEAST_MOTIONS = {
     **dict.fromkeys(("roll_rate", "pitch_rate", "yaw_rate"), math.radians(1.0)),
@@ -78,12 +82,12 @@ _EARTH_RADIUS_M = 6_371_008.8
 
 
 class _Pair(NamedTuple):
-    """Two measurements that must agree or vary together.
+    """Quantity and values that follow from other quantities: both must agree or vary together.
 
     quantity: the quantity that is checked.
-    partner: text that names the quantities with which it is compared.
+    partner: text that names the other quantities, such as "the change of altitude".
     series: values of the quantity.
-    expected: values that follow from the partner, at the times of the grid, (n,).
+    expected: values that follow from the other quantities, at the times of the grid, (n,).
     exact: True if both must be equal, False if they only vary together.
     simultaneous: True if both vary at the same time, False if the motion delays the partner.
     """
@@ -349,7 +353,10 @@ def _check_not_frozen(log: ColumnLog, quantity: str, grid: Floats) -> None:
 
 
 def _check_pair(log: ColumnLog, pair: _Pair, grid: Floats) -> None:
-    """Raise LogError if two measurements have opposite signs, do not correlate, or differ by a factor.
+    """Raise LogError if the measurements of a pair contradict each other.
+
+    They contradict each other if they vary in opposite directions, do not correlate, or differ by a factor although
+    they should be equal.
 
     With errors in both measurements, the factor lies between r c and r / c, where r is the ratio of the standard
     deviations and c the correlation (Frisch 1934).
@@ -373,8 +380,9 @@ def _check_pair(log: ColumnLog, pair: _Pair, grid: Floats) -> None:
 def _check_delay(log: ColumnLog, pair: _Pair, grid: Floats) -> None:
     """Raise LogError if a measurement leads or lags its partner by `_LATE_S` or more.
 
-    The delay is the shift with the best correlation.  A shift is ignored if the amplitudes of both measurements differ
-    after it, because it then does not compare the same motion.
+    The delay is the shift with the best correlation, if it correlates clearly better than no shift.  It is ignored if
+    the shifted measurement varies more or less than its partner, because both then show different motions.  Pairs that
+    are not simultaneous, and short flights, are not checked.
     """
     is_inner = (grid > grid[0] - _SHIFTS_S[0]) & (grid < grid[-1] - _SHIFTS_S[-1])
     if not pair.simultaneous or np.count_nonzero(is_inner) < _MIN_ROWS:
@@ -397,7 +405,8 @@ def _check_delay(log: ColumnLog, pair: _Pair, grid: Floats) -> None:
 def _check_airspeed(log: ColumnLog, grid: Floats) -> None:
     """Raise LogError for an airspeed near zero in flight, or one that contradicts velocity and heading.
 
-    If the flight has turns, a logged wind that contradicts the wind of the velocity triangle also raises LogError.
+    The contradiction is found only in a flight with turns.  There, a logged wind that contradicts the wind of the
+    velocity triangle also raises LogError.
     """
     airspeed, column = _average_on_grid(log.series("airspeed"), grid), log.column("airspeed")
     if np.median(airspeed) < _MIN_AIRSPEED_MPS:
@@ -420,9 +429,10 @@ def _check_airspeed(log: ColumnLog, grid: Floats) -> None:
 
 
 def _read_mean_winds(log: ColumnLog, grid: Floats) -> Iterator[tuple[str, complex]]:
-    """Yield each logged mean wind with the name of a quantity that states it.
+    """Yield the mean of each logged wind, with the name of a quantity that states it.
 
-    The wind is a complex number, north + i east, m/s.
+    A log may state the wind by components, by speed and direction, or twice by both.  The wind is a complex number,
+    north + i east, m/s.
     """
     if log.has("wind_north", "wind_east"):
         north, east = (float(np.mean(_average_on_grid(log.series(f"wind_{axis}"), grid))) for axis in ("north", "east"))

@@ -179,7 +179,7 @@ class ColumnLog:
         return Series(time, factor * angles[angle]() + offset)
 
     def raw_values(self, quantity: str) -> tuple[Floats, Column]:
-        """Return the times and the unconverted values of a quantity, such as the names or numbers of modes."""
+        """Return the times, s, and the unconverted values of a quantity, such as the names of modes."""
         entry = self.table.columns[quantity][0]
         clock = self._get_clock(entry.clock)
         return self._align_times(entry.clock), self._find_column_on_clock(
@@ -189,7 +189,8 @@ class ColumnLog:
     def parameters(self) -> dict[str, float]:
         """Return the autopilot's parameters by name, from the parameter columns and from [parameters].
 
-        A value in [parameters] takes precedence.  Raises LogError if the columns of names and values differ in length.
+        A value in [parameters] takes precedence.  Column values that are not finite are left out.  Raises LogError if
+        the columns of names and values differ in length.
         """
         if self.table.parameter_columns is None:
             return dict(self.table.parameters)
@@ -301,7 +302,10 @@ class ColumnLog:
         return MAIN_CLOCK if MAIN_CLOCK in self.table.clocks else next(iter(self.table.clocks))
 
     def _align_times(self, name: str) -> Floats:
-        """Return the times of a clock, converted to the main clock, s."""
+        """Return the times of a clock, converted to the main clock, s.
+
+        Raises LogError for a clock without `align` that has no time in common with the main clock.
+        """
         time, main = self._get_unaligned_times(name), self._get_unaligned_times(self._main_clock)
         if self.table.clocks[name].align is None and (time[0] > main[-1] or time[-1] < main[0]):
             spans = f"{time[0]:.6g} to {time[-1]:.6g} s, {self._main_clock} from {main[0]:.6g} to {main[-1]:.6g} s"
@@ -394,7 +398,9 @@ class ColumnLog:
     def _read_entry(self, quantity: str, entry: ColumnTable) -> Series:
         """Return the series of one entry in SI units, radians and the default frame.
 
-        Only the time span that the table names is read.  Rows that do not meet the entry's condition are NaN.
+        Only rows in the time span that the table states are returned.  Rows that do not meet the entry's condition are
+        NaN.  An entry with a rate has only the rows in which its value changes, and a constant all rows of the main
+        clock.  Raises LogError for implausible values, and for values that change more often than the stated rate.
         """
         if entry.value is not None:
             time = self._align_times(self._main_clock)

@@ -26,7 +26,7 @@ _INERTIAL = (
     *("acceleration_forward", "acceleration_right", "acceleration_down"),
     *("roll_rate", "pitch_rate", "yaw_rate"),
 )
-# Commands that an identification needs, each with the pairs of halves that make it up.
+# Commands that an identification needs, each with the pairs of surfaces from which it can be computed.
 _COMMANDS = {
     "elevator": (("elevon_left", "elevon_right"), ("elevator_left", "elevator_right")),
     "aileron": (("elevon_left", "elevon_right"), ("aileron_left", "aileron_right")),
@@ -114,8 +114,8 @@ def _read_attitude(log: ColumnLog) -> Samples:
 def read_velocity(log: ColumnLog) -> Samples:
     """Return the ground velocity to north, east and down, m/s, (n, 3).
 
-    The velocity comes from components, or from ground speed and course.  If the vertical velocity is not logged, it is
-    computed from the altitude.  There are no rows if the table lacks both.
+    The horizontal velocity comes from its components, or else from ground speed and course; the vertical velocity from
+    the log, or else from the altitude.  There are no rows if the table lacks the columns for one of them.
     """
     if log.has("velocity_north", "velocity_east"):
         parts = [log.series("velocity_north"), log.series("velocity_east")]
@@ -210,9 +210,9 @@ def _find_airspeed_ratio(ratio: Samples, height: Samples, time: Floats) -> Float
 
 
 def _read_controls(log: ColumnLog) -> tuple[Samples, tuple[bool, bool, bool], bool]:
-    """Return the controls, three flags for controls that are angles, and True if the aircraft has elevons.
+    """Return the controls, flags for the controls that are angles, and True if the aircraft has elevons.
 
-    The controls and the flags are defined at `MotionLog.controls` and `MotionLog.angles`.  Left and right halves become
+    They become `controls`, `angles` and `elevons` of `MotionLog`, where they are defined.  Left and right halves become
     one surface: the elevator is their mean, the aileron half their difference.  There are no rows if elevator, aileron
     or throttle is missing.  A missing rudder is 0.
     """

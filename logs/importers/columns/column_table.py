@@ -21,7 +21,7 @@ class _Table(BaseModel):
 
 
 class AlignTable(_Table):
-    """[clocks.NAME.align]: a pair of signals whose correlation gives the offset of the clock from the main clock.
+    """[clocks.NAME.align]: two signals whose correlation gives the clock's offset from the main clock.
 
     column: a column with this clock.
     with: the quantity that varies with the column, on the main clock, or a column with the main clock.
@@ -34,7 +34,7 @@ class AlignTable(_Table):
 
 
 class ClockTable(_Table):
-    """[clocks.NAME]: column of times; without a column, the times follow from the row numbers and ``rate``, Hz."""
+    """[clocks.NAME]: column of times, or ``rate``, Hz, from which the times of the rows follow."""
 
     file: str | None = None
     column: str | None = None
@@ -45,7 +45,7 @@ class ClockTable(_Table):
 
 
 class ConditionTable(_Table):
-    """Condition ``when`` of a column: only the rows in which another column with the same clock has this value."""
+    """Condition ``when`` of a column: only rows in which another column of its clock has this value."""
 
     column: str
     value: float | str

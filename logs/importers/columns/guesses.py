@@ -150,13 +150,17 @@ _HEAD = (
     "# of a surface, or the datum of an altitude.",
     "",
 )
+# Unit at the end of a column's name: "speed [m/s]", "speed (m/s)" or "speed_mps".
 _UNIT_SUFFIX = re.compile(r"(?:\s*[\[(]\s*([^\])]*)\s*[\])]|_([a-zA-Z%]+[0-9]?))\s*$")
 
 
 @dataclass(frozen=True, slots=True)
 class _Clock:
-    """Column of times for a group of columns: those of one file with the same prefix and length.
+    """Column of times for a group of columns: the columns of one file with the same prefix and length.
 
+    file: name of the file in the table.
+    prefix: text before the last dot in the names of the columns, such as a message name.
+    column: name of the column of times.
     unit: unit of the times.
     length: number of rows.
     span: first and last time, s.
@@ -184,7 +188,11 @@ class _Clock:
 
 @dataclass(frozen=True, slots=True)
 class _Guess:
-    """Guessed entry of the table.  reason: remark for the person who checks the entry."""
+    """Guess that a column holds a quantity, for an entry of the table.
+
+    clock: column of times of the guessed column.
+    reason: text that follows "guess" in the remark for the person who checks the entry; may be "".
+    """
 
     quantity: str
     column: str
@@ -284,7 +292,13 @@ def _find_time_unit(values: Column, stated_unit: str) -> str:
 
 
 def _guess_entries(quantity: str, clocks: Sequence[_Clock], files: dict[str, DataFile]) -> Iterator[_Guess]:
-    """Yield a guessed entry for each column that can hold a quantity, in the order of `NAMES`."""
+    """Yield a guess for each column whose name means a quantity and whose values are plausible.
+
+    The order is that of the quantity's names in `NAMES`.
+
+    clocks: clocks whose columns are examined.
+    files: data files by their names in the table.
+    """
     for name in NAMES[quantity]:
         for clock in clocks:
             data = files[clock.file]
@@ -302,9 +316,10 @@ def _guess_entries(quantity: str, clocks: Sequence[_Clock], files: dict[str, Dat
 
 
 def _guess_entry(quantity: str, column: str, clock: _Clock, values: Column, stated_unit: str) -> _Guess | None:
-    """Return a column as the guessed entry of a quantity, with its unit and frame.
+    """Guess in which unit and frame a column holds a quantity.
 
-    Return None if the column is not numeric, if it is constant, or if it is implausible in every unit.
+    Return None if the column is not numeric, if it is constant, or if it is implausible in every unit.  A column for
+    `mode` may have any values.
 
     stated_unit: unit from the column's name or the file, or "".
     """
@@ -411,7 +426,7 @@ def _format_missing_lines(guesses: Sequence[_Guess]) -> Iterator[str]:
 
 
 def _format_unused_lines(guesses: Sequence[_Guess], files: dict[str, DataFile]) -> Iterator[str]:
-    """Yield a comment line for each file with columns that no guess uses."""
+    """Yield a comment line for each file that has unused columns next to columns that a guess uses."""
     used = {(guess.clock.file, guess.column) for guess in guesses} | {
         (guess.clock.file, guess.clock.column) for guess in guesses
     }

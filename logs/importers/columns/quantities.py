@@ -42,9 +42,13 @@ class Quantity(NamedTuple):
     frames: tuple[str, ...] = ()
 
 
+# Body axes: forward, right, down; or forward, left, up.
 _BODY = ("FRD", "FLU")
+# Axes of the world: north, east, down; or east, north, up.
 _WORLD = ("NED", "ENU")
+# Direction to which, or from which, the wind blows.
 _WIND = ("to", "from")
+# Largest plausible course, rad: two turns.
 _TURN = math.pi * 4.02
 QUANTITIES: dict[str, Quantity] = {
     "latitude": Quantity("angle", "geographic latitude", -1.5708, 1.5708),
@@ -115,7 +119,7 @@ QUANTITIES: dict[str, Quantity] = {
 # Angles of the attitude, and the parts of the quaternion that can take their place.
 ANGLES = ("roll", "pitch", "yaw")
 QUATERNION = ("quaternion_w", "quaternion_x", "quaternion_y", "quaternion_z")
-# Quantities whose sign changes from the second frame to the first.
+# Quantities that change their sign when they are converted from this frame to their default frame.
 _NEGATED_BY_FRAME = {
     **dict.fromkeys(("pitch_rate", "yaw_rate", "acceleration_right", "acceleration_down"), "FLU"),
     **dict.fromkeys(("velocity_down", "pitch"), "ENU"),

@@ -88,9 +88,9 @@ def parquet_bytes(log: FlightLog) -> bytes:
 
 
 def battery_voltage(log: FlightLog) -> float:
-    """Return the battery's constant voltage, V: the aircraft's, or the mean by logged energy and current.
+    """Return the voltage of the aircraft's battery, which is constant in the model, V.
 
-    Returns NaN for an aircraft without a battery.
+    If the aircraft does not state it, it is the mean that follows from logged energy and current; NaN without current.
 
     >>> from logs.recording.example_log import example_log
     >>> round(battery_voltage(example_log()), 3)  # 5 A and 180 W

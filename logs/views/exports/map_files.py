@@ -164,8 +164,7 @@ def _make_line(setup: FlightSetup, name: str, positions: ArrayLike, folder: str,
 def glide_shapes(setup: FlightSetup, drawn_returns: DrawnReturns) -> list[MapZone]:
     """Return the areas of the glide footprint; [] if none was computed.
 
-    They are areas, one for each range of the lowest height above ground from which a chosen place can be reached, and
-    flat ground.
+    There is an area for each height above ground from which a chosen place can be reached, and one of flat ground.
     """
     footprint = drawn_returns.glides.footprint
     if footprint is None:
@@ -277,7 +276,11 @@ def _add_style(mark: ElementTree.Element, role: str) -> None:
 
 
 def _add_ring(polygon: ElementTree.Element, kind: str, ring: Floats, zone: MapZone) -> None:
-    """Add one closed outline to a polygon."""
+    """Add one closed outline to a polygon, at the height of the zone's ceiling.
+
+    kind: name of the outline's element, "outerBoundaryIs" or "innerBoundaryIs".
+    ring: latitude and longitude of its corners, deg, (k, 2).
+    """
     line = _add_element(_add_element(polygon, kind), "LinearRing")
     up = 0.0 if zone.height is None else zone.height
     _add_element(line, "coordinates", " ".join(f"{lon:.8f},{lat:.8f},{up:.3f}" for lat, lon in ring))

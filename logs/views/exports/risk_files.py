@@ -59,7 +59,10 @@ def risk_geojson(setup: FlightSetup, volumes: Sequence[RiskVolume], properties: 
 
 
 def _to_degrees(setup: FlightSetup, ring: Floats) -> Floats:
-    """Convert an outline (n, 2) in m to longitude and latitude, deg, (n, 2)."""
+    """Convert an outline (n, 2) in m to longitude and latitude, deg, (n, 2).
+
+    Longitudes near the origin continue beyond 180 degrees.
+    """
     origin = setup.scenario.origin
     lat, lon = to_geo(origin, ring[:, 0], ring[:, 1])
     return np.column_stack([longitude_near(lon, origin.lon_deg), lat])

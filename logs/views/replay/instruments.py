@@ -42,7 +42,13 @@ _NARROW = _Size(MIN_WIDTH, 11, 21)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Instruments:
-    """A log prepared for frames, with its timeline and the ground under each row, (t,) m, NaN if unknown."""
+    """Instruments of a recorded flight as frames of text, with its timeline and the ground below.
+
+    log: log with legs computed from its track.
+    entries: timeline of the flight.
+    ground: altitude of the ground under each row, m AMSL, (t,); NaN if unknown.
+    limits: name and limit of each control.
+    """
 
     log: FlightLog
     entries: tuple[TimelineEntry, ...]

@@ -164,7 +164,7 @@ def _list_leg_entries(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEnt
 def _list_turn_entries(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:
     """List an entry for each change to the next leg: the turn of the route, and the peak bank.
 
-    The peak bank is the largest bank between the middles of the two legs.
+    The peak bank is the largest bank between the middles of the two legs.  Corners within a loiter have no entries.
     """
     route, track = log.setup.route, log.track
     turns = signed_turns(route.positions)
@@ -226,7 +226,10 @@ def _list_threat_entries(log: FlightLog) -> list[TimelineEntry]:
 
 
 def _list_stay_entries(name: str, unit: str, radius: float, stay: Passage) -> list[TimelineEntry]:
-    """List entry and exit of one stay in a sphere, with its duration and the closest distance."""
+    """List the start and the end of one stay in a sphere, with its duration and the closest distance.
+
+    If the track ends inside the sphere, the second entry says so.
+    """
     entry = TimelineEntry(stay.start, "threat", f"inside the {unit} range of {name} ({radius:.0f} m)")
     stay_text = f"{stay.end - stay.start:.1f} s inside, closest {stay.closest:.0f} m"
     if not stay.whole:

@@ -221,7 +221,8 @@ _BLOCK_POINTS = 32
 def measure_nearest_distances(points: Floats, track: Floats) -> Floats:
     """Return the distance (n,) from each point of one track to the nearest point of another track.
 
-    Bounding boxes of successive points, which lie near each other, exclude points that cannot be the nearest.
+    To be fast, both tracks are divided into blocks of successive points.  For a block of ``points``, only those blocks
+    of ``track`` are searched whose bounding box is near enough to contain a nearest point.
 
     points, track: (n, 3) and (m, 3).
 

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
 # Pictures.
 
-# A larger picture is embedded as a JPEG, bytes.
+# Size of a PNG above which the picture is embedded as a JPEG, bytes.
 _LARGE_PICTURE_BYTES = 200_000
 
 

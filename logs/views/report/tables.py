@@ -87,9 +87,9 @@ def leg_rows(setup: FlightSetup, track: Track | None, failing: frozenset[int]) -
 
 
 def ground_clearance(setup: FlightSetup, track: Track) -> Floats | None:
-    """Return the lowest height above ground from each row to the next, m, (t,), as the clearance rule measures it.
+    """Return the lowest height above ground from each row to the next, m, (t,).
 
-    Return None without terrain.  The last row has its own height.
+    The heights are measured as by the clearance rule.  The last row has its own height.  Return None without terrain.
     """
     terrain = setup.scenario.terrain
     if terrain is None:

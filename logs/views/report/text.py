@@ -169,7 +169,10 @@ def missed_text(finding: Finding) -> str:
 
 
 def rule_row(rule: RuleFindings) -> RuleRow:
-    """Return the row of one rule: the numbers of its findings, and the values of a representative one."""
+    """Return the row of one rule: numbers of its findings, and values of the representative finding.
+
+    Without a representative finding there are no values.  A rule that was not judged states the reason as its place.
+    """
     head = (rule.state, _describe_state(rule.state), rule.words.word, rule.tally_text)
     if rule.shown is None:
         return RuleRow(*head, "" if rule.judged else rule.findings[0].reason)
@@ -243,7 +246,9 @@ def describe_model_trust(reflight: Reflight) -> str:
 def list_not_reflown(reflights: Sequence[Reflight], stretches: Sequence[MissionStretch], max_count: int) -> list[str]:
     """List the stretches of an imported flight that were not simulated, with the reasons.
 
-    stretches: stretches of the imported flight.  max_count: largest number of stretches to fly again.
+    reflights: simulated flights, each with its stretch.
+    stretches: all stretches of the imported flight, which are the periods in which it followed its mission.
+    max_count: largest number of stretches that are simulated.
 
     >>> list_not_reflown((), (MissionStretch(50.0, 60.0, "AUTO", "log"),), 9)
     ['Not flown again: AUTO from 50.0 s to 60.0 s: it did not pass two waypoints in order']

@@ -105,7 +105,7 @@ class _Probit:
         return np.exp(-0.5 * x * x) / np.sqrt(2.0 * np.pi)
 
     def information(self, x: Floats, width: float = 0.0) -> Floats:
-        """Return the Fisher information about x of a flight that gives its margin if it passes within `width`."""
+        """Return the Fisher information of a flight about its predictor x, as `BinaryLink.information`."""
         from scipy.special import ndtr
 
         upper_predictor = x + width
@@ -161,7 +161,7 @@ class _ComplementaryLogLog:
         return np.exp(x - np.exp(np.minimum(x, _MAX_EXPONENT)))
 
     def information(self, x: Floats, width: float = 0.0) -> Floats:
-        """Return the Fisher information about x of a flight that gives its margin if it passes within `width`."""
+        """Return the Fisher information of a flight about its predictor x, as `BinaryLink.information`."""
         rate, upper_rate = (
             np.exp(np.clip(predictor, -_MAX_EXPONENT, 0.5 * _MAX_EXPONENT)) for predictor in (x, x + width)
         )
@@ -320,7 +320,7 @@ class Outcomes:
     def margins_given_pass(self) -> "Outcomes":
         """Return the outcomes of the passed flights with a known margin, conditional on having passed.
 
-        The margin of an outcome is NaN if unknown, and positive if the flight passed.
+        All other flights have a margin of 0, and are left out.
         """
         has_margin = self.margin > 0.0
         return Outcomes(self.terms[has_margin], self.failed[has_margin], self.margin[has_margin], given_passed=True)
@@ -379,9 +379,10 @@ def fit_regression(outcomes: Outcomes, link: BinaryLink, nearby_fit: RegressionF
 
 
 class _Posterior:
-    """Posterior of the coefficients of a regression, with the logarithm of the wind's coefficient.
+    """Posterior density of the coefficients of a regression, which is evaluated at points.
 
-    If any margin is known, the margin's coefficient is the last one.
+    A point (k,) holds the constant, the logarithm of the wind's coefficient, the coefficients of the draws, and, if any
+    margin is known, the margin's coefficient.
 
     draw_deviation: standard deviation of the prior of the draws' coefficients.
     """
@@ -417,7 +418,11 @@ class _Posterior:
         return beta
 
     def log_density(self, points: Floats) -> Floats:
-        """Return the logarithm of the posterior density at points (n, k), up to a constant, (n,)."""
+        """Return the logarithm of the posterior density at points (n, k), up to a constant, (n,).
+
+        It is the sum of the logarithms of the prior and of the probability of each outcome. It is -inf where a flight
+        that passed has a practically impossible predictor, or where the margin's coefficient is not positive.
+        """
         beta = self.coefficients(points)
         deviations = points - self._prior_mean
         has_failed = self._outcomes.failed

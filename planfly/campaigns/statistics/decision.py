@@ -160,7 +160,11 @@ class StoppingBound:
 
     @cached_property
     def parts(self) -> tuple[tuple[float, float, float], ...]:
-        """Weight, a and b of each part of the mixture."""
+        """Weight, a and b of each part of the mixture.
+
+        The a of the first part is `min_flights`.  Its b is found by bisection: the largest value with which
+        `min_flights` flights without a failure still reach the target.
+        """
         scale, min_failures, max_failures = float(self.min_flights), 0.0, 1.0
         for _ in range(_BISECTIONS):
             failures = 0.5 * (min_failures + max_failures)
@@ -188,6 +192,8 @@ class StoppingBound:
 
         E(p) is the ratio of the mixture's likelihood to the likelihood of p.  p is excluded if the logarithm is at
         least ``-log(1 - confidence)``.
+
+        successes, failures: numbers of flights.
         """
         likelihood = _times_log(successes, p) + _times_log(failures, 1.0 - p)
         return _log_mixture(self.parts, successes, failures) - likelihood
@@ -196,13 +202,17 @@ class StoppingBound:
         """Return True if the success probability is proven to be above p, or below p if `above` is False.
 
         p: tested success probability, 0 to 1.
+        successes, failures: numbers of flights.
         """
         fraction = successes / max(1, successes + failures)
         is_beyond = fraction > p if above else fraction < p
         return is_beyond and self.evidence(successes, failures, p) >= self._required_evidence
 
     def interval(self, successes: int, failures: int) -> Interval:
-        """Return the interval of all p that are not excluded; it contains the fraction of successes."""
+        """Return the interval of the probabilities p that the flights do not exclude.
+
+        It contains the fraction of successes.
+        """
         trials = successes + failures
         if not trials:
             return Interval(0.0, 1.0)
@@ -212,9 +222,10 @@ class StoppingBound:
         return Interval(lower, upper)
 
     def _find_edge(self, successes: int, failures: int, excluded: float, included: float) -> float:
-        """Find the edge of the values of p that are not excluded, by bisection.
+        """Find by bisection the edge between the excluded and the other probabilities p.
 
         excluded, included: an excluded value, and a value that is not excluded.
+        successes, failures: numbers of flights.
         """
         for _ in range(_BISECTIONS):
             candidate = 0.5 * (excluded + included)
@@ -245,6 +256,7 @@ def _log_mixture(parts: tuple[tuple[float, float, float], ...], successes: int, 
     """Return the log-likelihood of outcomes under a mixture of beta distributions.
 
     parts: weight, a and b of each distribution.
+    successes, failures: numbers of flights.
     """
     from scipy.special import betaln
 
@@ -326,7 +338,7 @@ class Estimator:
         return is_reached or bound.excludes(tally.flyable + tally.unknown, tally.failed, target, above=False)
 
     def deciding_flights(self, tally: Tally) -> int | None:
-        """Return the number of flights that would decide the target if the fractions of all outcomes stay the same.
+        """Return the number of flights that would decide the target with the present fractions of outcomes.
 
         Return None for more than `MAX_DECIDING_FLIGHTS`.
         tally: at least one flight, with which the target is undecided.
@@ -355,7 +367,10 @@ class Estimator:
         return enough
 
     def estimate(self, tally: Tally) -> Estimate:
-        """Estimate the probability from a tally."""
+        """Estimate the probability from a tally, and answer whether it reaches the target.
+
+        The bounds come from the stopping bound if the goal stops the campaign, otherwise from the number of flights.
+        """
         confidence = self._goal.confidence
         if self._bound is not None:
             interval = self._bound.bounds(tally)

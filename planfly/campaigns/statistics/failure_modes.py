@@ -67,7 +67,12 @@ class FailureWindDistributions:
         return cls(np.concatenate((mean, location)), np.concatenate((deviation, scale)), mean.size)
 
     def log_probabilities(self, speed: float) -> tuple[Floats, Floats]:
-        """Return the logarithms of the probabilities of failure and success in a wind (m/s), two arrays (n,)."""
+        """Return log-probabilities that a flight fails, and that it succeeds, in a wind; two arrays (n,).
+
+        There is one value for each distribution.
+
+        speed: wind speed, m/s.
+        """
         from scipy.special import log_ndtr
         from scipy.stats import gumbel_l
 
@@ -77,7 +82,7 @@ class FailureWindDistributions:
         return log_failure, np.concatenate((log_ndtr(-normal), gumbel_l.logsf(gumbel)))
 
     def quantile(self, fraction: float) -> Floats:
-        """Return the wind in which a fraction of flights fails, m/s, for each distribution, (n,)."""
+        """Return for each distribution the wind in which a fraction of the flights fails, m/s, (n,)."""
         from scipy.special import ndtri
         from scipy.stats import gumbel_l
 
@@ -88,7 +93,7 @@ class FailureWindDistributions:
     def posterior_quantiles(
         self, fraction: float, speeds: Floats, flyable: NDArray[np.bool_], probabilities: Floats
     ) -> Floats:
-        """Return posterior quantiles of the wind in which a fraction of flights fails, m/s, (k,).
+        """Return quantiles of the unknown wind in which a fraction of the flights fails, m/s, (k,).
 
         speeds: wind of each flight, m/s, (m,).
         flyable: True for a flyable flight, (m,).
@@ -262,6 +267,8 @@ def boundary_speed(modes: Sequence[FailureMode], draws: Floats, failing_fraction
 
     draws: the drawn quantities, (m, d).
     failing_fraction: the fraction of the draws, 0 to 1.
+    modes: fitted failure modes for one link; a flight succeeds if it fails in none of them.
+    max_speed: strongest wind of the search, m/s.
     """
     mode_predictors = [
         (mode.link, make_regressors(WIND_ORIGIN_MPS, draws) @ mode.mean, float(mode.mean[1])) for mode in modes
@@ -298,7 +305,12 @@ class FailureFraction:
 
 
 def failure_fraction(modes: Sequence[FailureMode], draws: Floats, speed: float) -> FailureFraction:
-    """Return the fraction of draws (m, d) that is expected to fail in a wind (m/s), and its derivatives."""
+    """Return the expected fraction of failing flights in a wind, and its derivatives.
+
+    draws: drawn quantities, (m, d).
+    speed: wind speed, m/s.
+    modes: fitted failure modes for one link.
+    """
     terms = make_regressors(speed, draws)
     predictors = [terms @ mode.mean for mode in modes]
     success = [mode.link.survival(predictor) for mode, predictor in zip(modes, predictors, strict=True)]

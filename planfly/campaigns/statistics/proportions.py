@@ -23,7 +23,7 @@ class ProportionDifference(NamedTuple):
 
 
 def paired_difference(only_first: int, only_second: int, pairs: int, confidence: float = 0.95) -> ProportionDifference:
-    """Return the success probability of the second of two paired trials minus that of the first trial.
+    """Return the difference of two success probabilities, second minus first, from paired trials.
 
     The interval is Tango's score interval (Statistics in Medicine 17, 1998).  The p-value is from McNemar's exact test.
 
@@ -60,13 +60,15 @@ def paired_difference(only_first: int, only_second: int, pairs: int, confidence:
 
 
 def _score_deviation(only_first: int, only_second: int, pairs: int, difference: float) -> float:
-    """Return the standard deviation of the difference of the counts, for a true difference of the proportions.
+    """Return the standard deviation of `only_second` - `only_first`, if the true difference is given.
 
     only_first, only_second: number of pairs in which only the first trial, or only the second, succeeds.
     pairs: number of all pairs.
 
     The probability that only the first trial succeeds is estimated by maximum likelihood for this difference: it is the
     larger root of Tango's quadratic equation.
+
+    difference: true difference of the success probabilities, second minus first.
     """
     a = 2.0 * pairs
     b = -only_second - only_first + (2.0 * pairs - only_second + only_first) * difference

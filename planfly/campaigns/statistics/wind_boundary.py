@@ -59,7 +59,11 @@ def boundary_quantiles(
 ) -> list[float]:
     """Return quantiles of the boundary's posterior, m/s, from 0 to ``max_speed``.
 
-    draws: possible draws, (m, d), spread evenly even if only the first few are used.
+    Each posterior sample of the coefficients has one boundary.  The quantiles are those of these boundaries, each with
+    the weight of its link.
+
+    fits: failure modes fitted with each link, and the link's weight.
+    draws: possible draws, (m, d); the first few of them are spread as evenly as all.
     failing_fraction: fraction of flights that fail at the boundary, above 0 and below 1.
     probabilities: probability of each quantile, 0 to 1.
 
@@ -86,7 +90,12 @@ def boundary_quantiles(
 def _boundary_speeds(modes: Sequence[FailureMode], draws: Floats, failing_fraction: float, max_speed: float) -> Floats:
     """Return the boundary for each posterior sample of the modes' coefficients, m/s, (n,).
 
-    draws: possible draws, (m, d); the boundary is first bracketed with only some of them.
+    Bisection with the first `_BRACKET_DRAWS` draws brackets each boundary; secant steps with all draws then refine it.
+
+    draws: possible draws, (m, d).
+    modes: fitted failure modes for one link.
+    failing_fraction: fraction of the flights that fail at the boundary, 0 to 1.
+    max_speed: strongest wind of the search, m/s.
     """
     # The posteriors of the modes are independent: samples of different modes can be combined in any order.
     samples = [
@@ -328,7 +337,7 @@ _LARGEST_WIND_TOLERANCE_MPS = 0.3
 
 
 def next_flights(direction: Direction, count: int) -> list[tuple[float, int]]:
-    """Return the wind, m/s, and the index of the draw of the next `count` flights of a direction.
+    """Choose the next `count` flights of a direction: wind, m/s, and index of the draw of each.
 
     As long as all flights have the same outcome, the wind is chosen by bisection.  After that, the flights are chosen
     that are expected to reduce the variance of the boundary most.
@@ -373,7 +382,7 @@ def _next_draws(direction: Direction, count: int, other_draws: list[int]) -> lis
 
 
 def _choose_most_informative(direction: Direction, count: int) -> list[tuple[float, int]]:
-    """Return the wind, m/s, and the index of the draw of the `count` most informative flights of a direction.
+    """Choose the `count` most informative flights of a direction: wind, m/s, and index of the draw.
 
     Each flight is chosen as if the previous ones had been flown.
     """
@@ -409,7 +418,7 @@ def _choose_most_informative(direction: Direction, count: int) -> list[tuple[flo
 
 
 def _expected_between_fit_reductions(fits: tuple[FailureFit, ...], terms: Floats) -> Floats:
-    """Return each flight's expected reduction of the boundary's variance between the fits, (m/s)^2, (n,).
+    """Return the variance between the fits that each flight is expected to remove, (m/s)^2, (n,).
 
     The fits are alternative models, and the outcome of a flight makes one of them more likely.  The reduction is the
     variance, over the two outcomes of a flight, of the mean boundary given the outcome.
@@ -433,9 +442,9 @@ class _ExpectedPosterior:
         self._covariances = [mode.covariance for mode in fit.modes]
 
     def expected_gains(self, terms: Floats) -> Floats:
-        """Return each flight's expected reduction of the boundary's variance, (m/s)^2, (n,).
+        """Return the variance of the boundary that each flight is expected to remove, (m/s)^2, (n,).
 
-        Only the variance within the fit is considered.
+        Only the variance within the fit is considered; the reduction is multiplied by the weight of the fit.
 
         terms: regressors of each flight, (n, 2 + d).
         """
@@ -462,6 +471,8 @@ class _ExpectedPosterior:
         """Yield for each mode the Fisher information of flights, (n,).
 
         A failure in an earlier mode leaves no information on a later mode.
+
+        terms: regressors of each flight, (n, 2 + d).
         """
         reach_probability: Floats = np.ones(len(terms))
         for mode in self._fit.modes:
