@@ -526,8 +526,14 @@ def with_file_autopilot(scenario: Scenario, mission: Mission | None = None) -> S
     mission_autopilot = "" if mission is None else mission.autopilot
     is_named_by_user = table.autopilot is not None and table.autopilot_from is None
     if not is_named_by_user and table.params is not None and table.autopilot is None:
-        scenario = _with_autopilot_from_parameters(scenario, table.params)
-        table = scenario.flight
+        origin = read_origin(Path(table.params))
+        if origin.mixed:
+            remedy = "--autopilot names the autopilot that is to fly"
+            message = f"{table.params}: {origin.evidence}: {remedy}"
+            raise ParameterError(message, file=table.params, field="autopilot", value=origin.evidence, allowed=remedy)
+        if origin.autopilot:
+            scenario = _with_autopilot(scenario, origin.autopilot, table.params)
+            table = scenario.flight
     if mission is None or not mission_autopilot:
         return scenario
     if table.autopilot is None:
@@ -551,21 +557,6 @@ def with_file_autopilot(scenario: Scenario, mission: Mission | None = None) -> S
 
 # Text by which a .plan file states its autopilot.
 _FIRMWARE_TEXTS = {ARDUPILOT: "firmwareType 3", PX4: "firmwareType 12"}
-
-
-def _with_autopilot_from_parameters(scenario: Scenario, params_path: str) -> Scenario:
-    """Return the scenario with the autopilot of its parameter file.
-
-    The scenario is unchanged if the file does not identify an autopilot.
-
-    Raises ParameterError for a file with parameters of both autopilots.
-    """
-    origin = read_origin(Path(params_path))
-    if origin.mixed:
-        remedy = "--autopilot names the autopilot that is to fly"
-        message = f"{params_path}: {origin.evidence}: {remedy}"
-        raise ParameterError(message, file=params_path, field="autopilot", value=origin.evidence, allowed=remedy)
-    return _with_autopilot(scenario, origin.autopilot, params_path) if origin.autopilot else scenario
 
 
 def _with_autopilot(scenario: Scenario, autopilot: str, file: str) -> Scenario:

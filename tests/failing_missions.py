@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from flight.mission.items import Command, Frame, Home, Mission, MissionItem, round_to_grid
-from flight.mission_files.wpl import waypoints_text
+from flight.mission_files.formats import waypoints_text
 from world.arrays import Floats
 from world.frames import to_geo
 from world.scenario import load_scenario

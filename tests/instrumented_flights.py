@@ -21,7 +21,7 @@ from scipy.signal import savgol_filter
 import planfly
 from aircraft.catalog import Aircraft, load_aircraft, read_aircraft
 from flight.dynamics.envelope_tables import load_envelope
-from flight.mission_files.wpl import waypoints_text
+from flight.mission_files.formats import waypoints_text
 from flight.simulation.track import Track
 from logs.importers.motion import MotionLog, Samples
 from planfly.identification.manoeuvres import make_identification_mission

@@ -15,7 +15,7 @@ import numpy as np
 import planfly
 from aircraft.catalog import Aircraft, read_aircraft
 from flight.dynamics.envelope_tables import load_envelope
-from flight.mission_files.wpl import waypoints_text
+from flight.mission_files.formats import waypoints_text
 from flight.simulation.track import Track
 from logs.importers.motion import MotionLog
 from planfly.identification.manoeuvres import make_identification_mission

@@ -31,7 +31,7 @@ LONGEST = 60
 # statement more: to be split, and not to grow.
 LONGER = {
     "flight/autopilots/arduplane/go_around_point_mass.py:fly_go_arounds": 76,
-    "flight/autopilots/arduplane/rtl_point_mass.py:fly_returns": 77,
+    "flight/autopilots/arduplane/rtl_point_mass.py:fly_returns": 72,
     "flight/autopilots/arduplane/rtl_point_mass.py:fly_stages": 78,
     "flight/autopilots/px4/lateral.py:guide_to_path": 66,
     "flight/guidance/path.py:fly_by_path": 74,

@@ -13,20 +13,31 @@ _callbacks: list[BeforeCompiling] = []
 
 
 @contextmanager
-def notify_before_compiling(callback: BeforeCompiling) -> Iterator[None]:
+def notify_before_compiling(callback: BeforeCompiling, *, once: bool = False) -> Iterator[None]:
     """Call a function before each kernel that any thread compiles within this block.
 
     If blocks are nested, only the innermost function is called.
+
+    once: True to call the function only before the first kernel.
 
     >>> with notify_before_compiling(lambda: print("compiling")):
     ...     announce_compilation()
     compiling
     """
-    _callbacks.append(callback)
+    has_notified = False
+
+    def notify() -> None:
+        """Call the function, or do nothing if it is called only once."""
+        nonlocal has_notified
+        if not (once and has_notified):
+            has_notified = True
+            callback()
+
+    _callbacks.append(notify)
     try:
         yield
     finally:
-        _callbacks.remove(callback)
+        _callbacks.remove(notify)
 
 
 class CompileTimer:

@@ -34,9 +34,8 @@ from typing import Protocol
 from aircraft.catalog import Aircraft
 from flight.live.telemetry import AUTO, CRITICAL, GUIDED, LOITER, MODE_NAMES, Snapshot, SnapshotMaker, StatusText
 from flight.mission.items import Frame, Home, Mission
-from flight.simulation.local_map import LocalMap
 from flight.simulation.setup import FlightSetup
-from flight.simulation.simulate import TICK_S, Flight
+from flight.simulation.simulate import TICK_S, Flight, LocalMap
 from flight.simulation.track import Rows, Track, as_track, join_rows
 from world.arrays import Floats
 from world.errors import PlanflyError

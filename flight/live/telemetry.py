@@ -10,8 +10,8 @@ import numpy as np
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from flight.mission.items import Home
-from flight.simulation.local_map import LocalMap
 from flight.simulation.setup import FlightSetup
+from flight.simulation.simulate import LocalMap
 from flight.simulation.track import THROTTLE, TRACK_ROW
 from world.arrays import Floats
 from world.frames import GeoOrigin, to_geo

@@ -14,8 +14,9 @@ from flight.mission.items import Command, Mission, MissionItem
 from flight.mission.itinerary import LANDING_NOTE
 from flight.mission.placing import home_point
 from flight.mission.route import Route, part_of_route
-from world.airfield import LandingStrip, Launch
+from world.airfield import LandingStrip, Launch, strip_slopes
 from world.arrays import Floats
+from world.geometry import leg_courses
 from world.scenario import Scenario
 
 # Climb pitch of a take-off item without a pitch, rad: ArduPlane's pitch for a first parameter of 0.
@@ -270,3 +271,18 @@ def flown_notes(route: Route, ground_phases: GroundPhases) -> tuple[str, ...]:
     if ground_phases.approach is None:
         return route.notes
     return tuple(note for note in route.notes if LANDING_NOTE not in note)
+
+
+def landing_slopes(mission: Mission, route: Route, scenario: Scenario) -> tuple[float, float] | None:
+    """Return the ground slopes along and across the final landing leg, m per m; NaN if unknown.
+
+    Returns None if the mission does not end with a landing, or if the scenario defines a landing strip.
+    """
+    last_item = int(route.items[-1])
+    has_landing = any(item.seq == last_item and item.command == Command.NAV_LAND for item in mission.items)
+    if scenario.landing is not None or not has_landing:
+        return None
+    if scenario.terrain is None:
+        return math.nan, math.nan
+    east, north = route.positions[-1, :2].tolist()
+    return strip_slopes(scenario.terrain, LandingStrip(east, north), float(leg_courses(route.positions)[-1]))

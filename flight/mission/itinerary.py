@@ -552,7 +552,15 @@ class _ItineraryBuilder:
         self.has_ended = False
         self.landing: RoutePoint | None = None
         self.has_home = mission.home is not None
-        self.first_home = self.home = mission.home or _first_position(mission)
+        home = mission.home
+        if home is None:
+            # The position of the first item that has one, as a home of unknown altitude.
+            has_stop = (item for item in mission.items if item.command in PLACES | TAKEOFFS | LANDINGS)
+            first_item = next((item for item in has_stop if item.has_position), None)
+            if first_item is None:
+                raise _error_without_position(mission)
+            home = Home(first_item.lat_deg, first_item.lon_deg, math.nan)
+        self.first_home = self.home = home
 
     def process_step(self, step: _Step) -> None:
         """Run the commands before a navigation item as both autopilots do, then add the item's stops.
@@ -630,7 +638,11 @@ class _ItineraryBuilder:
         if item.command == Command.DO_CHANGE_SPEED:
             self._change_speed_as_px4(item)
         elif item.command == Command.CONDITION_GATE:
-            self._add_gate(item)
+            # PX4 passes a gate at once if it has no position or precedes the start.
+            if item.has_position and self.stops:
+                self.gates.append(Gate(item.seq, item.lat_deg, item.lon_deg, self.px4_airspeed))
+            else:
+                self.notes.px4.add(f"{command_name(item.command)}: passed at once", item.seq)
         else:
             if item.command in CAMERA_SWITCHES and self.gates:
                 self.gates[-1] = self.gates[-1]._replace(switches_camera=True)
@@ -701,16 +713,6 @@ class _ItineraryBuilder:
             min_ground_speed=self.min_ground_speed,
             home_up=self.home.alt,
         )
-
-    def _add_gate(self, item: MissionItem) -> None:
-        """Add a gate to the next leg.
-
-        PX4 passes a gate at once if it has no position or precedes the start.
-        """
-        if item.has_position and self.stops:
-            self.gates.append(Gate(item.seq, item.lat_deg, item.lon_deg, self.px4_airspeed))
-        else:
-            self.notes.px4.add(f"{command_name(item.command)}: passed at once", item.seq)
 
     def _add_take_off(self, item: MissionItem) -> None:
         """Add the stop of a take-off.
@@ -906,17 +908,6 @@ class _ItineraryBuilder:
         notes.add(f"DO_CHANGE_SPEED to {speed:g} m/s: returns to PX4's default airspeed", item.seq)
         if throttle > 0.0:
             notes.add("DO_CHANGE_SPEED's throttle: not flown", item.seq)
-
-
-def _first_position(mission: Mission) -> Home:
-    """Return the position of the first item that has one, as a home of unknown altitude (NaN).
-
-    Raises MissionError if no item has a position.
-    """
-    for item in mission.items:
-        if item.command in PLACES | TAKEOFFS | LANDINGS and item.has_position:
-            return Home(item.lat_deg, item.lon_deg, math.nan)
-    raise _error_without_position(mission)
 
 
 def _error_without_position(mission: Mission) -> MissionError:

@@ -721,7 +721,13 @@ def _insert_gates(placed_mission: PlacedMission, notes: Notes) -> list[RoutePoin
             if gate.switches_camera and _distance_to_line(start, end, gate_position) > _MAX_GATE_DISTANCE_M:
                 distance_text = f"passed at more than {_MAX_GATE_DISTANCE_M:g} m"
                 notes.add(f"{distance_text}: {GATES_ARE_NO_WAYPOINTS}", gate.item)
-            fraction = _gate_fraction(start, end, gate_position)
+            # PX4 passes a gate at the vertical plane through its position, perpendicular to the line to the leg's end.
+            gate_to_end = end[:2] - np.array([float(gate_position[0]), float(gate_position[1])])
+            length_along_normal = float((end[:2] - start[:2]) @ gate_to_end)
+            fraction = 0.0
+            if length_along_normal > 0.0:
+                # Backwards from the leg's end, whose distance from the plane is its distance from the gate.
+                fraction = 1.0 - float(gate_to_end @ gate_to_end) / length_along_normal
             east, north, up = (start + fraction * (end - start)).tolist()
             is_apart = (
                 min(math.dist((east, north), leg_end.map_position[:2]) for leg_end in (placed_stops[-1], next_stop))
@@ -741,19 +747,6 @@ def _distance_to_line(start: Floats, end: Floats, position: tuple[Any, Any]) -> 
     """Return the horizontal distance of a position (east, north, m) from the line through two points, m."""
     (east, north), (offset_east, offset_north) = (end - start)[:2], np.array(position, dtype=float) - start[:2]
     return abs(float(east * offset_north - north * offset_east)) / max(math.hypot(east, north), 1e-9)
-
-
-def _gate_fraction(start: Floats, end: Floats, gate: tuple[Any, Any]) -> float:
-    """Return the fraction of a leg at which the aircraft passes a gate, as PX4 decides it.
-
-    The gate is a vertical plane through the gate's position, perpendicular to the line from there to the leg's end.
-
-    gate: east and north, m.
-    """
-    gate_to_end = end[:2] - np.array([float(gate[0]), float(gate[1])])
-    length_along_normal = float((end[:2] - start[:2]) @ gate_to_end)
-    # Measured backwards from the leg's end, whose distance from the plane is its distance from the gate.
-    return 1.0 - float(gate_to_end @ gate_to_end) / length_along_normal if length_along_normal > 0.0 else 0.0
 
 
 def _read_stops(

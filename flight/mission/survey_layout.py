@@ -253,18 +253,13 @@ def _order_lines(lines: Sequence[_Line], layout: SurveyLayout) -> list[_Line]:
         for index in lateral[first :: layout.every]:
             line, is_forward = lines[index], len(ordered) % 2 == 0
             runs_forward = float((line.corners[-1] - line.corners[0]) @ direction) > 0.0
-            ordered.append(line if runs_forward == is_forward else _reverse_line(line))
+            if runs_forward != is_forward:
+                # The waypoints are reversed, but the commands between them keep their positions in the list.
+                points = reversed(line.point_items)
+                items = tuple(next(points) if _is_line_point(item, line.flown) else item for item in line.items)
+                line = _Line(line.corners[::-1], items, line.flown)
+            ordered.append(line)
     return ordered
-
-
-def _reverse_line(line: _Line) -> _Line:
-    """Return a line in the opposite direction.
-
-    Its waypoints are in reverse order. The commands between them keep their positions in the list.
-    """
-    reversed_items = reversed(line.point_items)
-    items = tuple(next(reversed_items) if _is_line_point(item, line.flown) else item for item in line.items)
-    return _Line(line.corners[::-1], items, line.flown)
 
 
 def _items_with_turn_arounds(line: _Line, turn_around: float, lead_in: float, origin: GeoOrigin) -> list[MissionItem]:

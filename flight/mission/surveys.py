@@ -164,9 +164,10 @@ class LineAxis:
         min_distance = np.full(len(points), np.inf)
         coordinates = np.zeros((3, len(points)))
         for index, (direction, length) in enumerate(zip(self._directions, self._lengths, strict=True)):
-            along, right = _track_components(
-                points[:, :2] - self.corners[index, :2], math.atan2(direction[0], direction[1])
-            )
+            offsets, course = points[:, :2] - self.corners[index, :2], math.atan2(direction[0], direction[1])
+            east, north = math.sin(course), math.cos(course)
+            along = offsets[:, 0] * east + offsets[:, 1] * north
+            right = offsets[:, 0] * north - offsets[:, 1] * east
             min_along = -math.inf if index == 0 else 0.0
             max_along = math.inf if index == len(self._lengths) - 1 else length
             distance = np.hypot(along - np.clip(along, min_along, max_along), right)
@@ -174,7 +175,7 @@ class LineAxis:
             min_distance[is_nearer] = distance[is_nearer]
             coordinates[0, is_nearer] = self.along[index] + along[is_nearer]
             coordinates[1, is_nearer] = right[is_nearer]
-            coordinates[2, is_nearer] = math.atan2(direction[0], direction[1])
+            coordinates[2, is_nearer] = course
         return coordinates[0], coordinates[1], coordinates[2]
 
     def points_at(self, along: Floats) -> Floats:
@@ -678,12 +679,3 @@ def _remove_lead(points: Floats, line: PhotoLine, lead_length: float) -> PhotoLi
     first = start_points[0] if start_points and line.first == line.begins else line.first
     last = end_points[-1] if end_points and line.last == line.ends else line.last
     return line._replace(first=first, last=last) if first < last else line
-
-
-def _track_components(offsets: Floats, course: float) -> tuple[Floats, Floats]:
-    """Return the along-track and cross-track components of offsets (n, 2), m, (n,) each.
-
-    The cross-track component is positive to the right.
-    """
-    east, north = math.sin(course), math.cos(course)
-    return offsets[:, 0] * east + offsets[:, 1] * north, offsets[:, 0] * north - offsets[:, 1] * east

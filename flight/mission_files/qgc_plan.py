@@ -403,21 +403,6 @@ def _check_vehicle(kind: int | None, source: str) -> None:
         raise MissionError.at(source, "mission.vehicleType", kind, allowed)
 
 
-def _autopilot_name(firmware: int | None, source: str) -> str:
-    """Return the name in scenarios of the autopilot that a firmwareType states; "" if the plan names none.
-
-    firmware: MAV_AUTOPILOT; None if missing.
-
-    Raises MissionError for an unknown firmwareType.
-    """
-    if firmware is None or firmware in _UNNAMED_FIRMWARES:
-        return ""
-    if firmware not in _FIRMWARES:
-        allowed = "not an autopilot that planfly simulates; expected 3 (ArduPilot), 12 (PX4) or 0 (not stated)"
-        raise MissionError.at(source, "mission.firmwareType", firmware, allowed)
-    return _FIRMWARES[firmware]
-
-
 def parse_plan_file(text: str, source: str) -> Mission:
     """Read the text of a `.plan` file; ``source`` names it in messages.
 
@@ -434,7 +419,12 @@ def parse_plan_file(text: str, source: str) -> Mission:
     except ValidationError as error:
         raise MissionError(**first_fault(error, data).at(source)) from error
     _check_vehicle(file.mission.vehicleType, source)
-    autopilot = _autopilot_name(file.mission.firmwareType, source)
+    # None or 0: the plan names no autopilot.
+    firmware = file.mission.firmwareType or 0
+    if firmware not in _UNNAMED_FIRMWARES and firmware not in _FIRMWARES:
+        allowed = "not an autopilot that planfly simulates; expected 3 (ArduPilot), 12 (PX4) or 0 (not stated)"
+        raise MissionError.at(source, "mission.firmwareType", firmware, allowed)
+    autopilot = _FIRMWARES.get(firmware, "")
     items = [_read_item(item, index, source) for index, item in enumerate(file.mission.items)]
     if not (items or file.geoFence.circles or file.geoFence.polygons or file.rallyPoints.points):
         raise MissionError(f"{source}: mission.items: no items", file=source, field="mission.items")

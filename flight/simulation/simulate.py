@@ -8,7 +8,7 @@ import math
 import struct
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import lru_cache, partial
 
 import numpy as np
 
@@ -26,18 +26,18 @@ from flight.guidance.gains import Gains, load_gains
 from flight.guidance.navigation_error import ERRORS, start_navigation
 from flight.guidance.path import FlyByPath, fly_by_path, waypoint_records
 from flight.mission.ground_phases import GroundPhases, TakeOff
-from flight.simulation.local_map import Ground, LocalMap
 from flight.simulation.setup import EngineChoice, FlightSetup
 from flight.simulation.tick import BLOCK_TICKS, ENDS, READ_FIELDS, Workspace, rtl_loiter_timeout
 from flight.simulation.track import Rows, Track, TrackBuilder, join_rows, quantise
 from flight.simulation.turbulence import start_gusts
-from world.arrays import Floats
+from world.arrays import Floats, Heights
 from world.errors import FlightError, StartError
 from world.forecast.wind_field import without_levels_above
-from world.frames import to_geo
+from world.frames import GeoOrigin, PolyMap, fit_polymap, to_geo, to_map
 from world.geometry import leg_courses
 from world.kernels import Records
 from world.random_streams import NAVIGATION, TURBULENCE, stream
+from world.terrain import Terrain
 from world.wind import W20
 
 # ----------------------------------------------------------------------
@@ -163,6 +163,130 @@ MIN_GROUND_SPEED_MPS = 3.0
 
 
 # ----------------------------------------------------------------------
+# The map and the ground around one flight, in the form that the compiled loop needs.  JSBSim provides latitudes and
+# longitudes; all other code uses positions on the map.
+
+# Margin of the local map around the area and the route, m.
+MAP_MARGIN_M = 5000.0
+# Maximum errors of the local map, m and rad.
+MAX_MAP_ERRORS = (0.01, 1e-6)
+
+
+@dataclass(frozen=True, slots=True)
+class LocalMap:
+    """Map projection for compiled code: polynomials that are fitted around one flight.
+
+    position: from latitude and longitude, rad, to east and north, m.
+    angle: from latitude and longitude, rad, to the grid convergence, rad, which is the map course of true north, and 0.
+    center_longitude: longitude of the map's center, rad; longitudes are normalised to within pi of it.
+    """
+
+    position: PolyMap
+    angle: PolyMap
+    center_longitude: float
+
+    @staticmethod
+    def around(setup: FlightSetup) -> "LocalMap":
+        """Fit a local map around the area and the route, with a margin of `MAP_MARGIN_M`.
+
+        The error is 0.1 mm and 1e-9 rad on areas up to 600 km wide. Raises FlightError if the map cannot be fitted, as
+        for an area around a pole.
+        """
+        points = np.concatenate([setup.route.positions[:, :2], setup.scenario.bounds.T])
+        min_corner, max_corner = points.min(axis=0) - MAP_MARGIN_M, points.max(axis=0) + MAP_MARGIN_M
+        return _fit_local_map(
+            setup.scenario.origin, tuple(min_corner.tolist()), tuple(max_corner.tolist()), setup.mission.source
+        )
+
+    def convergence(self, lat_deg: float, lon_deg: float) -> float:
+        """Return the grid convergence at a position, rad: the map course of true north."""
+        lon = self.center_longitude + math.remainder(math.radians(lon_deg) - self.center_longitude, 2.0 * math.pi)
+        return float(self.angle(math.radians(lat_deg), lon)[0])
+
+
+@lru_cache(maxsize=4)
+def _fit_local_map(
+    origin: GeoOrigin, min_corner: tuple[float, float], max_corner: tuple[float, float], source: str
+) -> LocalMap:
+    """Fit a local map over a rectangle of the map; the flights of a campaign share it.
+
+    min_corner, max_corner: corners of the rectangle, east and north, m.
+    source: file of the mission, for messages.
+
+    Raises FlightError if the map cannot be fitted.
+    """
+    outline = np.array(
+        [
+            [east, north]
+            for east in (min_corner[0], 0.5 * (min_corner[0] + max_corner[0]), max_corner[0])
+            for north in (min_corner[1], max_corner[1])
+        ]
+    )
+    lat, lon = (np.radians(values) for values in to_geo(origin, outline[:, 0], outline[:, 1]))
+    # Longitudes relative to the origin, so that an area may include the 180th meridian.
+    origin_longitude = math.radians(origin.lon_deg)
+    lon = origin_longitude + (lon - origin_longitude + math.pi) % (2.0 * math.pi) - math.pi
+    bounds = np.array([[lat.min(), lat.max()], [lon.min(), lon.max()]])
+    if not (np.isfinite(bounds).all() and np.ptp(bounds[1]) < math.pi):
+        raise FlightError(f"{source}: the area contains a pole", file=source)
+
+    def position(latitude: Floats, longitude: Floats) -> tuple[Floats, Floats]:
+        """Return the map position of a latitude and longitude (rad), m."""
+        return to_map(origin, np.degrees(latitude), np.degrees(longitude))
+
+    def angle(latitude: Floats, longitude: Floats) -> tuple[Floats, Floats]:
+        """Return the map course of true north at a latitude and longitude (rad), rad, and 0."""
+        step = 1e-5
+        east0, north0 = position(latitude - step, longitude)
+        east1, north1 = position(latitude + step, longitude)
+        return np.arctan2(east1 - east0, north1 - north0), np.zeros_like(latitude)
+
+    center_longitude = float((bounds[1, 0] + bounds[1, 1]) / 2)
+    local = LocalMap(fit_polymap(position, bounds, 1e-4), fit_polymap(angle, bounds, 1e-9), center_longitude)
+    if not (local.position.residual <= MAX_MAP_ERRORS[0] and local.angle.residual <= MAX_MAP_ERRORS[1]):
+        raise FlightError(
+            f"{source}: the area is too large to fly in: its map has an error "
+            f"of {local.position.residual:.2g} m; {MAX_MAP_ERRORS[0]:g} m is allowed",
+            file=source,
+        )
+    return local
+
+
+class Ground:
+    """Terrain for the compiled tick; without terrain, a raster without data.
+
+    known: True if there is terrain.
+    heights: altitudes of the ground, m, (rows, columns); NaN where unknown.
+    to_pixel: transformation from map positions (east, north) to column and row of ``heights``.
+    """
+
+    def __init__(self, terrain: Terrain | None) -> None:
+        self.known = terrain is not None
+        self.terrain = terrain
+        self.heights: Heights
+        if terrain is None:
+            self.heights, self.to_pixel = np.full((2, 2), np.nan, dtype=np.float32), _map_outside_raster()
+            # Lock it like a terrain's array, because locked arrays are a different type for compiled code.
+            self.heights.setflags(write=False)
+        else:
+            self.heights, self.to_pixel = terrain.heights, terrain.to_pixel
+
+    def height(self, east: float, north: float) -> float:
+        """Return the ground altitude at a map position, m; NaN if unknown."""
+        return math.nan if self.terrain is None else float(self.terrain.height(east, north))
+
+
+def _map_outside_raster() -> PolyMap:
+    """Return a map from positions to pixels that stands for missing terrain: every pixel is outside any raster."""
+
+    def outside_pixel(x: Floats, y: Floats) -> tuple[Floats, Floats]:
+        """Return a pixel outside any raster for each position."""
+        return np.full_like(x, -9.0), np.full_like(y, -9.0)
+
+    return fit_polymap(outside_pixel, [[-1.0, 1.0], [-1.0, 1.0]], 1e-6)
+
+
+# ----------------------------------------------------------------------
 # One flight in progress, for any autopilot: its start, ground, wind and time limit.
 
 
@@ -185,6 +309,24 @@ class Start:
     course: float
     slope: float
     airspeed: float
+    wind: tuple[float, float, float]
+    ground: float
+
+
+@dataclass(frozen=True, slots=True)
+class Release:
+    """State of the aircraft at its release.
+
+    position: latitude and longitude, deg, and altitude, m AMSL.
+    attitude: roll, pitch, yaw (true), rad.
+    velocity: velocity of the aircraft over the ground, north, east and down, m/s.
+    wind: velocity of the air, north, east and down, m/s.
+    ground: altitude of the ground, m AMSL.
+    """
+
+    position: tuple[float, float, float]
+    attitude: tuple[float, float, float]
+    velocity: tuple[float, float, float]
     wind: tuple[float, float, float]
     ground: float
 
@@ -272,7 +414,13 @@ class RunningFlight:
         self._work.settings.center_longitude = self.map.center_longitude
         self._work.settings.battery = setup.battery
         length = self.path.length + _extra_loiter_length(setup, waypoints)
-        ground_speed = _min_ground_speed(setup, self._airspeeds) - _max_wind_deviation(setup, length)
+        ground_speed = _min_ground_speed(setup, self._airspeeds)
+        if (wind_field := setup.scenario.wind.field) is not None:
+            # Allow for the largest deviation of the forecast's wind from the mean wind around the flight.
+            longest_time = TIME_LIMIT_FACTOR * length / MIN_GROUND_SPEED_MPS + TIME_LIMIT_BASE_S
+            flight_field = wind_field.between(0.0, longest_time)
+            flight_field = without_levels_above(flight_field, float(setup.route.positions[:, 2].max()))
+            ground_speed -= float(np.linalg.norm(flight_field.velocities, axis=-1).max())
         time_limit = TIME_LIMIT_FACTOR * length / max(MIN_GROUND_SPEED_MPS, ground_speed) + TIME_LIMIT_BASE_S
         # A loiter for a time lasts as long as its item states, although its path is only one circle.
         timed_loiters = waypoints[(waypoints["loiter_time"] > 0.0) & (waypoints["loiter_time"] < math.inf)]
@@ -348,10 +496,18 @@ class RunningFlight:
             ground=min(0.0, up - 1000.0) if math.isnan(ground_altitude) else ground_altitude,
         )
 
-    def _start_trimmed(self, source: str, start: Start) -> None:
+    def _start_trimmed(
+        self,
+        source: str,
+        start: Start,
+        launch_end: Release | None = None,
+        commands: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0),
+    ) -> None:
         """Start the aircraft trimmed on the slope of the first leg, or level if it cannot hold that slope.
 
         source: file of the mission, for messages.
+        launch_end: state in which a launch then releases the aircraft; None for a start in the air.
+        commands: elevator, aileron, rudder (rad) and throttle (0..1) at the release.
 
         Raises StartError if the aircraft can fly neither the slope nor level.
         """
@@ -369,6 +525,9 @@ class RunningFlight:
         self.fdm.set_gust(*start.wind)
         self._work.commands = tuple(trimmed.commands())
         self._work.air.wind_north, self._work.air.wind_east = start.wind[:2]
+        if launch_end is not None:
+            self._work.commands = release(self.fdm, launch_end, commands)
+            self._work.air.wind_north, self._work.air.wind_east = launch_end.wind[:2]
 
     def fly_block(self, count: int) -> tuple[Rows, str]:
         """Fly up to ``count`` ticks; return their track rows and the reason for the flight's end.
@@ -449,21 +608,6 @@ def _min_ground_speed(setup: FlightSetup, airspeeds: Floats) -> float:
     return float(np.nanmin(speeds)) if np.isfinite(speeds).any() else MIN_GROUND_SPEED_MPS
 
 
-def _max_wind_deviation(setup: FlightSetup, length: float) -> float:
-    """Return the largest deviation of a forecast's wind from the mean wind around a flight, m/s.
-
-    length: length of the flight, m.
-
-    Without a forecast the result is 0.
-    """
-    field = setup.scenario.wind.field
-    if field is None:
-        return 0.0
-    longest_time = TIME_LIMIT_FACTOR * length / MIN_GROUND_SPEED_MPS + TIME_LIMIT_BASE_S
-    flight_field = without_levels_above(field.between(0.0, longest_time), float(setup.route.positions[:, 2].max()))
-    return float(np.linalg.norm(flight_field.velocities, axis=-1).max())
-
-
 def _find_wind(setup: FlightSetup, position: Sequence[float], convergence: float) -> tuple[float, float, float]:
     """Return the mean wind at a position at the start of the flight: true north, east and down, m/s.
 
@@ -478,24 +622,6 @@ def _find_wind(setup: FlightSetup, position: Sequence[float], convergence: float
 
 # ----------------------------------------------------------------------
 # Start from the ground.
-
-
-@dataclass(frozen=True, slots=True)
-class Release:
-    """State of the aircraft at its release.
-
-    position: latitude and longitude, deg, and altitude, m AMSL.
-    attitude: roll, pitch, yaw (true), rad.
-    velocity: velocity of the aircraft over the ground, north, east and down, m/s.
-    wind: velocity of the air, north, east and down, m/s.
-    ground: altitude of the ground, m AMSL.
-    """
-
-    position: tuple[float, float, float]
-    attitude: tuple[float, float, float]
-    velocity: tuple[float, float, float]
-    wind: tuple[float, float, float]
-    ground: float
 
 
 def default_gear(ground_phases: GroundPhases) -> Gear:
@@ -628,7 +754,12 @@ class Flight(RunningFlight):
         if level_trim is None:
             reason = f"no level flight at {gains.reference_airspeed:.1f} m/s and {start.amsl:.0f} m AMSL"
             raise StartError(setup.aircraft, reason, field="airspeed", value=gains.reference_airspeed)
-        self._start_motion(setup, start, level_trim.elevator)
+        launch_end, take_off = None, self._ground_phases.take_off
+        if take_off is not None:
+            launch_end = find_release(setup, self.map, self._ground, aircraft, take_off)
+        commands = (level_trim.elevator, 0.0, 0.0, self._law.released_throttle)
+        start_motion = partial(self._start_trimmed, setup.mission.source, start, launch_end, commands)
+        start_motion()
         memory = self.guidance_memory
         memory.trim_elevator, memory.trim_alpha = level_trim.elevator, level_trim.alpha
         memory.trim_throttle = (steady_flight(model, start.airspeed, start.amsl) or level_trim).throttle
@@ -636,7 +767,7 @@ class Flight(RunningFlight):
         memory.max_bank = setup.limits.max_bank + BANK_RESERVE_RAD
         self._law.initialise(self.guidance_memory, self._workspace.law_record)
         self._start_disturbances(setup)
-        self._compiled, self.engine = self._choose_engine(setup, start, level_trim.elevator)
+        self._compiled, self.engine = self._choose_engine(setup, start_motion)
         self._fly_ticks = self._make_loop()
 
     def divert(self, setup: FlightSetup, local_map: LocalMap) -> None:
@@ -661,22 +792,10 @@ class Flight(RunningFlight):
         self._law.transfer_state(old_law_record, self._workspace.law_record, setup.route.positions[0])
         self._fly_ticks = self._make_loop()
 
-    def _start_motion(self, setup: FlightSetup, start: Start, elevator: float) -> None:
-        """Start the aircraft trimmed in the air, and then release it from its launcher if it takes off.
-
-        elevator: elevator command at the release, rad.
-        """
-        self._start_trimmed(setup.mission.source, start)
-        if self._ground_phases.take_off is not None:
-            release_state = find_release(setup, self.map, self._ground, self.fdm.aircraft, self._ground_phases.take_off)
-            commands = (elevator, 0.0, 0.0, self._law.released_throttle)
-            self._work.commands = release(self.fdm, release_state, commands)
-            self._work.air.wind_north, self._work.air.wind_east = release_state.wind[:2]
-
-    def _choose_engine(self, setup: FlightSetup, start: Start, elevator: float) -> tuple[CompiledModel | None, str]:
+    def _choose_engine(self, setup: FlightSetup, start_motion: Callable[[], None]) -> tuple[CompiledModel | None, str]:
         """Choose between the compiled model and JSBSim, by comparing their steps.
 
-        start, elevator: as in `_start_motion`, to start JSBSim again after a comparison that found a difference.
+        start_motion: function that starts JSBSim again after a comparison that found a difference.
         Returns the compiled model, or None for JSBSim, and a text that names the choice and its reason.
         """
         if self._chosen_engine == "jsbsim":
@@ -693,7 +812,7 @@ class Flight(RunningFlight):
         if differences := model.find_differences():
             # Start again, since the comparison has moved the aircraft.
             self.fdm = self._new_fdm()
-            self._start_motion(setup, start, elevator)
+            start_motion()
             return None, f"JSBSim, because the compiled model differs from it in {differences[0]}"
         return model, f"compiled model, bit-identical to JSBSim {JSBSIM_VERSION} over {PROOF_STEPS} test steps"
 

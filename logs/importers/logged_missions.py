@@ -1,6 +1,6 @@
 """Read content that is common to several log formats: missions, and the flight modes of ArduPlane and PX4."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -56,15 +56,15 @@ def combine_items(rows: Iterable[LoggedItem]) -> list[LoggedItemGroup]:
     totals: list[int] = []
     ordered = list(rows)
     for k, (time, total, item, begins_mission) in enumerate(ordered):
-        following = ordered[k + 1].item if k + 1 < len(ordered) else None
-        if (
-            not missions
-            or begins_mission
-            or (item.seq == 0 and len(missions[-1][1]) > 1 and _starts_new_mission(following, missions[-1][1]))
-        ):
+        items = missions[-1][1] if missions else {}
+        following = ordered[k + 1].item if k + 1 < len(ordered) else item
+        # An item 0 begins a new mission if item 1 follows, or an item that is not in the mission, or differs from it.
+        is_other = following.seq not in items or not _is_same_item(items[following.seq], following)
+        begins_again = item.seq == 0 < following.seq and (following.seq == 1 or is_other)
+        if not missions or begins_mission or (begins_again and len(items) > 1):
             missions.append((time, {}))
-        elif item.seq in missions[-1][1] and not _is_same_item(missions[-1][1][item.seq], item):
-            missions.append((time, dict(missions[-1][1])))
+        elif item.seq in items and not _is_same_item(items[item.seq], item):
+            missions.append((time, dict(items)))
         missions[-1][1][item.seq] = item
         if len(totals) < len(missions):
             totals.append(0)
@@ -81,20 +81,6 @@ def combine_items(rows: Iterable[LoggedItem]) -> list[LoggedItemGroup]:
         else:
             combined.append(logged)
     return combined
-
-
-def _starts_new_mission(next_item: MissionItem | None, items: Mapping[int, MissionItem]) -> bool:
-    """Return True if an item 0 starts a new mission; False if it is only logged again.
-
-    It starts one if the following item is item 1, has a number that the mission so far lacks, or differs from the
-    mission's item of this number.
-
-    next_item: item that is logged after item 0; None at the end of the log.
-    items: items of the mission so far, by number.
-    """
-    if next_item is None or next_item.seq == 0:
-        return False
-    return next_item.seq == 1 or next_item.seq not in items or not _is_same_item(items[next_item.seq], next_item)
 
 
 def _is_same_mission(first: LoggedItemGroup, second: LoggedItemGroup) -> bool:

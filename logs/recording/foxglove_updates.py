@@ -155,7 +155,10 @@ class FlightEvents:
             is_inside = (distance < radius) & (radius > 0.0)
             has_changed = np.diff(is_inside, axis=0, prepend=was_inside[None, :])
             for row, threat in np.argwhere(has_changed).tolist():
-                yield self._threat_record(int(log_times[checked_rows[row]]), kind, threat, bool(is_inside[row, threat]))
+                has_entered, name = bool(is_inside[row, threat]), self._threats.names[threat]
+                text = f"inside the {kind} of {name}" if has_entered else f"out of the {kind} of {name}"
+                level = "warning" if has_entered and kind == "missile range" else "info"
+                yield self._event_record(int(log_times[checked_rows[row]]), text, level)
             self._inside[kind] = is_inside[-1]
 
     def _leg_text(self, leg: int) -> str:
@@ -165,18 +168,6 @@ class FlightEvents:
             return f"leg {leg}"
         item_text = f" (item {route.items[waypoint]})" if route.items[waypoint] >= 0 else ""
         return f"leg {route.leg_numbers[leg]}, to waypoint {route.stops[waypoint]}{item_text}"
-
-    def _threat_record(self, time: int, kind: str, threat: int, has_entered: bool) -> MessageRecords:
-        """Make the message record for an entry into, or an exit from, the range of a threat.
-
-        time: log time, ns.
-        kind: "missile range" or "radar range".
-        threat: index of the threat.
-        """
-        name = self._threats.names[threat]
-        level = "warning" if kind == "missile range" else "info"
-        text = f"inside the {kind} of {name}" if has_entered else f"out of the {kind} of {name}"
-        return self._event_record(time, text, level if has_entered else "info")
 
     def _event_record(self, time: int, text: str, level: str) -> MessageRecords:
         """Make the message record of one event.

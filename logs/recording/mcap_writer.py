@@ -191,7 +191,9 @@ class ContainerWriter:
                 index.setdefault(number, []).append((log_time, position))
         parts, channels, position = [], [], 0
         for number, pairs in sorted(index.items()):
-            parts.append(_message_index(number, np.array(pairs, dtype=np.uint64)))
+            data = np.array(pairs, dtype="<u8").tobytes()
+            header = number.to_bytes(2, "little") + len(data).to_bytes(4, "little")
+            parts.append(FRAME.pack(Opcode.MESSAGE_INDEX, _PAIRS_HEAD + len(data)) + header + data)
             channels.append(ChannelIndex(number, position, len(pairs)))
             position += len(parts[-1])
         times = [log_time for pairs in index.values() for log_time, _ in pairs]
@@ -286,16 +288,6 @@ def _record_bytes(record: McapRecord) -> bytes:
     builder: Any = RecordBuilder()  # mcap leaves some of its methods without annotations
     record.write(builder)
     return bytes(builder.end())
-
-
-def _message_index(channel: int, pairs: Index) -> bytes:
-    """Encode the index of a channel's messages in a chunk.
-
-    pairs: log time (ns) of each message, and its offset in the chunk (bytes), (n, 2).
-    """
-    data = np.ascontiguousarray(pairs, dtype="<u8").tobytes()
-    header = channel.to_bytes(2, "little") + len(data).to_bytes(4, "little")
-    return FRAME.pack(Opcode.MESSAGE_INDEX, _PAIRS_HEAD + len(data)) + header + data
 
 
 # ----------------------------------------------------------------------

@@ -16,7 +16,7 @@ from flight.mission.altitude_frames import find_misread_altitudes
 from flight.mission.items import OVER_HOME, PLACES, Frame
 from flight.mission.itinerary import stated_loiter
 from flight.mission.placing import HOME_ALTITUDE_TOLERANCE_M
-from flight.mission_files.wpl import HOME_LINE_MISSING_TEXT
+from flight.mission_files.formats import HOME_LINE_MISSING_TEXT
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import UNKNOWN_AIRCRAFT, Finding
 from logs.verdict.measures.acceptance import position_error

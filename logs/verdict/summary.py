@@ -305,7 +305,12 @@ def summary_lines(
     """
     *other_answers, own_answer = levels
     lines = [own_answer.headline]
-    if _is_covered_by_airframe(findings):
+    # The airframe's reference flight flies no take-off and no landing, and no slope that the aircraft cannot fly.
+    if not any(
+        finding.rule in GROUND_RULES or any(fact.what == AIRCRAFT_SLOPE for fact in finding.facts)
+        for finding in findings
+        if finding.ok is False
+    ):
         lines += _airframe_or_autopilot_lines(levels, deciding, setup)
     lines += _pitch_limit_lines(findings, setup)
     lines.append(f"Start: {setup.started}" if setup.started else "Start: not stated")
@@ -395,19 +400,6 @@ def _airframe_or_autopilot_lines(
     if deciding is not None:
         reason = f": {deciding_text(deciding)}{', by the simulated flight' if flew_program else ''}"
     return [f"The aircraft can fly this mission, but {setup.autopilot.title}{parameters_note} cannot{reason}"]
-
-
-def _is_covered_by_airframe(findings: Sequence[Finding]) -> bool:
-    """Return True if the airframe's reference flight can show whether the autopilot causes every failure.
-
-    It cannot show this for failures in a take-off or landing, which it does not fly, nor for a slope that the aircraft
-    itself cannot fly.
-    """
-    failed_findings = [finding for finding in findings if finding.ok is False]
-    return not any(
-        finding.rule in GROUND_RULES or any(fact.what == AIRCRAFT_SLOPE for fact in finding.facts)
-        for finding in failed_findings
-    )
 
 
 def _pitch_limit_lines(findings: Sequence[Finding], setup: FlightSetup) -> list[str]:

@@ -2,8 +2,7 @@
 
 import functools
 import inspect
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from typing import ParamSpec, TypeVar, get_args, get_type_hints
 
 from planfly.arguments import check_arguments
@@ -18,11 +17,12 @@ _Result = TypeVar("_Result")
 
 
 def api_function(*kernel_units: str) -> Callable[[Callable[_Parameters, _Result]], Callable[_Parameters, _Result]]:
-    """Return a decorator for a function of the API: its arguments are checked, and it runs inside `warm_up`.
+    """Return a decorator for a function of the API, which checks its arguments and compiles its kernels.
 
+    All kernels are compiled, in two processes, as soon as the function calls a kernel that is not cached.
     The options of an ``Unpack[...]`` parameter are listed in its signature, with their defaults.
 
-    kernel_units: see `warm_up`.
+    kernel_units: units of `planfly.kernel_units` with the function's kernels, the unit that takes longest first.
     The function raises the ArgumentErrors of `world.argument_types.check_types` and `check_arguments`.
 
     >>> from typing import Unpack
@@ -52,7 +52,7 @@ def api_function(*kernel_units: str) -> Callable[[Callable[_Parameters, _Result]
 
         @functools.wraps(function)
         def checked_function(*args: _Parameters.args, **keywords: _Parameters.kwargs) -> _Result:
-            """Check the arguments, add the defaults of missing options, and call the function inside `warm_up`."""
+            """Check the arguments, add the defaults of missing options, and call the function."""
             for name in keywords if defaults else ():
                 if name not in signature.parameters:
                     hint = did_you_mean(name, signature.parameters)
@@ -60,30 +60,11 @@ def api_function(*kernel_units: str) -> Callable[[Callable[_Parameters, _Result]
             checked_args, checked_keywords = check_types(signature, args, keywords)
             all_keywords = {**defaults, **checked_keywords}
             check_arguments(**{name: all_keywords[name] for name in RANGED_OPTIONS if name in defaults})
-            with warm_up(*kernel_units):
+            compile_kernels = functools.partial(compile_and_report, kernel_units)
+            with notify_before_compiling(compile_kernels, once=True):
                 return function(*checked_args, **all_keywords)
 
         checked_function.__signature__ = signature  # type: ignore[attr-defined]
         return checked_function
 
     return decorate
-
-
-@contextmanager
-def warm_up(*units: str) -> Iterator[None]:
-    """Compile all kernels of the ``with`` block as soon as it calls a kernel that is not cached.
-
-    The kernels are compiled in two processes before the code continues.
-    units: units of `planfly.kernel_units` with these kernels, the unit that takes longest first.
-    """
-    has_compiled = False
-
-    def compile_all() -> None:
-        """Compile the units at the first call only."""
-        nonlocal has_compiled
-        if not has_compiled:
-            has_compiled = True
-            compile_and_report(units)
-
-    with notify_before_compiling(compile_all):
-        yield

@@ -33,11 +33,10 @@ from planfly.arguments import check_arguments
 from planfly.flight_logs import is_log, loss_text
 from planfly.flight_options import FencePaths, MissionOptions, read_named_fences
 from planfly.plan_fence import add_plan_fence
-from planfly.rtl.return_summary import return_summary
 from planfly.runtime.stages import stage
 from planfly.workflow.open_flight import PLAN_FILE, open_flight
 from planfly.workflow.output_paths import check_output_file
-from planfly.workflow.pipeline import FlownMission
+from planfly.workflow.pipeline import FlownMission, return_summary
 from planner.plan import Plan, plan_json
 from world.errors import MissionError, ParameterError, PlanflyError
 from world.extras import require_extra

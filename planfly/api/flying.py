@@ -30,13 +30,25 @@ from planfly.flight_options import (
     select_mission_options,
 )
 from planfly.kernel_units.unit_kernels import FLYING, PLANNING_AND_FLYING
-from planfly.rtl.return_summary import ReturnSummary, return_summary
 from planfly.runtime.stages import report_replaced, stage
 from planfly.workflow import pipeline
 from planfly.workflow.flight_limits import FlightLimits, computing_time_key, length_and_duration_text
 from planfly.workflow.open_flight import open_flight
-from planfly.workflow.output_paths import FLY_LOG, LOG_FIGURES, check_output_file, file_target, prepare_folder
-from planfly.workflow.pipeline import FlownMission, PlanThenFly, autopilot_log_path, fly_and_judge
+from planfly.workflow.output_paths import (
+    FLY_LOG,
+    LOG_FIGURES,
+    check_output_file,
+    expand_path_pattern,
+    prepare_folder,
+)
+from planfly.workflow.pipeline import (
+    FlownMission,
+    PlanThenFly,
+    ReturnSummary,
+    autopilot_log_path,
+    fly_and_judge,
+    return_summary,
+)
 from planfly.workflow.suggestion_trials import judge_mission_geometry
 from planner.plan import Plan
 from world.errors import ArgumentError, ScenarioError
@@ -210,9 +222,12 @@ def _prepare_log_file(
     Raises PlanflyError for a file that cannot be written, and for an existing file without `overwrite`.
     """
     source = None if isinstance(mission, Plan) else Path(mission)
-    target = file_target(log, setup.name, setup.seed, suffix=".mcap", overwrite=overwrite, source=source)
+    target = expand_path_pattern(log, setup.name, setup.seed)
+    folder_must_exist = target == Path(log)
+    check_output_file(target, overwrite, source, suffix=".mcap", folder_must_exist=folder_must_exist)
     if program is not None:
-        check_output_file(autopilot_log_path(target, program), overwrite, source)
+        program_log = autopilot_log_path(target, program)
+        check_output_file(program_log, overwrite, source, folder_must_exist=folder_must_exist)
     target.parent.mkdir(parents=True, exist_ok=True)
     if log == FLY_LOG:
         # Remove the report and the pictures of the previous flight.

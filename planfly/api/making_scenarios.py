@@ -63,7 +63,10 @@ def make_scenario(
         spec["flight"] = _without_other_autopilot(spec["flight"], base_scenario.flight, flight)
     for name, values in _convert_to_plain_values(tables).items():
         is_merged = isinstance(values, Mapping) and isinstance(spec.get(name), dict) and name not in _POSITIONS
-        spec[name] = _change_table(spec[name], values) if is_merged else values
+        if is_merged and any(key in values and values[key] != spec[name].get(key) for key in _SOURCE_KEYS):
+            # The other values belong to another kind or file.
+            spec[name] = {key: spec[name][key] for key in ("kind",) if key in spec[name]}
+        spec[name] = spec[name] | dict(values) if is_merged else values
     terrain_table, base_table = spec["terrain"], base_scenario.to_json()["terrain"]
     # The check of the whole scenario refuses a terrain that is no mapping.
     is_other_file = isinstance(terrain_table, Mapping) and terrain_table.get("path") != base_table.get("path")
@@ -115,13 +118,3 @@ def _without_other_autopilot(entries: dict[str, Any], base: FlightTable, changes
     # The default accuracy of the navigation depends on the autopilot.
     dropped_keys = (*_AUTOPILOT_KEYS, *(("nav",) if base.nav is None else ()))
     return {key: value for key, value in entries.items() if key not in dropped_keys}
-
-
-def _change_table(table: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a table of a scenario with changed values.
-
-    If the kind or the file of the table changes, its other values are not kept.
-    """
-    if any(key in changes and changes[key] != table.get(key) for key in _SOURCE_KEYS):
-        table = {key: table[key] for key in ("kind",) if key in table}
-    return table | dict(changes)

@@ -127,7 +127,10 @@ class Optimiser:
             raise ArgumentError.of_argument("values, violations", values, allowed, shown="")
         if not self._levels:
             self._violation_count = violation_values.shape[1]
-            self._levels = _make_priority_levels(violation_values.shape[1], objective_values.shape[1])
+            # Constraints with the goal 0, then objectives.
+            constraints, objectives = violation_values.shape[1], objective_values.shape[1]
+            levels = (Level(tuple(range(constraints, constraints + objectives)), (NO_GOAL,) * objectives),)
+            self._levels = (Level(tuple(range(constraints)), (0.0,) * constraints), *levels) if constraints else levels
             self._scores = np.empty((0, scores.shape[1]))
         self.evaluations += len(points)
         self._update_front(points, scores)
@@ -293,18 +296,6 @@ def _parse_numbers(name: str, numbers: ArrayLike) -> Floats:
         return np.array(numbers, dtype=np.float64)
     except (TypeError, ValueError):
         raise ArgumentError.of_argument(name, type(numbers).__name__, "expected an array of numbers") from None
-
-
-def _make_priority_levels(violations: int, objectives: int) -> tuple[Level, ...]:
-    """Return the priority levels by which scores are ranked: constraints with the goal 0, then objectives.
-
-    A level is a group of columns of the scores; a later level decides only between points that are equally good in the
-    earlier ones.
-
-    violations, objectives: numbers of constraints and of objectives.
-    """
-    values = Level(tuple(range(violations, violations + objectives)), (NO_GOAL,) * objectives)
-    return (Level(tuple(range(violations)), (0.0,) * violations), values) if violations else (values,)
 
 
 def _parse_columns(name: str, numbers: ArrayLike, row_count: int) -> Floats:

@@ -19,7 +19,7 @@ from planfly.planning.expected_failures import expected_failures
 from planfly.runtime.stages import stage
 from planfly.threat_tables import GivenThreats, threat_tables
 from planfly.workflow.make_plan import make_given_plan, make_plan
-from planfly.workflow.output_paths import file_target
+from planfly.workflow.output_paths import check_output_file, expand_path_pattern
 from planfly.workflow.uav import choose_seed, cruise_airspeed, load_uav, scenario_aircraft
 from planner.plan import GIVEN_WAYPOINTS, Plan, nearest_missile_text, plan_json, read_plan
 from planner.search.explain_failure import explain_failure
@@ -233,8 +233,9 @@ def _find_plan_target(
     if out is None:
         return None
     source_file = None if isinstance(source, Scenario) else Path(source)
-    seed = choose_seed(world, options["seed"])
-    return file_target(out, world.name, seed, suffix=".json", overwrite=overwrite, source=source_file)
+    target = expand_path_pattern(out, world.name, choose_seed(world, options["seed"]))
+    check_output_file(target, overwrite, source_file, suffix=".json", folder_must_exist=target == Path(out))
+    return target
 
 
 def _write_plan(plan: Plan, target: Path | None) -> Plan:

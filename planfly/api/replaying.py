@@ -199,7 +199,11 @@ def play_to_foxglove(
 
     check_arguments(speed=speed, port=port, wait=wait)
     origins = allow_origin.split(",") if isinstance(allow_origin, str) else allow_origin
-    allowed_origins = [_check_origin(origin.strip()) for origin in origins if origin.strip()]
+    allowed_origins = [origin.strip() for origin in origins if origin.strip()]
+    for origin in allowed_origins:
+        if not _ORIGIN.fullmatch(origin):
+            allowed = "expected the origin of a web page, such as https://example.com or http://localhost:8080"
+            raise LogError.of_argument("allow_origin", origin, allowed)
     flight_log = _read_log_if_path(log)
     start_time, end_time = replay_interval(flight_log, start, end)
     foxglove_server.play_to_foxglove(
@@ -213,17 +217,6 @@ def play_to_foxglove(
         should_stop=stop,
         on_message=on_message,
     )
-
-
-def _check_origin(text: str) -> str:
-    """Return the origin of a web page unchanged.
-
-    Raises LogError if it is not written as browsers write it.
-    """
-    if not _ORIGIN.fullmatch(text):
-        allowed = "expected the origin of a web page, such as https://example.com or http://localhost:8080"
-        raise LogError.of_argument("allow_origin", text, allowed)
-    return text
 
 
 @requires_extra("live", "playing to ground stations needs")

@@ -12,11 +12,10 @@ from logs.verdict.verdict import Verdict
 from logs.views.report.compare import Comparison, compare_logs, write_comparison
 from planfly.api.api_function import api_function
 from planfly.flight_logs import judge_log
-from planfly.rtl.return_summary import return_summary
 from planfly.runtime.stages import stage
 from planfly.workflow.open_flight import open_flight
 from planfly.workflow.output_paths import COMPARE_FILES, LOG_FIGURES, check_output_file, clean_folder
-from planfly.workflow.pipeline import FlownMission
+from planfly.workflow.pipeline import FlownMission, return_summary
 from planfly.workflow.suggestion_trials import judge_mission_geometry
 from planner.plan import Plan
 from world.argument_types import checks_types

@@ -23,7 +23,7 @@ from logs.verdict.returns.judge_returns import (
     make_return_world,
     unknown_energy_text,
 )
-from logs.verdict.returns.return_starts import ReturnStarts
+from logs.verdict.returns.return_starts import ReturnStarts, return_starts
 from logs.verdict.returns.returns_text import (
     describe_causes,
     describe_landing,
@@ -42,7 +42,6 @@ from planfly.flight_logs import is_log
 from planfly.flight_options import LogOptions, select_log_options, select_mission_options
 from planfly.kernel_units.unit_kernels import FLYING, GLIDING
 from planfly.rtl.jsbsim_returns import fly_return
-from planfly.rtl.return_summary import return_starts
 from planfly.rtl.sitl_returns import (
     ProgramReturns,
     check_is_arduplane,

@@ -20,7 +20,6 @@ from planfly.api.flying import check_program
 from planfly.arguments import check_arguments
 from planfly.flight_options import RunOptions, load_scenario_with_options, option_defaults
 from planfly.kernel_units.unit_kernels import GLIDING, PLANNING_AND_FLYING
-from planfly.rtl.return_summary import ReturnSummary, return_summary
 from planfly.runtime.stages import report_replaced, stage
 from planfly.workflow.flight_limits import FlightLimits, computing_time_key, length_and_duration_text
 from planfly.workflow.make_plan import make_plan, planning_conditions
@@ -32,7 +31,7 @@ from planfly.workflow.output_paths import (
     expand_path_pattern,
     prepare_folder,
 )
-from planfly.workflow.pipeline import autopilot_log_path, fly_and_judge
+from planfly.workflow.pipeline import ReturnSummary, autopilot_log_path, fly_and_judge, return_summary
 from planfly.workflow.reference_flights import FlyReference
 from planfly.workflow.tighten_plan import refine as refine_rounds
 from planfly.workflow.uav import Uav, choose_seed, load_uav, with_tightened_limits

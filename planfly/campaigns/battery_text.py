@@ -5,9 +5,9 @@ import math
 import numpy as np
 
 from logs.verdict.measures.route_requirements import route_requirements
+from logs.verdict.returns.returns_text import return_law_lines
 from logs.verdict.wording import place_text
 from planfly.campaigns.find_battery import MIN_MASS_FACTOR, BatteryResult
-from planfly.rtl.return_summary import return_law_lines
 
 # Number of parts that decide the battery, and of legs, in the lines.
 _MAX_LISTED = 3

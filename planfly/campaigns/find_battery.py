@@ -18,8 +18,7 @@ import numpy as np
 
 from flight.simulation.simulate import Flight, fly_to_end
 from flight.simulation.track import Track
-from logs.verdict.measures.energy import predicted_energy
-from logs.verdict.measures.route_requirements import route_requirements
+from logs.verdict.measures.route_requirements import predicted_energy, route_requirements
 from logs.verdict.returns.judge_returns import Returns, judge_returns, make_return_world
 from logs.verdict.returns.return_starts import flown_starts
 from logs.verdict.tolerances import ENERGY_RESERVE_FRACTION

@@ -2,9 +2,9 @@
 
 from logs.verdict.conditions import flown_lines
 from logs.verdict.returns.judge_returns import make_return_world, returning_title, without_engine_world
+from logs.verdict.returns.returns_text import return_law_lines
 from planfly.campaigns.find_ground_risk import GroundRiskResult
 from planfly.campaigns.sora import IGRC_COLUMNS
-from planfly.rtl.return_summary import return_law_lines
 from world.population import DENSITY_LIMITS_PER_KM2, Population, density_band, format_density
 from world.wording import count_text
 

@@ -29,8 +29,8 @@ from world.errors import ArgumentError
 
 if TYPE_CHECKING:
     from planfly import Verdict
-    from planfly.rtl.return_summary import ReturnSummary
     from planfly.terminal.verdict_answers import VerdictsDocument
+    from planfly.workflow.pipeline import ReturnSummary
 
 # Suffixes of logs of other programs, as the help shows them.
 LOGS = "LOG.BIN|.tlog|.ulg|.gpx|.igc|.kml|.kmz"

@@ -22,7 +22,7 @@ from flight.dynamics.envelope_tables import load_envelope
 from flight.dynamics.fdm import Fdm
 from flight.dynamics.trim import steady_flight
 from flight.guidance.model_gains import gains_from_model, gains_text
-from flight.mission_files.wpl import waypoints_text
+from flight.mission_files.formats import waypoints_text
 from logs.importers.motion import MotionLog
 from planfly.identification.manoeuvres import make_identification_mission
 from planfly.identification.model_text import format_identified_model

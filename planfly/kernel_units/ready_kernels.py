@@ -17,9 +17,8 @@ from flight.mission_files.formats import parse_mission
 from flight.simulation.setup import make_limits
 from logs.recording.recorder import Recorder
 from planfly.kernel_units.unit_kernels import UNIT_KERNELS
-from planfly.rtl.return_summary import return_summary, returns_line
 from planfly.workflow.open_flight import make_setup
-from planfly.workflow.pipeline import fly_and_judge
+from planfly.workflow.pipeline import fly_and_judge, return_summary
 from planfly.workflow.uav import Uav, load_uav, scenario_aircraft
 from planner.evaluation.problem import make_problem
 from planner.search.kernel_calls import FRONT, PARTS, SAMPLE_COUNT, call_kernels
@@ -111,7 +110,7 @@ def _compile_flight_kernels() -> None:
     scenario, uav = _make_scenario_and_uav()
     setup = make_setup(scenario, uav, parse_mission(MISSION_TEXT, "field.waypoints"), 1)
     flight = fly_and_judge(setup)
-    returns_line(setup, flight.track)
+    return_summary(setup, flight.track)
     with TemporaryDirectory() as folder, Recorder(Path(folder) / "flight.mcap", setup) as recorder:
         recorder.write(flight.track)
         recorder.finish(flight.ended, flight.verdict)

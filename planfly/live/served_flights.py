@@ -37,9 +37,8 @@ from flight.live.telemetry import (
     StatusText,
 )
 from flight.mission.items import Command, Frame, Home, Mission, MissionItem, round_to_grid
-from flight.simulation.local_map import LocalMap
 from flight.simulation.setup import FlightSetup
-from flight.simulation.simulate import Flight
+from flight.simulation.simulate import Flight, LocalMap
 from flight.simulation.track import Track, as_track, join_tracks
 from logs.recording.recorder import Recorder
 from logs.verdict.findings import Finding

@@ -1,1 +1,1 @@
-"""Fly returns to launch in JSBSim or by a real autopilot, and summarise them."""
+"""Fly returns to launch in JSBSim or by a real autopilot."""

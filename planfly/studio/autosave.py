@@ -289,7 +289,8 @@ def _replace_entries(saved_spec: Json, opened_spec: Json, table: str, keys: tupl
         if new_value is not None:
             saved[key] = new_value
         if not _is_same_value(old_value, new_value) and key not in ("aircraft_by_default", "autopilot_from"):
-            replaced.append(f"{_key_text(key)} {_value_text(old_value)} \u2192 {_value_text(new_value)}")
+            name = {"speed_mps": "wind", "from_deg": "wind from", "airspeed_mps": "airspeed"}.get(key)
+            replaced.append(f"{name or key.replace('_', ' ')} {_value_text(old_value)} \u2192 {_value_text(new_value)}")
     return replaced
 
 
@@ -298,11 +299,6 @@ def _is_same_value(first: object, second: object) -> bool:
     if isinstance(first, str) and isinstance(second, str) and names_folder(first) and names_folder(second):
         return Path(first).resolve() == Path(second).resolve()
     return first == second
-
-
-def _key_text(key: str) -> str:
-    """Return the name of an entry of a scenario as text."""
-    return {"speed_mps": "wind", "from_deg": "wind from", "airspeed_mps": "airspeed"}.get(key, key.replace("_", " "))
 
 
 def _value_text(value: object) -> str:

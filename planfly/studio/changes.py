@@ -85,13 +85,24 @@ def flight_results(mission: Mission, route: Route, findings: Iterable[Finding], 
     order = {item.seq: k for k, item in enumerate(mission.items)}
     results: _Results = {}
     findings = tuple(findings)
-    places_reached = _places_reached(findings)
+    places_reached: set[tuple[str, int | None]] = {
+        (finding.place.kind, finding.place.index) for finding in findings if finding.flown is not None
+    }
     for finding in findings:
         key, description = _place_key(finding.place, route.items.tolist(), order)
         is_planned = finding.flown is None or _is_decided_by_plan(finding)
         value, level = (finding.planned, _PLANNED) if is_planned else (finding.flown, _FLOWN)
-        if places_reached and not _is_reached(finding.place, places_reached):
-            level = _NOT_REACHED
+        place = finding.place
+        if places_reached and place.kind in ("leg", "waypoint") and place.index is not None:
+            # A leg is reached if it was begun, and a waypoint also if the leg to it was begun.
+            begun_leg = ("leg", place.index - (place.kind == "waypoint"))
+            if not {(place.kind, place.index), begun_leg} & places_reached:
+                level = _NOT_REACHED
+        cause = ""
+        if finding.ok is False and finding.limit is not None and value is not None:
+            # A failed finding whose value is within the limit fails for another reason.
+            is_within_limit = value >= finding.limit if finding.at_least else value <= finding.limit
+            cause = finding.brief if is_within_limit else ""
         result = PlaceResult(
             finding.ok,
             value,
@@ -100,7 +111,7 @@ def flight_results(mission: Mission, route: Route, findings: Iterable[Finding], 
             description,
             RULE_WORDS[finding.rule].scale,
             level,
-            _other_cause(finding, value),
+            cause,
             None if finding.flown is None else finding.planned,
         )
         previous = results.get((finding.rule, key))
@@ -118,32 +129,6 @@ def _is_decided_by_plan(finding: Finding) -> bool:
         for value in (finding.planned, finding.flown)
     )
     return planned_error < flown_error
-
-
-def _other_cause(finding: Finding, value: float | None) -> str:
-    """Return the cause of a failed finding if its value is within the limit; otherwise "".
-
-    value: value of the finding that is compared, in the finding's unit.
-    """
-    if finding.ok is not False or finding.limit is None or value is None:
-        return ""
-    is_within_limit = value >= finding.limit if finding.at_least else value <= finding.limit
-    return finding.brief if is_within_limit else ""
-
-
-def _places_reached(findings: Iterable[Finding]) -> set[tuple[str, int | None]]:
-    """Return the kinds and indices of the places with a flown number; empty if nothing was flown."""
-    return {(finding.place.kind, finding.place.index) for finding in findings if finding.flown is not None}
-
-
-def _is_reached(place: Place, places_reached: set[tuple[str, int | None]]) -> bool:
-    """Return True unless a place is a leg or a waypoint that the flight did not reach.
-
-    A leg is reached if it was begun, and a waypoint also if the leg to it was begun.
-    """
-    if place.kind not in ("leg", "waypoint") or place.index is None or (place.kind, place.index) in places_reached:
-        return True
-    return place.kind == "waypoint" and ("leg", place.index - 1) in places_reached
 
 
 def _severity_key(result: PlaceResult) -> tuple[bool, int, float]:

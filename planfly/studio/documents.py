@@ -5,7 +5,6 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -160,7 +159,10 @@ def _check_plan_names_no_files(name: str, data: bytes) -> None:
     try:
         scenario = json.loads(data)["scenario"]
         named_files = [scenario.get("terrain", {}).get("path"), scenario.get("flight", {}).get("params")]
-        named_files += [scenario.get("zones_file"), _aircraft_folder(scenario.get("flight", {}).get("aircraft"))]
+        aircraft = scenario.get("flight", {}).get("aircraft")
+        # An aircraft is a name or the path of a folder.
+        is_path = isinstance(aircraft, str) and ("/" in aircraft or "\\" in aircraft)
+        named_files += [scenario.get("zones_file"), aircraft if is_path else None]
     except (ValueError, LookupError, TypeError, AttributeError, RecursionError):
         # Errors in the plan are reported when the plan is read.
         return
@@ -168,11 +170,6 @@ def _check_plan_names_no_files(name: str, data: bytes) -> None:
         if file is not None and str(file) not in EMBEDDED:
             allowed = "a plan that names other files can only be opened by the command: planfly studio plan.json"
             raise MissionError.at(name, "scenario", str(file)[:60], allowed)
-
-
-def _aircraft_folder(aircraft: Any) -> str | None:
-    """Return the aircraft entry of a scenario if it is a path, or None if it is a name."""
-    return aircraft if isinstance(aircraft, str) and ("/" in aircraft or "\\" in aircraft) else None
 
 
 def _open_file(path: Path, options: MissionOptions) -> FlightSetup:
@@ -256,7 +253,10 @@ def save_document(document: Document, context: EditContext, judged_mission: Judg
     """
     mission, name = judged_mission.mission, f"{document.stem}{SAVED_SUFFIXES[kind]}"
     if kind == "parm":
-        return _saved_parameters(name, context)
+        if not context.parameters.values:
+            raise PlanflyError("no parameter was set in the studio: set one under Settings", field="form")
+        parameter_text = context.parameters.text(f"set in planfly studio for {context.uav.autopilot.title}")
+        return SavedFile(name, parameter_text.encode())
     has_same_world = kind != "plan.json" or context.scenario is document.setup.scenario
     if kind == document.kind and mission is document.setup.mission and has_same_world:
         return SavedFile(name, document.data, _lost_settings(document.setup, context))
@@ -264,9 +264,8 @@ def save_document(document: Document, context: EditContext, judged_mission: Judg
         return _saved_plan(name, context, judged_mission)
     if kind == "kml":
         text = kml_text(context.scenario.name, [plan_line(judged_mission.setup)], map_zones(judged_mission.setup))
-        return SavedFile(
-            name, _to_bytes(text), ("the commands, speeds and frames of the items, because the file is only a map",)
-        )
+        data = text.encode() if isinstance(text, str) else text
+        return SavedFile(name, data, ("the commands, speeds and frames of the items, because the file is only a map",))
     start_airspeed = float(judged_mission.setup.route.leg_airspeeds[0])
     is_stated_in_file = document.kind == "plan" and start_airspeed == document.setup.route.leg_airspeeds[0]
     if kind == "plan" and not is_stated_in_file:
@@ -275,11 +274,6 @@ def save_document(document: Document, context: EditContext, judged_mission: Judg
     text = mission_text(mission, "waypoints" if kind == "waypoints" else "plan")
     losses = (*_format_losses(context, mission, text, name, kind), *_lost_settings(document.setup, context))
     return SavedFile(name, text.encode(), losses)
-
-
-def _to_bytes(text: str | bytes) -> bytes:
-    """Return text as UTF-8, and bytes unchanged."""
-    return text.encode() if isinstance(text, str) else text
 
 
 def _format_losses(context: EditContext, mission: Mission, text: str, name: str, kind: str) -> tuple[str, ...]:
@@ -331,16 +325,6 @@ def _lost_parameters(context: EditContext) -> tuple[str, ...]:
     """
     count = len(context.parameters.values)
     return (f"{count_text(count, 'parameter')} set in the studio: only a .parm contains them",) if count else ()
-
-
-def _saved_parameters(name: str, context: EditContext) -> SavedFile:
-    """Return a parameter file with the parameters set in the studio.
-
-    Raises PlanflyError if no parameter was set.
-    """
-    if not context.parameters.values:
-        raise PlanflyError("no parameter was set in the studio: set one under Settings", field="form")
-    return SavedFile(name, context.parameters.text(f"set in planfly studio for {context.uav.autopilot.title}").encode())
 
 
 def _saved_plan(name: str, context: EditContext, judged_mission: JudgedMission) -> SavedFile:

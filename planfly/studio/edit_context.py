@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from flight.mission.implied_scenario import implied_scenario
 from flight.mission.items import Mission
+from flight.mission.placing import implied_scenario
 from flight.mission.route import Route, route_through_stops, with_end_courses
 from flight.simulation.setup import FlightSetup, make_limits
 from planfly.flight_options import NamedFences

@@ -72,9 +72,9 @@ def judge_windows(
         )
     if route is None:
         route = context.route(mission)
-    spans = (
-        None if _may_contain_survey(context, mission, route) else _find_affected_spans(route, mission.items[index].seq)
-    )
+    # The lines of a survey are found from the whole route.
+    may_contain_survey = context.scenario.limits.surveys == "lines" or bool(camera_spacing(mission, route).any())
+    spans = None if may_contain_survey else _find_affected_spans(route, mission.items[index].seq)
     if spans is None:
         return route, (_judge_window(context.part_setup(mission, route), 0, route.legs, 0),)
     windows = []
@@ -87,11 +87,6 @@ def judge_windows(
             start -= added_count
         windows.append(_judge_window(context.part_setup(mission, part), first, last, start))
     return route, tuple(windows)
-
-
-def _may_contain_survey(context: EditContext, mission: Mission, route: Route) -> bool:
-    """Return True if the mission may contain surveys, whose lines are found from the whole route."""
-    return context.scenario.limits.surveys == "lines" or bool(camera_spacing(mission, route).any())
 
 
 def _add_extreme_legs(context: EditContext, route: Route, part: Route, *, before_part: bool) -> tuple[Route, int]:

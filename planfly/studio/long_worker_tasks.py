@@ -10,13 +10,13 @@ from typing import Any
 
 from flight.mission.items import Mission
 from logs.verdict.returns.judge_returns import judge_returns, make_return_world
+from logs.verdict.returns.return_starts import return_starts
 from logs.verdict.returns.returns_text import headline, point_of_no_return_text, range_text
 from logs.verdict.rule_words import rule_word
 from planfly.campaigns.campaign_base import CampaignBase, campaign_of_setup
 from planfly.campaigns.dispersions import default_dispersions
 from planfly.campaigns.flight_row import fly_one
 from planfly.campaigns.worker_pool import Workers
-from planfly.rtl.return_summary import return_starts
 from planfly.studio.edit_context import EditContext
 from planfly.studio.worker_process import Advance
 from planfly.workflow.pipeline import fly_and_judge

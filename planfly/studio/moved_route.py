@@ -12,7 +12,6 @@ from flight.mission.items import AMSL, OVER_HOME, OVER_TERRAIN, PLACES, Command,
 from flight.mission.placing import MAX_ALTITUDE_M, MIN_ALTITUDE_M
 from flight.mission.route import Route, fly_over_waypoints
 from planfly.workflow.uav import Uav
-from world.arrays import Floats
 from world.frames import to_map
 from world.scenario import Scenario
 from world.scenario_tables import MAP_EXTENT
@@ -74,7 +73,13 @@ def update_moved_route(
             points["above_ground"][row] = new_item.alt
         points["acceptance_radius"][row] = min(max(0.0, new_item.params[1]), rules.acceptance_limit)
         changed_rows |= {row, *neighbours}
-    if any(_is_near_previous(array, k) for array in (positions, route.positions) for k in changed_rows if k):
+    # Waypoints that are close to each other may be merged.
+    if any(
+        math.dist(array[row - 1, :2], array[row, :2]) < _MERGE_DISTANCE_M
+        for array in (positions, route.positions)
+        for row in changed_rows
+        if row
+    ):
         return None
     must_fly_over = fly_over_waypoints(points, uav.limits, rules.turn_distance)
     points["fly_over"] = np.where(route.arc_radii > 0.0, False, scenario.flight.fly_over | must_fly_over)
@@ -123,8 +128,3 @@ def _map_position(item: MissionItem, mission: Mission, scenario: Scenario) -> tu
         altitude = float(scenario.terrain.height(east, north)) + item.alt
     is_valid = MIN_ALTITUDE_M <= altitude <= MAX_ALTITUDE_M and max(abs(east), abs(north)) <= MAP_EXTENT
     return (east, north, altitude) if is_valid else None
-
-
-def _is_near_previous(points: Floats, row: int) -> bool:
-    """Return True if a waypoint is so close to the previous waypoint that both may be merged."""
-    return math.dist(points[row - 1, :2], points[row, :2]) < _MERGE_DISTANCE_M

@@ -62,10 +62,13 @@ def place_states(requirements: RouteRequirements, findings: Sequence[Finding], *
     threats: set[int] = set()
     zones: set[int] = set()
     for finding in findings:
-        state = finding_state(finding, unjudged=finding.state == "open" or _leaves_terrain(finding))
+        place = finding.place
+        # The height of a leg is unknown where the leg leaves the terrain data.
+        is_unknown = finding.ok is None and finding.planned is None
+        leaves_terrain = is_unknown and finding.rule == "clearance" and place.kind == "leg"
+        state = finding_state(finding, unjudged=finding.state == "open" or leaves_terrain)
         if state is None:
             continue
-        place = finding.place
         if place.kind == "leg" and place.index is not None:
             _set_worse_state(legs, (place.index + shift,), state)
         elif place.kind == "waypoint" and place.index is not None:
@@ -77,13 +80,6 @@ def place_states(requirements: RouteRequirements, findings: Sequence[Finding], *
     for leg, state in _missile_states(requirements).items():
         _set_worse_state(legs, (leg + shift,), state)
     return PlaceStates(legs, corners, frozenset(threats), frozenset(zones))
-
-
-def _leaves_terrain(finding: Finding) -> bool:
-    """Return True if the height of a leg is unknown because the leg leaves the terrain data."""
-    return (
-        finding.rule == "clearance" and finding.place.kind == "leg" and finding.ok is None and finding.planned is None
-    )
 
 
 def _missile_states(requirements: RouteRequirements) -> dict[int, State]:

@@ -10,7 +10,7 @@ from pydantic.dataclasses import dataclass
 from logs.verdict.document import VerdictDocument
 
 if TYPE_CHECKING:
-    from planfly.rtl.return_summary import ReturnSummary
+    from planfly.workflow.pipeline import ReturnSummary
 
 # Configuration of answers for pydantic.
 STRICT = ConfigDict(extra="forbid", use_attribute_docstrings=True, json_schema_serialization_defaults_required=True)

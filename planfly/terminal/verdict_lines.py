@@ -1,15 +1,18 @@
 """Format a verdict, or the verdicts for several autopilots, as lines for a terminal."""
 
 from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING
 
 from flight.simulation.setup import FlightSetup
 from logs.verdict.conditions import flown_lines
 from logs.verdict.presentation import RuleFindings, finding_heading, findings_by_rule
 from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.verdict import Verdict
-from planfly.rtl.return_summary import ReturnSummary
 from planfly.terminal.command_parser import STATE_STYLES, colour_text
 from planfly.workflow.suggestion_trials import has_geometric_suggestion
+
+if TYPE_CHECKING:
+    from planfly.workflow.pipeline import ReturnSummary
 
 # Maximum number of failed findings of a rule that are listed after the worst finding.
 _MAX_LISTED = 6
@@ -26,7 +29,7 @@ def verdict_lines(
     verdict: Verdict,
     notes: Iterable[str],
     setup: FlightSetup | None = None,
-    returns: ReturnSummary | None = None,
+    returns: "ReturnSummary | None" = None,
 ) -> list[str]:
     """Return the lines of a verdict for a terminal.
 

@@ -523,22 +523,17 @@ def make_data_sheet_folder(
     file_parameters = {name: value for name, value in parameter_values.values.items() if not is_overridden.get(name)}
     if sized is None:
         sheet = with_parameters(sheet, file_parameters)
-        _check_required_numbers(sheet)
+        for name in ("mass", "span", "cruise", "stall"):
+            if not getattr(sheet, name):
+                min_value, max_value, unit = RANGES[name][2], RANGES[name][3], RANGES[name][1]
+                allowed = f"missing; a data sheet needs it ({min_value:g}..{max_value:g} {unit})"
+                raise FlightError.of_argument(name, None, allowed, shown="")
         sized = size_aircraft(check_sheet(sheet))
     with temporary_folder("planfly-sheet-") as draft_folder:
         climb_names = " and ".join(_climb_names(parameter_values))
         files = _file_texts(sized, target.name, draft_folder, file_parameters, readme_lines, climb_names)
     write_aircraft_folder(target, {name: text.encode() for name, text in files.items()})
     return read_aircraft(target)
-
-
-def _check_required_numbers(sheet: DataSheet) -> None:
-    """Raise FlightError for a sheet without mass, span, cruise speed or stall speed."""
-    for name in ("mass", "span", "cruise", "stall"):
-        if not getattr(sheet, name):
-            min_value, max_value, unit = RANGES[name][2], RANGES[name][3], RANGES[name][1]
-            allowed = f"missing; a data sheet needs it ({min_value:g}..{max_value:g} {unit})"
-            raise FlightError.of_argument(name, None, allowed, shown="")
 
 
 def _parameter_lines(stated: AircraftParameters, overridden: Sequence[str]) -> list[str]:

@@ -17,9 +17,8 @@ from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from flight.dynamics.envelope_tables import load_envelope
 from flight.dynamics.fdm import Variation
 from flight.mission.commands import Command
-from flight.mission.implied_scenario import implied_scenario
 from flight.mission.items import TAKEOFFS, Frame, Mission
-from flight.mission.placing import PlacedMission, place_stops
+from flight.mission.placing import PlacedMission, implied_scenario, place_stops
 from flight.mission.route import route_through_stops
 from flight.mission_files.formats import read_mission
 from flight.simulation.setup import FlightSetup, ImportedLog, make_limits

@@ -78,20 +78,27 @@ REFLY_FILES = tuple(
 PREDICT_FILES = ("predict.html", "predict.png")
 
 
-def check_output_file(path: Path, overwrite: bool, source: Path | None = None) -> None:
+def check_output_file(
+    path: Path, overwrite: bool, source: Path | None = None, *, suffix: str = "", folder_must_exist: bool = True
+) -> None:
     """Raise PlanflyError if an output file cannot or must not be written.
 
     The path must not be the input file, a folder, or a file in a missing folder; without `overwrite` it must not exist.
 
     source: the input file, or None.
+    suffix: suffix that the file must have, because its format does not depend on its name; "" for any suffix.
+    folder_must_exist: False if the caller makes the folder.
     """
+    if suffix and path.suffix.lower() != suffix:
+        allowed = f"expected a {suffix} file; planfly.export writes other formats"
+        raise PlanflyError(f"{path}: {allowed}", file=path, field="suffix", value=path.suffix, allowed=allowed)
     if source is not None and path.exists() and source.exists() and path.samefile(source):
         raise PlanflyError(f"{path}: is the input file; name another output file", file=path)
     if path.is_dir():
         raise PlanflyError(f"{path}: is a folder; expected a file name", file=path)
     if path.exists() and not overwrite:
         raise PlanflyError(f"{path}: exists; overwrite=True replaces it", file=path)
-    if not path.parent.exists():
+    if folder_must_exist and not path.parent.exists():
         raise PlanflyError(f"{path}: the folder {path.parent} does not exist", file=path)
 
 
@@ -164,24 +171,3 @@ def expand_path_pattern(target: str | Path, name: str, seed: int) -> Path:
     if safe_name != name:
         safe_name += f"-{hashlib.sha256(name.encode(errors='surrogatepass')).hexdigest()[:6]}"
     return Path(str(target).replace("{name}", safe_name).replace("{seed}", str(seed)))
-
-
-def file_target(
-    target: str | Path, name: str, seed: int, *, suffix: str, overwrite: bool, source: Path | None = None
-) -> Path:
-    """Replace the placeholders in the path of an output file; check the path, and return it.
-
-    `check_output_file` checks it.  A path with placeholders in a missing folder is not checked, because the caller
-    makes the folder.  Raises PlanflyError for another suffix.
-
-    name, seed: values of the placeholders {name} and {seed}.
-    suffix: suffix that the file must have, because its format does not depend on its name.
-    source: file from which the output is made, which must not be overwritten.
-    """
-    path = expand_path_pattern(target, name, seed)
-    if path.suffix.lower() != suffix:
-        allowed = f"expected a {suffix} file; planfly.export writes other formats"
-        raise PlanflyError(f"{path}: {allowed}", file=path, field="suffix", value=path.suffix, allowed=allowed)
-    if path.parent.exists() or path == Path(target):
-        check_output_file(path, overwrite, source)
-    return path

@@ -1,4 +1,4 @@
-"""Plan, fly, record and judge a mission, with one function for each stage."""
+"""Plan, fly, record and judge a mission and returns from it, with one function for each stage."""
 
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
@@ -15,11 +15,14 @@ from flight.simulation.track import Track, TrackBuilder, join_tracks
 from logs.recording.reader import LogEvent
 from logs.recording.recorder import Recorder, thin_track
 from logs.verdict.judge_flight import judge_flight, judge_plan_only
-from logs.verdict.measures.energy import check_energy
-from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
+from logs.verdict.measures.route_requirements import RouteRequirements, check_energy, route_requirements
 from logs.verdict.places import ReferenceFlights
+from logs.verdict.returns.drawn_returns import DrawnReturns, drawn_returns, drawn_returns_without_glides
+from logs.verdict.returns.judge_glides import judge_glides
+from logs.verdict.returns.judge_returns import Returns, ReturnWorld, judge_returns, make_return_world
+from logs.verdict.returns.return_starts import ReturnStarts, return_starts
+from logs.verdict.returns.returns_text import headline
 from logs.verdict.verdict import Verdict
-from planfly.rtl.return_summary import ReturnSummary, return_summary
 from planfly.workflow.flight_limits import FlightLimits
 from planfly.workflow.make_plan import Advance, make_plan, planning_conditions
 from planfly.workflow.mission_context import JudgedMission
@@ -28,11 +31,13 @@ from planfly.workflow.reference_flights import FlyReference, explain_verdict
 from planfly.workflow.suggestion_trials import with_tried_suggestions
 from planfly.workflow.uav import choose_seed, load_uav
 from planner.plan import Plan
-from world.errors import FlightError, StartError
+from world.errors import FlightError, PlanflyError, StartError
 from world.scenario import Scenario
 
 # Flight time whose rows are written at once, s; its simulation takes about 30 ms.
 BATCH_S = 60
+# Number of returns in a flight's summary of returns and in its pictures.
+_SUMMARY_RETURN_COUNT = 50
 # Limits of a flight unless others are given.
 _DEFAULT_LIMITS = FlightLimits()
 
@@ -75,6 +80,41 @@ class OffNominal:
 
     variation: Variation
     start_offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class ReturnSummary:
+    """Returns from a few points of a flight, simulated only with a point mass, to accompany its verdict.
+
+    line: summary of all returns in a line; "" if no return can be judged.
+    world, starts, returns: data of the returns; None if no return is judged.
+    """
+
+    line: str = ""
+    world: ReturnWorld | None = None
+    starts: ReturnStarts | None = None
+    returns: Returns | None = None
+
+    @property
+    def has_failures(self) -> bool:
+        """True if a return is unsafe."""
+        returns = self.returns
+        return returns is not None and bool(returns.each) and not (returns.safe or returns.undecided)
+
+    def data_for_pictures(self) -> DrawnReturns | None:
+        """Return the data for pictures of returns and glides, or None without judged returns.
+
+        The computation of the glides takes a few seconds.
+        """
+        if self.world is None or self.starts is None or self.returns is None or not self.returns.each:
+            return None
+        return drawn_returns(self.world, self.starts, self.returns, judge_glides(self.world, self.starts))
+
+    def drawn_returns_without_glides(self) -> DrawnReturns | None:
+        """Return the data for pictures of returns without glides, or None without judged returns."""
+        if self.world is None or self.starts is None or self.returns is None or not self.returns.each:
+            return None
+        return drawn_returns_without_glides(self.world, self.starts, self.returns)
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -180,9 +220,9 @@ def fly_and_judge(
     findings_only: True for a verdict with only its findings and answer, see `logs.verdict.judge_flight.judge_flight`.
     limits: limits of the flight time and of the size of the log.
 
-    If the flight cannot start, or `logs.verdict.measures.energy.check_energy` refuses it, the result has no row and no
-    log; its verdict covers the route and says that the flight did not start.  Raises FlightError if the catalog does
-    not contain the setup's aircraft, or if a program does not fly the mission to its end; then no log is left.
+    If the flight cannot start, or `check_energy` refuses it, the result has no row and no log; its verdict covers the
+    route and says that the flight did not start.  Raises FlightError if the catalog does not contain the setup's
+    aircraft, or if a program does not fly the mission to its end; then no log is left.
     """
     aircraft = find_logged_aircraft(setup.aircraft, setup.scenario.flight.aircraft)
     task = _FlightTask(aircraft, log, advance, every, limits, reference, returns=returns, findings_only=findings_only)
@@ -310,3 +350,29 @@ def _judge_unflown(
     if reference != "never":
         verdict = with_tried_suggestions(JudgedMission(setup.mission, setup, requirements, verdict))
     return FlownMission(setup, track, verdict, end_reason)
+
+
+def return_summary(
+    setup: FlightSetup, track: Track | None, requirements: RouteRequirements | None = None
+) -> ReturnSummary:
+    """Judge returns from a few points of a flight or planned path.
+
+    The summary is empty without home or terrain.
+
+    requirements: the setup's route requirements if already known.
+    """
+    if setup.mission.home is None or setup.scenario.terrain is None:
+        return ReturnSummary()
+    try:
+        world = make_return_world(setup)
+        duration = setup.path.length / max(1.0, setup.airspeed)
+        if track is not None and len(track):
+            duration = float(track.time[-1] - track.time[0])
+        interval = max(1.0, duration / _SUMMARY_RETURN_COUNT)
+        starts = return_starts(setup, track, interval, requirements)
+        returns = judge_returns(world, starts, interval)
+    except PlanflyError as error:
+        return ReturnSummary(f"not judged: {error}")
+    is_replaced = world.stands_in and not world.uses_other_autopilot
+    replacement_text = f" (simulated with ArduPlane in place of {setup.autopilot.title})" if is_replaced else ""
+    return ReturnSummary(headline(returns) + replacement_text, world, starts, returns)

@@ -10,8 +10,7 @@ from flight.simulation.simulate import BLOCK_DURATION_S, Flight
 from flight.simulation.track import Track, TrackBuilder, join_tracks
 from logs.verdict.judge_flight import judge_flight
 from logs.verdict.judge_geometry import judge_geometry
-from logs.verdict.measures.energy import check_energy
-from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
+from logs.verdict.measures.route_requirements import RouteRequirements, check_energy, route_requirements
 from logs.verdict.verdict import Verdict
 from planfly.workflow.flight_limits import predicted_seconds
 from world.errors import StartError

@@ -45,7 +45,7 @@ STAGES = (
     "flight.mission.route:route_through_stops",
     "planfly.workflow.open_flight:make_setup",
     "flight.guidance.path:fly_by_path",
-    "flight.simulation.local_map:LocalMap.around",
+    "flight.simulation.simulate:LocalMap.around",
     "flight.simulation.simulate:Flight.__init__",
     "logs.verdict.judge_flight:judge_flight",
     "logs.verdict.judge_flight:judge_geometry",

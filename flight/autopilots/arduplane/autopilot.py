@@ -1,10 +1,10 @@
 """ArduPlane's control law as an autopilot, with its parameters."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, ClassVar, Literal, Self
+from typing import ClassVar, Literal, Self
 
 from aircraft.catalog import Aircraft
 from aircraft.contacts import Contact
@@ -30,6 +30,7 @@ from flight.autopilots.arduplane.parameters import (
     ArduPilotParameters,
 )
 from flight.autopilots.arduplane.releases import choose_release, release_difference_note, simulated_release
+from flight.autopilots.arduplane.rtl_point_mass import fly_returns
 from flight.autopilots.arduplane.tracking_error import tracking_error
 from flight.autopilots.autopilot import Autopilot, Origin, StoredAutopilot, StoredParameters
 from flight.autopilots.gust_height import updraft_altitude_gain
@@ -55,14 +56,10 @@ from flight.mission.ground_phases import GroundPhases
 from flight.mission.items import LANDINGS, Command
 from flight.mission.itinerary import Loiter
 from flight.mission.loiter_circles import LoiterRules
-from flight.mission.return_path import LandingStart, ReturnCircle, ReturnRules, ReturnTarget
+from flight.mission.return_path import ReturnRules
 from world.arrays import Floats
-from world.kernels import Record, Records
+from world.kernels import Record
 from world.scenario_tables import ArduPlaneVersion, FlightTable
-
-if TYPE_CHECKING:
-    from flight.autopilots.point_mass import PointMass
-    from flight.autopilots.simulated_returns import ReturnEnvironment, SimulatedReturns
 
 # Fields of `flight.autopilots.arduplane.law.ARDUPILOT_MEMORY` that belong to the current leg or mission, not to the
 # aircraft.
@@ -324,7 +321,7 @@ class ArduPlane(Autopilot):
             self._return_rules,
             self._rtl_parameters,
             after_link_loss=partial(link_loss_reactions, parameters),
-            fly=self._fly_returns,
+            fly=partial(fly_returns, parameters),
             flies_without_engine=True,
             # A landing sequence begins with DO_LAND_START; a mission with a landing item ends on the ground.
             causes=lambda mission: failsafe_causes(
@@ -337,46 +334,6 @@ class ArduPlane(Autopilot):
             unsimulated_text=lambda mission: "terrain" if parameters.rtl_follows_terrain else "",
             unjudged_texts=self._unjudged_return_texts,
             trials=ReturnTrials((altitude,), (*climbs, {"FLIGHT_OPTIONS": options}), "RTL_ALTITUDE, climb"),
-        )
-
-    def _fly_returns(
-        self,
-        starts: Records,
-        targets: Sequence[ReturnTarget],
-        aircraft: "PointMass",
-        environment: "ReturnEnvironment",
-        *,
-        store_positions: bool = False,
-        abort_limits: tuple[Floats, Floats] | None = None,
-        engine_out: bool = False,
-    ) -> "SimulatedReturns":
-        """Simulate the RTL from each of n starts to its target.
-
-        starts: positions, velocities, banks and times of the starts, `RETURN_START` records (n,).
-        targets: target of each RTL (n).
-        aircraft: point mass of the aircraft in the wind.
-        environment: terrain and kill spheres from which the clearances are measured.
-        store_positions: True to store the flown positions.
-        abort_limits: heights above ground, (n,), and distances outside spheres, (n,), m, below which an RTL is aborted.
-        engine_out: True after an engine failure: the aircraft glides.
-        """
-        # Imported here: only simulated RTLs need the trims of JSBSim.
-        from flight.autopilots.arduplane.rtl_point_mass import fly_returns
-
-        radius = self._return_rules.radius
-        return fly_returns(
-            starts,
-            [
-                None if target.straight else ReturnCircle(*target.position, radius, target.slope_base)
-                for target in targets
-            ],
-            self.parameters,
-            aircraft,
-            environment,
-            landings=[_simulated_landing(target, engine_out=engine_out) for target in targets],
-            store_positions=store_positions,
-            abort_limits=abort_limits,
-            engine_out=engine_out,
         )
 
     def _unjudged_return_texts(self, mission: ReturnMission) -> tuple[str, ...]:
@@ -677,21 +634,6 @@ def read_loiter_radius(loiter: Loiter) -> float:
         # ArduPlane stores a larger radius in steps of 10 m.
         stated_radius = 10.0 * min(_MAX_BYTE_RADIUS_M, math.floor(stated_radius / 10.0))
     return stated_radius if stated_radius > _MAX_IGNORED_RADIUS_M else 0.0
-
-
-def _simulated_landing(target: ReturnTarget, *, engine_out: bool) -> LandingStart | None:
-    """Return the landing sequence that a simulated RTL flies to; None if the RTL has none.
-
-    The RTL joins the sequence after its loiter, or flies straight to it. The landing itself is not simulated, so an RTL
-    whose sequence begins with the landing ends at its loiter. After an engine failure, an RTL ends at its loiter or at
-    the start of the sequence.
-
-    engine_out: True after an engine failure.
-    """
-    landing = target.landing
-    if engine_out:
-        return landing._replace(next_stops=()) if landing and target.straight else None
-    return landing if landing and not landing.is_landing else None
 
 
 def _radius_growth(amsl: float) -> float:

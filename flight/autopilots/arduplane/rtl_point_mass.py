@@ -61,7 +61,7 @@ from flight.dynamics.state import STATE
 from flight.guidance.equivalent_airspeed import eas_to_tas_ratio
 from flight.guidance.lateral_reference_laws import WAYPOINT
 from flight.guidance.navigation_error import MOTION
-from flight.mission.return_path import LandingStart, ReturnCircle
+from flight.mission.return_path import LandingStart, ReturnTarget
 from flight.simulation.tick import RTL_ARRIVAL_LOITER_RADII
 from world.arrays import Floats, Heights
 from world.frames import PolyMapRecord
@@ -86,22 +86,22 @@ STORED_EVERY_TICKS = 10
 
 
 def fly_returns(
-    starts: Records,
-    targets: Sequence[ReturnCircle | None],
     parameters: ArduPilotParameters,
+    starts: Records,
+    targets: Sequence[ReturnTarget],
     aircraft: PointMass,
     environment: ReturnEnvironment,
     *,
-    landings: Sequence[LandingStart | None] = (),
     store_positions: bool = False,
     abort_limits: tuple[Floats, Floats] | None = None,
     engine_out: bool = False,
 ) -> SimulatedReturns:
-    """Simulate an RTL from each of n starts.
+    """Simulate the RTL from each of n starts to its target.
 
     starts: (n,) of `flight.autopilots.simulated_returns.RETURN_START`.
-    targets: n loiters, the target of each start; None to go straight to the landing sequence.
-    landings: n landing sequences to join after the loiter, up to their end or first loiter, or None; or no sequences.
+    targets: n targets; the RTL continues to the landing sequence of its target up to its end or first loiter.
+    aircraft: point mass of the aircraft in the wind.
+    environment: terrain and kill spheres from which the clearances are measured.
     store_positions: True to store the positions.
     abort_limits: heights above ground, (n,), and distances outside spheres, (n,), m, below which an RTL is aborted.
     engine_out: True after an engine failure: the aircraft flies on for `ENGINE_FAILURE_REACTION_S`, and the RTL ends at
@@ -118,19 +118,16 @@ def fly_returns(
     >>> start = np.zeros(1, RETURN_START)
     >>> start["up"], start["velocity_north"] = 1000.0, 26.0
     >>> result = fly_returns(
+    ...     ArduPilotParameters.load(aerosonde).changed(RTL_RADIUS=120.0),
     ...     start,
-    ...     [ReturnCircle(0.0, 4000.0, 900.0, 120.0)],
-    ...     ArduPilotParameters.load(aerosonde),
+    ...     [ReturnTarget((0.0, 4000.0, 900.0), "home", "", 4000.0)],
     ...     make_point_mass(aerosonde, load_envelope(aerosonde), 25.0, Wind()),
     ...     make_return_environment(scenario),
     ... ).results[0]
     >>> int(result["outcome"]) == RETURN_ARRIVED, bool(140.0 < result["arrival_time"] < 160.0)
     (True, True)
     """
-    stages = [
-        _make_stages(target, landing, parameters, aircraft)
-        for target, landing in zip(targets, landings or [None] * len(targets), strict=True)
-    ]
+    stages = [_make_stages(target, parameters, aircraft, engine_out) for target in targets]
     if engine_out:
         stages = [np.concatenate([waypoint_ahead(start), route]) for start, route in zip(starts, stages, strict=True)]
     timeouts = [rtl_timeout(start, route, aircraft) for start, route in zip(starts, stages, strict=True)]
@@ -163,30 +160,31 @@ def fly_returns(
 
 
 def _make_stages(
-    target: ReturnCircle | None, landing: LandingStart | None, parameters: ArduPilotParameters, aircraft: PointMass
+    target: ReturnTarget, parameters: ArduPilotParameters, aircraft: PointMass, engine_out: bool
 ) -> Records:
     """Return the successive targets of an RTL, as n `WAYPOINT` records.
 
-    `WAYPOINT` is defined in `flight.guidance.lateral_reference_laws`. The first target is the RTL loiter, if there is
-    one. The other targets are the stops of the landing sequence, up to its first loiter.
+    `WAYPOINT` is defined in `flight.guidance.lateral_reference_laws`. The first target is the RTL loiter, unless the
+    RTL flies straight to a landing sequence. The other targets are the stops of the sequence, up to its first loiter.
+    The landing itself is not simulated, so an RTL whose sequence begins with the landing ends at its loiter. After an
+    engine failure, an RTL ends at its loiter or at the start of the sequence.
     """
-    stops = truncate_at_first_loiter(() if landing is None else (landing, *landing.next_stops))
-    stages: Records = np.zeros((target is not None) + len(stops), WAYPOINT)
+    stops: Sequence[LandingStart] = ()
+    if target.landing is not None and engine_out:
+        stops = (target.landing,) if target.straight else ()
+    elif target.landing is not None and not target.landing.is_landing:
+        stops = truncate_at_first_loiter((target.landing, *target.landing.next_stops))
+    stages: Records = np.zeros((not target.straight) + len(stops), WAYPOINT)
     stages["airspeed"], stages["min_ground_speed"] = aircraft.record.airspeed, parameters.ground_speed_min
-    if target is not None:
+    if not target.straight:
         first_stage = stages[0]
-        (
-            first_stage.centre_east,
-            first_stage.centre_north,
-            first_stage.up,
-            first_stage.loiter_radius,
-            first_stage.slope_base,
-        ) = target
-        first_stage.east, first_stage.north, first_stage.is_rtl = target.east, target.north, True
+        first_stage.centre_east, first_stage.centre_north, first_stage.up = target.position
+        first_stage.loiter_radius, first_stage.slope_base = parameters.return_radius, target.slope_base
+        first_stage.east, first_stage.north, first_stage.is_rtl = *target.position[:2], True
     for stage, stop in zip(stages[len(stages) - len(stops) :], stops, strict=True):
         fill_stage(stage, stop, parameters)
         # The first leg of an RTL to a landing sequence follows no line, as after any mode change.
-        stage.without_crosstrack = stop is landing
+        stage.without_crosstrack = stop is target.landing
     return stages
 
 

@@ -1,11 +1,11 @@
 """Define the simulated PX4 for fixed wing as an autopilot, with its parameters."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar, NamedTuple, Self, get_args
+from typing import ClassVar, NamedTuple, Self, get_args
 
 import numpy as np
 
@@ -43,21 +43,18 @@ from flight.autopilots.px4.parameters import (
     SIDE_CANDIDATES,
     Px4Parameters,
 )
+from flight.autopilots.px4.rtl_point_mass import fly_returns
 from flight.autopilots.px4.tracking_error import altitude_miss_probability, tracking_error
 from flight.guidance.equivalent_airspeed import eas_to_tas_ratio
 from flight.mission.items import LANDINGS, Command
 from flight.mission.loiter_circles import LoiterRules
-from flight.mission.return_path import ReturnRules, ReturnTarget
+from flight.mission.return_path import ReturnRules
 from world.arrays import Floats
 from world.errors import ParameterError
 from world.files import read_small_file, utf8_text
-from world.kernels import Record, Records
+from world.kernels import Record
 from world.scenario_tables import NEWEST_PX4, FlightTable, Navigation, Px4Version
 from world.wind import Turbulence
-
-if TYPE_CHECKING:
-    from flight.autopilots.point_mass import PointMass
-    from flight.autopilots.simulated_returns import ReturnEnvironment, SimulatedReturns
 
 _VERSIONS: tuple[Px4Version, ...] = get_args(Px4Version)
 
@@ -466,7 +463,7 @@ class Px4(Autopilot):
             self._return_rules,
             lambda settings: {} if settings.altitude is None else {"RTL_RETURN_ALT": settings.altitude},
             after_link_loss=partial(link_loss_reactions, self.parameters),
-            fly=self._fly_returns,
+            fly=partial(fly_returns, parameters),
             causes=lambda mission: failsafe_causes(parameters, has_fence=mission.has_fence),
             unsimulated_text=self._unsimulated_returns,
             unjudged_texts=self._unjudged_returns,
@@ -476,42 +473,6 @@ class Px4(Autopilot):
                 tuple({"RTL_TYPE": value} for value in other_types),
                 "RTL_RETURN_ALT, RTL_DESCEND_ALT, RTL_TYPE",
             ),
-        )
-
-    def _fly_returns(
-        self,
-        starts: Records,
-        targets: Sequence[ReturnTarget],
-        aircraft: "PointMass",
-        environment: "ReturnEnvironment",
-        *,
-        store_positions: bool = False,
-        abort_limits: tuple[Floats, Floats] | None = None,
-        engine_out: bool = False,
-    ) -> "SimulatedReturns":
-        """Simulate the RTL from each of n starts to its target.
-
-        starts: positions, velocities, banks and times of the starts, `RETURN_START` records (n,).
-        targets: target of each RTL (n).
-        aircraft: point mass of the aircraft in the wind.
-        environment: terrain and kill spheres from which the clearances are measured.
-        store_positions: True to store the flown positions.
-        abort_limits: heights above ground, (n,), and distances outside spheres, (n,), m, below which an RTL is aborted.
-        engine_out: True after an engine failure, which is not simulated: raises ValueError.
-        """
-        # Imported here: only simulated RTLs need the trims of JSBSim.
-        from flight.autopilots.px4.rtl_point_mass import fly_returns
-
-        if engine_out:
-            raise ValueError("PX4's RTL without an engine is not simulated")
-        return fly_returns(
-            starts,
-            targets,
-            self.parameters,
-            aircraft,
-            environment,
-            store_positions=store_positions,
-            abort_limits=abort_limits,
         )
 
     def _unsimulated_returns(self, mission: ReturnMission) -> str:

@@ -60,14 +60,15 @@ _STORED_EVERY_TICKS = 10
 
 
 def fly_returns(
+    parameters: Px4Parameters,
     starts: Records,
     targets: Sequence[ReturnTarget],
-    parameters: Px4Parameters,
     aircraft: PointMass,
     environment: ReturnEnvironment,
     *,
     store_positions: bool = False,
     abort_limits: tuple[Floats, Floats] | None = None,
+    engine_out: bool = False,
 ) -> SimulatedReturns:
     """Simulate the RTL from each of n starts to its target, at FW_AIRSPD_TRIM.
 
@@ -85,15 +86,17 @@ def fly_returns(
     >>> start = np.zeros(1, RETURN_START)
     >>> start["up"], start["velocity_north"] = 1000.0, 26.0
     >>> result = fly_returns(
+    ...     Px4Parameters.load(aerosonde),
     ...     start,
     ...     [ReturnTarget((0.0, 4000.0, 900.0), "home", "", 4000.0, transit_altitude=1000.0)],
-    ...     Px4Parameters.load(aerosonde),
     ...     make_point_mass(aerosonde, load_envelope(aerosonde), 25.0, Wind()),
     ...     make_return_environment(scenario),
     ... ).results[0]
     >>> int(result["outcome"]) == RETURN_ARRIVED, bool(140.0 < result["arrival_time"] < 160.0)
     (True, True)
     """
+    if engine_out:
+        raise ValueError("PX4's RTL without an engine is not simulated")
     routes = [_make_route(start, target, parameters) for start, target in zip(starts, targets, strict=True)]
     timeouts = [
         _rtl_timeout(start, target, parameters, aircraft) for start, target in zip(starts, targets, strict=True)

@@ -31,9 +31,8 @@ from flight.guidance.gains import load_gains
 from flight.guidance.path import profile_at, project
 from flight.mission.ground_phases import TakeOff
 from flight.mission.itinerary import ENDLESS_LOITER_TIME_S
-from flight.simulation.local_map import Ground
 from flight.simulation.setup import FlightSetup
-from flight.simulation.simulate import GROUND_TIME_ALLOWANCE_S, Release, default_gear, find_release, release
+from flight.simulation.simulate import GROUND_TIME_ALLOWANCE_S, Ground, Release, default_gear, find_release, release
 from flight.simulation.tick import (
     NOT_A_NUMBER,
     PATH_ROW,

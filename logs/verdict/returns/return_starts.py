@@ -11,12 +11,13 @@ from aircraft.envelope import GRAVITY, ground_speed
 from flight.autopilots.simulated_returns import RETURN_START
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import ROLL, Track
-from logs.verdict.measures.energy import leg_energies, predicted_energy
 from logs.verdict.measures.ground_paths import first_landing_leg, landing_item, takeoff_item
 from logs.verdict.measures.path_moves import path_moves
 from logs.verdict.measures.route_requirements import (
     RouteRequirements,
     find_leg_winds,
+    leg_energies,
+    predicted_energy,
     route_requirements,
     true_airspeed_route,
 )
@@ -70,6 +71,19 @@ class ReturnStarts:
         arrays = (self.time[indices], self.rows[indices], self.energy_used[indices])
         masks = (self.is_ground_phase[indices], self.is_low[indices])
         return ReturnStarts(*arrays, self.is_flown, *masks, self.height_loss[indices], self.grounded_count)
+
+
+def return_starts(
+    setup: FlightSetup, track: Track | None, interval: float, requirements: RouteRequirements | None = None
+) -> ReturnStarts:
+    """Return the states from which returns start, on the flown track, or on the planned path without a flight.
+
+    interval: time between two returns, s.
+    requirements: the setup's route requirements if already known.
+    """
+    if track is not None and len(track):
+        return flown_starts(setup, track, interval)
+    return planned_starts(setup, interval, requirements)
 
 
 def flown_starts(setup: FlightSetup, track: Track, interval: float) -> ReturnStarts:

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 from flight.autopilots.parts import Cause, FailsafeAction
 from flight.mission.return_path import ReturnPoint
+from flight.simulation.setup import FlightSetup
 from logs.verdict.returns.judge_returns import (
     KINDS,
     POINT_MASS_ERROR_M,
@@ -15,6 +16,7 @@ from logs.verdict.returns.judge_returns import (
     ReturnRange,
     Returns,
     SimulatedReturn,
+    make_return_world,
 )
 from logs.verdict.returns.suggest_returns import Remedy
 from logs.verdict.tolerances import CLEARANCE_TOLERANCE_M
@@ -96,6 +98,23 @@ def unjudged_parts_text(parts: Sequence[str]) -> str:
     'mode AUTOLAND lands by a pattern of its own; RTL_LAND_DELAY 0 lands after the return, which is not simulated'
     """
     return "; ".join(UNJUDGED_PART_TEXTS.get(part, part) for part in parts)
+
+
+def return_law_lines(setup: FlightSetup) -> list[str]:
+    """Return lines on the autopilot whose returns are simulated, their path, and their unjudged parts.
+
+    Return [] for a mission without a home.
+    """
+    if setup.mission.home is None:
+        return []
+    world = make_return_world(setup)
+    behaviour, unjudged = world.autopilot.returns, world.unjudged_parts
+    lines = [f"returns to launch are simulated with a point-mass model under {world.autopilot.title}'s control laws"]
+    lines += [behaviour.path_text] if behaviour.path_text else []
+    if unjudged:
+        extent = "in full" if world.is_simulated else "at all"
+        lines.append(f"the returns are not judged {extent}: {unjudged_parts_text(unjudged)}")
+    return lines
 
 
 def segment_text(kind: Kind) -> str:

@@ -239,7 +239,14 @@ def _take_off_climb(
     start: east and north of home, m.
     altitudes: altitudes of the ground at home and of the end of the take-off, m AMSL.
     """
-    profile = _takeoff_profile(*altitudes, launch.leg_length, launch.slope, slope)
+    # A straight climb until the aircraft is on the first leg.
+    ground, leg_start = altitudes
+    climb_distance = (leg_start - ground) / slope
+    if climb_distance < launch.leg_length:
+        slope_difference = slope - launch.slope
+        joining_distance = (leg_start - ground) / slope_difference if slope_difference > 0.0 else math.inf
+        climb_distance = min(launch.leg_length, max(climb_distance, joining_distance))
+    profile = [(0.0, ground), (climb_distance, ground + slope * climb_distance)]
     obstacles = _find_obstacles(requirements, straight_path(start, launch.course, profile))
     return _Climb(slope, profile[-1][0], obstacles)
 
@@ -259,26 +266,6 @@ def _climb_profile(ground_altitude: float, waypoint_altitude: float, distance: f
     if climb_distance >= distance:
         return [(0.0, ground_altitude), (distance, ground_altitude + climb_slope * distance)]
     return [(0.0, ground_altitude), (climb_distance, top_altitude), (distance, waypoint_altitude)]
-
-
-def _takeoff_profile(
-    ground_altitude: float, leg_altitude: float, leg_length: float, leg_slope: float, climb_slope: float
-) -> Profile:
-    """Return the profile of a straight climb from the ground until the aircraft is on the first leg.
-
-    The profile is a list of pairs: horizontal distance from home (m) and altitude (m AMSL).
-
-    ground_altitude: altitude of the ground, m AMSL.
-    leg_altitude: altitude of the leg's start over home, to which the take-off climbs, m AMSL.
-    leg_length: length of the leg, m.
-    leg_slope, climb_slope: slopes of leg and climb, m per m.
-    """
-    climb_distance = (leg_altitude - ground_altitude) / climb_slope
-    if climb_distance < leg_length:
-        slope_difference = climb_slope - leg_slope
-        joining_distance = (leg_altitude - ground_altitude) / slope_difference if slope_difference > 0.0 else math.inf
-        climb_distance = min(leg_length, max(climb_distance, joining_distance))
-    return [(0.0, ground_altitude), (climb_distance, ground_altitude + climb_slope * climb_distance)]
 
 
 def _find_obstacles(requirements: RouteRequirements, path: GroundPath) -> _Obstacles:

@@ -18,9 +18,13 @@ from logs.verdict.findings import (
     make_finding,
     message,
 )
-from logs.verdict.measures.energy import leg_energies, predicted_energy
 from logs.verdict.measures.return_time import longest_return_time, remaining_time
-from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
+from logs.verdict.measures.route_requirements import (
+    RouteRequirements,
+    leg_energies,
+    predicted_energy,
+    route_requirements,
+)
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
 from logs.verdict.rule import LogNeeds, Rule

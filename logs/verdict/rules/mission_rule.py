@@ -21,6 +21,7 @@ from aircraft.catalog import find_logged_aircraft
 from flight.autopilots.parts import FeasibilityLimits, MissionParts
 from flight.mission.commands import SKIPPED_REASON, Treatment, command_support
 from flight.mission.fences import fence_problem
+from flight.mission.ground_phases import landing_slopes
 from flight.mission.items import (
     FENCES,
     LANDINGS,
@@ -36,7 +37,6 @@ from flight.mission.items import (
     is_navigation,
 )
 from flight.mission.itinerary import make_itinerary
-from flight.mission.preflight_notes import landing_slopes
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import NOT_FLOWN, Finding, Message, make_finding, message
 from logs.verdict.measures.mission_ends import judges_return_after_last_item, missing_ends_text

@@ -163,7 +163,11 @@ def px4_log_bytes(log: FlightLog) -> bytes:
     topics = [topic for topic in _make_topics(log, np.flatnonzero(is_finite)) if len(topic.values["timestamp"])]
     head = bytearray(_MAGIC + struct.pack("<Q", 0) + _encode_message(b"B", bytes(_FLAG_BITS_SIZE_BYTES)))
     for topic in topics:
-        head += _encode_message(b"F", f"{topic.name}:{_describe_format(topic)}".encode())
+        fields = "".join(
+            f"{_TYPES[kind]}{f'[{shape[0]}]' if shape else ''} {name};"
+            for name, kind, *shape in [("timestamp", "<u8"), *topic.fields]
+        )
+        head += _encode_message(b"F", f"{topic.name}:{fields}".encode())
     for key, value in (("sys_name", "planfly"), ("ver_hw", "SITL"), ("sys_uuid", "planfly")):
         name = f"char[{len(value)}] {key}".encode()
         head += _encode_message(b"I", bytes([len(name)]) + name + value.encode())
@@ -191,14 +195,6 @@ def px4_log_bytes(log: FlightLog) -> bytes:
 def _encode_message(letter: bytes, body: bytes) -> bytes:
     """Encode one message of a ULog file: its length, the letter of its kind, and its content."""
     return struct.pack("<H", len(body)) + letter + body
-
-
-def _describe_format(topic: _Topic) -> str:
-    """Return the format of a topic's fields in ULog syntax."""
-    return "".join(
-        f"{_TYPES[kind]}{f'[{shape[0]}]' if shape else ''} {name};"
-        for name, kind, *shape in [("timestamp", "<u8"), *topic.fields]
-    )
 
 
 def _encode_topic(number: int, topic: _Topic) -> tuple[list[int], list[bytes]]:

@@ -27,7 +27,7 @@ from flight.live.telemetry import (
     telemetry_message,
 )
 from flight.mission.items import Home
-from flight.simulation.local_map import LocalMap
+from flight.simulation.simulate import LocalMap
 from flight.simulation.track import track_rows
 from logs.recording.reader import FlightLog
 from logs.recording.state_channel import EPOCH_NS

@@ -13,7 +13,7 @@ from flight.autopilots.px4.autopilot import Px4
 from flight.autopilots.px4.parameters import Px4Parameters
 from flight.autopilots.simulated_returns import RETURN_ARRIVED, RETURN_TIMEOUT
 from flight.guidance.equivalent_airspeed import eas_to_tas_ratio
-from flight.mission.return_path import LandingStart, ReturnCircle, ReturnTarget
+from flight.mission.return_path import LandingStart, ReturnTarget
 from tests.flight.autopilots.arduplane.test_rtl_point_mass import flat, parameters, start, uav
 from world.arrays import Floats
 from world.forecast.wind_field import MeanProfile, WindField, subtract_profile
@@ -32,6 +32,8 @@ GEO_MAP = fit_polymap(
 )
 # Altitude of a level return, m AMSL.
 UP_M = 300.0
+# Target of a return.
+HOME = ReturnTarget((0.0, 0.0, UP_M), "home", "", 0.0)
 # Distance from the target at which a return starts, m.
 DISTANCE_M = 6000.0
 # Distance from its target at which it has arrived, m.
@@ -74,8 +76,7 @@ def true_airspeed() -> float:
 
 
 def fly_arduplane(begin: Record, aircraft: PointMass) -> Record:
-    circle = ReturnCircle(0.0, 0.0, UP_M, 120.0)
-    return fly_returns(begin, [circle], parameters(), aircraft, flat()).results[0]
+    return fly_returns(parameters(RTL_RADIUS=120.0), begin, [HOME], aircraft, flat()).results[0]
 
 
 def fly_px4(begin: Record, aircraft: PointMass) -> Record:
@@ -138,9 +139,9 @@ def test_a_field_of_no_deviation_changes_nothing() -> None:
     stated = Wind(9.0, uniform.from_course, reference_amsl=UP_M)
     begin = start(east=3000.0, north=800.0, up=UP_M + 60.0, velocity_east=20.0, velocity_north=12.0)
     ways = [
-        fly_returns(
-            begin, [ReturnCircle(0.0, 0.0, UP_M, 120.0)], parameters(), aerosonde(wind), flat(), store_positions=True
-        ).tracks[0]
+        fly_returns(parameters(RTL_RADIUS=120.0), begin, [HOME], aerosonde(wind), flat(), store_positions=True).tracks[
+            0
+        ]
         for wind in (uniform, stated)
     ]
     assert len(ways[0]) == len(ways[1])

@@ -25,8 +25,8 @@ from flight.live.flight_process import (
 )
 from flight.live.telemetry import AUTO, RTL, Snapshot
 from flight.mission.items import Mission
-from flight.simulation.local_map import LocalMap
 from flight.simulation.setup import FlightSetup
+from flight.simulation.simulate import LocalMap
 from flight.simulation.track import Track
 from tests.mission_lines import setup_of, wp
 from world.errors import FlightError

@@ -20,7 +20,7 @@ from flight.live.telemetry import (
     telemetry_message,
 )
 from flight.mission.items import Home
-from flight.simulation.local_map import LocalMap
+from flight.simulation.simulate import LocalMap
 from flight.simulation.track import Track, track_rows
 from tests.mission_lines import setup_of, wp
 

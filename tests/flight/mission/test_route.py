@@ -12,8 +12,8 @@ import pytest
 from aircraft.catalog import load_aircraft
 from aircraft.path_limits import Limits
 from flight.dynamics.envelope_tables import load_envelope
-from flight.mission.implied_scenario import implied_scenario
 from flight.mission.itinerary import NO_ITEM
+from flight.mission.placing import implied_scenario
 from flight.mission.return_path import ReturnCircle
 from flight.mission.route import (
     END_LEG_LENGTH_M,

@@ -12,8 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from flight.mission.items import Command, Frame, Home, Mission, MissionItem, is_located, round_to_grid
-from flight.mission_files.formats import mission_text, parse_mission, read_mission
-from flight.mission_files.wpl import fence_text, rally_text
+from flight.mission_files.formats import fence_text, mission_text, parse_mission, rally_text, read_mission
 from tests.soak import scaled
 
 SAMPLES = Path(__file__).parents[1] / "missions"

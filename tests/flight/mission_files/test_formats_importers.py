@@ -11,8 +11,7 @@ from typing import Any
 import pytest
 
 from flight.mission.items import MissionItem
-from flight.mission_files.formats import mission_text, parse_mission
-from flight.mission_files.wpl import fence_text
+from flight.mission_files.formats import fence_text, mission_text, parse_mission
 from tests.flight.mission_files.worldwide_mission import some_mission
 
 IMPORTERS = Path(__file__).parents[2] / "clients" / "mavsdk_import.py"

@@ -127,6 +127,15 @@ def test_a_law_of_guidance_and_a_real_autopilot_exclude_each_other(
     assert 'guidance: not allowed with autopilot = "ardupilot"' in capsys.readouterr().err
 
 
+def test_the_folder_of_the_default_log_may_be_missing(
+    mission: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The program is started, and its own failure reported."""
+    monkeypatch.chdir(tmp_path)
+    assert main(["fly", str(mission), "--sitl", str(write_fake(tmp_path, "panic"))]) == 2
+    assert "panicked: Failed to load defaults" in capsys.readouterr().err
+
+
 def test_the_autopilots_log_is_not_written_over_another(
     mission: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

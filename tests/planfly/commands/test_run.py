@@ -17,8 +17,8 @@ from flight.mission_files.formats import read_mission
 from logs.recording.reader import read_log
 from logs.verdict.rules.registry import RULES
 from planfly.cli import main
-from planfly.rtl.return_summary import return_summary
 from planfly.workflow.output_paths import RUN_FILES
+from planfly.workflow.pipeline import return_summary
 from tests.logs.verdict.judging import SILENT_ON_WAYPOINTS
 from tests.planfly.conftest import FIELD
 from tests.planfly.made_plans import DEFAULT_RUN, default_run

@@ -6,7 +6,7 @@ import planfly
 from aircraft.catalog import load_aircraft
 from flight.dynamics.envelope_tables import load_envelope
 from flight.mission.items import Command
-from flight.mission_files.wpl import waypoints_text
+from flight.mission_files.formats import waypoints_text
 from planfly.identification.manoeuvres import make_identification_mission
 
 

@@ -7,9 +7,8 @@ from typing import Any
 import pytest
 
 from flight.autopilots.parameter_files import parse_parameters
-from flight.mission_files.formats import read_mission
+from flight.mission_files.formats import HEADER, parse_mission, read_mission
 from flight.mission_files.qgc_plan import parse_plan_file
-from flight.mission_files.wpl import HEADER, parse_waypoints
 from logs.recording.reader import read_log
 from planfly.workflow.uav import load_uav
 from planner.plan import read_plan
@@ -48,15 +47,15 @@ CASES: dict[str, tuple[Callable[[Path], object], str, str, Any, str]] = {
     ),
     "an algorithm": (lambda _: find_algorithm("ga", "a.toml"), "a.toml", "planner.algorithm", "ga", "unknown"),
     "a whole number of a mission": (
-        lambda _: parse_waypoints(f"{HEADER}\n{_ITEM.replace('16', '1.5', 1)}\n", "a.waypoints"),
+        lambda _: parse_mission(f"{HEADER}\n{_ITEM.replace('16', '1.5', 1)}\n", "a.waypoints"),
         *("a.waypoints", "command", "1.5", "expected a whole number 0..65535"),
     ),
     "a number of a mission": (
-        lambda _: parse_waypoints(f"{HEADER}\n{_ITEM.replace('8.0', '8,0')}\n", "a.waypoints"),
+        lambda _: parse_mission(f"{HEADER}\n{_ITEM.replace('8.0', '8,0')}\n", "a.waypoints"),
         *("a.waypoints", "longitude", "8,0", "expected a finite number (a decimal comma?)"),
     ),
     "the header of a mission": (
-        lambda _: parse_waypoints("QGC WPL 999\n", "a.waypoints"),
+        lambda _: parse_mission("QGC WPL 999\n", "a.waypoints"),
         *("a.waypoints", "header", "QGC WPL 999", HEADER),
     ),
     "a suffix": (

@@ -4,12 +4,13 @@ import math
 import os
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numba
 import pytest
 
-from planfly.api.api_function import warm_up
+from planfly.api.api_function import api_function
 from planfly.kernel_units.unit_kernels import list_unit_kernels
 from planfly.runtime import first_start
 from planfly.runtime.stages import send_progress_to
@@ -20,11 +21,13 @@ from world.compile_events import announce_compilation
 ROOT = Path(__file__).parents[3]
 CODE = """
 import sys
-from planfly.api.api_function import warm_up
+from planfly.api.api_function import api_function
 from world.geometry import wrap
-with warm_up():
+@api_function()
+def wrap_twice(*, angle: float) -> None:
     for _ in range(2):
-        wrap(4.0)
+        wrap(angle)
+wrap_twice(angle=4.0)
 """
 SAID = "compiling numeric kernels, which later runs load"
 WAY_OUT = "set NUMBA_CACHE_DIR to a folder that can be written"
@@ -50,29 +53,42 @@ def shared(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[list[str]]:
 
 def test_units_are_counted_before_the_work_goes_on(shared: list[list[str]], capsys: pytest.CaptureFixture[str]) -> None:
     whole = len(list_unit_kernels(("scores", "paper")))
-    with send_progress_to(ON_STANDARD_ERROR), warm_up("scores", "paper"):
+
+    @api_function("scores", "paper")
+    def compile_two(*, number: int) -> list[str]:
         assert capsys.readouterr().err == ""
-        assert numba.njit(lambda a: a + 1)(1) == 2
-        begun, done = capsys.readouterr().err.splitlines()
+        assert numba.njit(lambda a: a + 1)(number) == number + 1
+        lines = capsys.readouterr().err.splitlines()
         announce_compilation()
+        return lines
+
+    with send_progress_to(ON_STANDARD_ERROR):
+        begun, done = compile_two(number=1)
     assert begun == f"{SAID} ... (0 of {whole}, no estimate yet)"
     assert done.startswith(f"{SAID}: done in ")
     assert done.endswith(f" s: 2 of {whole}")
     assert capsys.readouterr().err == ""
     # What this process has shared out it does not share out again.
-    with warm_up("scores", "flight"):
-        announce_compilation()
-    with warm_up("scores"):
-        announce_compilation()
+    compile_kernels("scores", "flight")
+    compile_kernels("scores")
     assert shared == [["scores", "paper"], ["flight"]]
 
 
+def compile_kernels(*units: str) -> None:
+    """As a function of the API does that needs kernels of these units."""
+
+    @api_function(*units)
+    def compile_one(*, announce: Callable[[], None]) -> None:
+        announce()
+
+    compile_one(announce=announce_compilation)
+
+
 def test_nothing_is_said_in_silence(shared: list[list[str]], capsys: pytest.CaptureFixture[str]) -> None:
-    with send_progress_to(SILENT), warm_up("scores"):
-        announce_compilation()
-    assert shared == [["scores"]]
-    with send_progress_to(SILENT), warm_up():
-        announce_compilation()
+    with send_progress_to(SILENT):
+        compile_kernels("scores")
+        assert shared == [["scores"]]
+        compile_kernels()
     assert capsys.readouterr().err == ""
 
 
@@ -86,8 +102,8 @@ def test_a_cache_that_cannot_be_written_is_named(
 ) -> None:
     folder = Path("/proc/none/kernels")
     monkeypatch.setattr("world.kernels.cache_folder", lambda: folder)
-    with send_progress_to(ON_STANDARD_ERROR), warm_up("scores"):
-        announce_compilation()
+    with send_progress_to(ON_STANDARD_ERROR):
+        compile_kernels("scores")
     said = f"compiling the numeric kernels: {folder} cannot be written, so they are not stored; {WAY_OUT}\n"
     assert (capsys.readouterr().err, shared) == (said, [])
 

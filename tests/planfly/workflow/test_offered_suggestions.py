@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 import planfly
-from flight.mission_files.wpl import waypoints_text
+from flight.mission_files.formats import waypoints_text
 from logs.verdict.findings import Finding
 from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.places import Suggestion

@@ -13,7 +13,6 @@ from planfly.workflow.output_paths import (
     check_output_file,
     check_output_folder,
     expand_path_pattern,
-    file_target,
     prepare_folder,
 )
 from world.errors import PlanflyError
@@ -118,14 +117,17 @@ def test_no_two_names_share_a_folder() -> None:
 
 
 def test_a_patterns_folder_may_be_missing_and_a_named_files_may_not(tmp_path: Path) -> None:
-    made = file_target(tmp_path / "{name}-{seed}" / "plan.json", "a/b", 3, suffix=".json", overwrite=False)
+    made = expand_path_pattern(tmp_path / "{name}-{seed}" / "plan.json", "a/b", 3)
     assert made == tmp_path / "a-b-c14cdd-3" / "plan.json"
+    check_output_file(made, overwrite=False, suffix=".json", folder_must_exist=False)
+    with pytest.raises(PlanflyError, match="does not exist"):
+        check_output_file(made, overwrite=True, suffix=".json")
     made.parent.mkdir()
     made.write_text("mine", encoding="utf-8")
     with pytest.raises(PlanflyError, match="overwrite=True replaces it"):
-        file_target(tmp_path / "{name}-{seed}" / "plan.json", "a/b", 3, suffix=".json", overwrite=False)
-    with pytest.raises(PlanflyError, match="does not exist"):
-        file_target(tmp_path / "none" / "plan.json", "a/b", 3, suffix=".json", overwrite=True)
+        check_output_file(made, overwrite=False, suffix=".json", folder_must_exist=False)
+    with pytest.raises(PlanflyError, match=r"expected a \.mcap file"):
+        check_output_file(made, overwrite=True, suffix=".mcap")
 
 
 def test_every_figure_of_a_report_is_cleared_with_it() -> None:

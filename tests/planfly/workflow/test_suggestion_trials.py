@@ -10,7 +10,7 @@ import pytest
 from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.mission.edits import movable_indices, raise_items
-from flight.mission_files.wpl import HOME_LINE_MISSING_TEXT
+from flight.mission_files.formats import HOME_LINE_MISSING_TEXT
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import UNKNOWN_AIRCRAFT, Fact, Finding, make_finding
 from logs.verdict.judge_flight import judge_flight

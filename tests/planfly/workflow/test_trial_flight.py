@@ -8,7 +8,7 @@ import pytest
 
 from aircraft.catalog import load_aircraft
 from logs.recording.example_log import example_log
-from logs.verdict.measures import energy
+from logs.verdict.measures import route_requirements
 from planfly.workflow import trial_flight
 from planfly.workflow.trial_flight import Trial, TrialAborted, max_explaining_flights
 from tests.synthetic import make_setup
@@ -47,7 +47,7 @@ def test_a_flight_of_more_than_twice_the_energy_carried_is_not_begun(
     """A kilowatt all the way takes more than the battery of 0.01 Wh."""
     envelope = replace(SETUP.limits.envelope, power_full=np.array([1000.0]))
     setup = replace(SETUP, battery=0.01, limits=replace(SETUP.limits, envelope=envelope))
-    monkeypatch.setattr(energy, "predicted_energy", lambda _: (ratio * 0.01, 0.0))
+    monkeypatch.setattr(route_requirements, "predicted_energy", lambda _: (ratio * 0.01, 0.0))
 
     def fly(setup: object, aircraft: object) -> None:
         raise StartError("f", "no trim")

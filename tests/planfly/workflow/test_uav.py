@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from flight.mission.implied_scenario import implied_scenario
+from flight.mission.placing import implied_scenario
 from planfly.workflow.uav import choose_seed, load_uav, with_tightened_limits
 from tests.mission_lines import mission, wp
 from tests.setups import small_scenario

@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from flight.autopilots.arduplane.rtl_point_mass import fly_returns
 from flight.autopilots.simulated_returns import RETURN_ARRIVED, RETURN_GROUND_IMPACT, SimulatedReturns
-from flight.mission.return_path import LandingStart, ReturnCircle
+from flight.mission.return_path import LandingStart, ReturnTarget
 from tests.flight.autopilots.arduplane.kept_flights import FOLDER, HOME, WIND
 from tests.flight.autopilots.arduplane.test_rtl_point_mass import aerosonde, around, flat, parameters, start
 from tests.soak import some
+from world.kernels import Records
 from world.wind import Wind
 
 
@@ -45,21 +46,22 @@ def glided(flight: str) -> SimulatedReturns:
     velocity = {f"velocity_{way}": row[f"velocity_{way}_mps"] for way in ("east", "north", "up")}
     begin = start(east=row["east_m"], north=row["north_m"], up=row["amsl_m"], **velocity)
     if GLIDES[flight]["mode"] == "RTL":
-        circle = ReturnCircle(HOME[0], HOME[1], HOME[2] + 100.0, parameters().loiter_radius)
-        return fly_returns(
-            begin, [circle], parameters(), aerosonde(WIND), around(), store_positions=True, engine_out=True
-        )
+        home = ReturnTarget((HOME[0], HOME[1], HOME[2] + 100.0), "home", "", 0.0)
+        made = parameters(RTL_RADIUS=parameters().loiter_radius)
+        return fly_returns(made, begin, [home], aerosonde(WIND), around(), store_positions=True, engine_out=True)
     # On along its leg, which bends by no more than 25 degrees.
     over = math.hypot(velocity["velocity_east"], velocity["velocity_north"])
     far = tuple(
         here + 12_000.0 * speed / over
         for here, speed in zip((row["east_m"], row["north_m"], row["amsl_m"]), velocity.values(), strict=True)
     )
-    on = LandingStart(1, (far[0], far[1], far[2]), (far[0], far[1], far[2]))
-    world = flat(0.0)
-    return fly_returns(
-        begin, [None], parameters(), aerosonde(WIND), world, landings=[on], store_positions=True, engine_out=True
-    )
+    on = straight_on((far[0], far[1], far[2]))
+    return fly_returns(parameters(), begin, [on], aerosonde(WIND), flat(0.0), store_positions=True, engine_out=True)
+
+
+def straight_on(place: tuple[float, float, float]) -> ReturnTarget:
+    """The target of a return that flies straight to a landing sequence."""
+    return ReturnTarget(place, "landing", "", 0.0, landing=LandingStart(1, place, place), straight=True)
 
 
 @pytest.mark.parametrize("flight", some(GLIDES, 2))
@@ -93,10 +95,8 @@ def test_it_gets_home_where_arduplane_did(flight: str) -> None:
 def straight(wind: Wind, north: float = 26.0) -> NDArray[np.float64]:
     """Places (t, 3) of a glide to the north from 2,000 m, a second apart."""
     begin = start(up=2000.0, velocity_north=north)
-    on = LandingStart(1, (0.0, 13_000.0, 2000.0), (0.0, 13_000.0, 2000.0))
-    flown = fly_returns(
-        begin, [None], parameters(), aerosonde(wind), flat(0.0), landings=[on], store_positions=True, engine_out=True
-    )
+    on = straight_on((0.0, 13_000.0, 2000.0))
+    flown = fly_returns(parameters(), begin, [on], aerosonde(wind), flat(0.0), store_positions=True, engine_out=True)
     return flown.tracks[0]
 
 
@@ -110,13 +110,17 @@ def test_it_glides_at_its_least_airspeed(head: float, ratio: float) -> None:
     assert 10.3 * ratio < run / fall < 10.9 * ratio
 
 
+def glide_to(place: tuple[float, float, float], begin: Records, *, engine_out: bool = True) -> SimulatedReturns:
+    """A return in calm air to a circle of 120 m, without its engine."""
+    target = ReturnTarget(place, "home", "", 0.0)
+    made = parameters(RTL_RADIUS=120.0)
+    return fly_returns(made, begin, [target], aerosonde(Wind()), flat(), store_positions=True, engine_out=engine_out)
+
+
 def test_it_flies_on_before_it_turns_back() -> None:
     """For 3 s, to the north; then it turns to what lies behind it."""
     begin = start(up=900.0, velocity_north=26.0)
-    circle = ReturnCircle(0.0, -5000.0, 500.0, 120.0)
-    (way,) = fly_returns(
-        begin, [circle], parameters(), aerosonde(Wind()), flat(), store_positions=True, engine_out=True
-    ).tracks
+    (way,) = glide_to((0.0, -5000.0, 500.0), begin).tracks
     assert way[3, 0] == pytest.approx(0.0, abs=0.5)
     assert way[3, 1] == pytest.approx(3.0 * 25.0, abs=2.5)
     assert abs(way[8, 0]) > 10.0
@@ -127,18 +131,7 @@ def test_it_flies_on_before_it_turns_back() -> None:
 def test_above_its_slope_it_dives_onto_it() -> None:
     """500 m down over 9 km, 18 : 1, where it glides 10.5 : 1: below it; over 4 km, 8 : 1: on it, and fast."""
     begin = start(up=900.0, velocity_north=26.0)
-    far, near = (
-        fly_returns(
-            begin,
-            [ReturnCircle(0.0, away, 400.0, 120.0)],
-            parameters(),
-            aerosonde(Wind()),
-            flat(),
-            store_positions=True,
-            engine_out=True,
-        ).tracks[0]
-        for away in (9000.0, 4000.0)
-    )
+    far, near = (glide_to((0.0, away, 400.0), begin).tracks[0] for away in (9000.0, 4000.0))
     assert near[60, 2] == pytest.approx(900.0 - 500.0 * near[60, 1] / 4000.0, abs=25.0)
     assert near[60, 1] - near[59, 1] > 22.0
     assert far[200, 1] - far[199, 1] < 19.5
@@ -147,11 +140,7 @@ def test_above_its_slope_it_dives_onto_it() -> None:
 
 def test_with_its_engine_it_does_not_come_down() -> None:
     begin = start(up=900.0, velocity_north=26.0)
-    circle = ReturnCircle(0.0, 9000.0, 900.0, 120.0)
-    on, off = (
-        fly_returns(begin, [circle], parameters(), aerosonde(Wind()), flat(), engine_out=out).results[0]
-        for out in (False, True)
-    )
+    on, off = (glide_to((0.0, 9000.0, 900.0), begin, engine_out=out).results[0] for out in (False, True))
     assert on["clearance_before_arrival"] > 890.0
     # 8.8 km at 10.5 : 1, and what it takes to slow down.
     assert off["arrival_altitude"] == pytest.approx(900.0 - 8800.0 / 10.5, abs=40.0)

@@ -20,7 +20,7 @@ from flight.autopilots.simulated_returns import (
     SimulatedReturns,
     make_return_environment,
 )
-from flight.mission.return_path import ReturnCircle, ReturnPoint, choose_target
+from flight.mission.return_path import ReturnCircle, ReturnPoint, ReturnTarget, choose_target
 from planfly.workflow.uav import Uav, load_uav
 from tests.flight.autopilots.arduplane.kept_flights import HOME, KEPT, WIND, flown_return, jacksboro, kept_track, rally
 from tests.soak import SOAK
@@ -63,6 +63,11 @@ def start(**values: float) -> Records:
     return made
 
 
+def target_at(circle: ReturnCircle) -> ReturnTarget:
+    """The target of a return to a circle, whose radius the parameters state."""
+    return ReturnTarget(circle[:3], "home", "", 0.0, circle.slope_base)
+
+
 def kind(flight: str) -> str:
     if KEPT[flight]["rally_set"]:
         return "rally"
@@ -90,8 +95,7 @@ def swift(flight: str) -> tuple[str, SimulatedReturns]:
     ]
     here = (float(begin["east"][0]), float(begin["north"][0]), float(begin["up"][0]))
     target = choose_target(rules, here, ReturnPoint(*HOME), points)
-    circle = ReturnCircle(*target.position, rules.radius, target.slope_base)
-    return target.name, fly_returns(begin, [circle], made, aerosonde(), around(), store_positions=True)
+    return target.name, fly_returns(made, begin, [target], aerosonde(), around(), store_positions=True)
 
 
 @pytest.mark.parametrize("flight", KEPT)
@@ -142,7 +146,8 @@ def flat(height: float = 0.0, spheres: tuple[tuple[float, ...], ...] = ()) -> Re
 
 
 def returned(begin: Records, circle: ReturnCircle, world: ReturnEnvironment, **values: float) -> Records:
-    found: Records = fly_returns(begin, [circle], parameters(**values), aerosonde(Wind()), world).results[0]
+    made, target = parameters(RTL_RADIUS=circle.radius, **values), target_at(circle)
+    found: Records = fly_returns(made, begin, [target], aerosonde(Wind()), world).results[0]
     return found
 
 

@@ -30,7 +30,7 @@ def returned(
     made = parameters(**values)
     target = choose_target(Px4(made).returns.rules, (0.0, 0.0, up), HOME, (), landings)
     begin = start(up=up, velocity_east=26.0)
-    return fly_returns(begin, [target], made, aerosonde(wind or Wind()), flat(ground), store_positions=True)
+    return fly_returns(made, begin, [target], aerosonde(wind or Wind()), flat(ground), store_positions=True)
 
 
 @pytest.mark.parametrize(

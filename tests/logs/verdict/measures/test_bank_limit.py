@@ -7,8 +7,8 @@ import pytest
 
 from flight.autopilots.px4.autopilot import Px4
 from flight.autopilots.px4.parameters import Px4Parameters
-from flight.mission.implied_scenario import implied_scenario
 from flight.mission.items import Mission
+from flight.mission.placing import implied_scenario
 from logs.verdict.measures.bank_limit import bank_limit_text
 from planfly.workflow.open_flight import make_setup
 from planfly.workflow.uav import load_uav

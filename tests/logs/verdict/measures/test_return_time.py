@@ -9,9 +9,8 @@ from flight.autopilots.px4.autopilot import Px4
 from flight.autopilots.px4.parameters import Px4Parameters
 from flight.simulation.setup import FlightSetup
 from logs.verdict.judge_flight import judge_geometry
-from logs.verdict.measures.energy import predicted_energy
 from logs.verdict.measures.return_time import longest_return_time, remaining_time
-from logs.verdict.measures.route_requirements import route_requirements
+from logs.verdict.measures.route_requirements import predicted_energy, route_requirements
 from tests.logs.verdict.judging import of
 from tests.mission_lines import setup_of, wp
 from world.wind import Wind

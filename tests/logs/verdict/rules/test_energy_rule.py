@@ -19,8 +19,7 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import Flight, fly_to_end
 from logs.verdict.findings import Finding, make_finding
 from logs.verdict.judge_flight import judge_flight, judge_geometry
-from logs.verdict.measures.energy import air_climb_angle, predicted_energy
-from logs.verdict.measures.route_requirements import route_requirements
+from logs.verdict.measures.route_requirements import air_climb_angle, predicted_energy, route_requirements
 from logs.verdict.places import FLIGHT
 from logs.verdict.suggestions import suggest_using_less_energy
 from tests.logs.verdict.judging import failing, judge, of

@@ -7,8 +7,7 @@ import pytest
 from aircraft.catalog import load_aircraft
 from flight.dynamics.envelope_tables import load_envelope
 from logs.verdict.judge_flight import judge_geometry
-from logs.verdict.measures.energy import predicted_energy
-from logs.verdict.measures.route_requirements import route_requirements
+from logs.verdict.measures.route_requirements import predicted_energy, route_requirements
 from tests.logs.verdict.judging import judge, of
 from tests.synthetic import fly_path, make_scenario, make_setup
 

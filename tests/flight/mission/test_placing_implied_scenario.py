@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flight.mission.implied_scenario import implied_scenario, mission_origin
 from flight.mission.items import Mission
 from flight.mission.itinerary import make_itinerary
+from flight.mission.placing import implied_scenario, mission_origin
 from flight.mission.route import Route, make_route
 from flight.mission_files.formats import read_mission
 from tests.mission_lines import mission, wp

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from flight.simulation.local_map import LocalMap
+from flight.simulation.simulate import LocalMap
 from tests.setups import MakeSetup
 from world.frames import GeoOrigin, to_map
 

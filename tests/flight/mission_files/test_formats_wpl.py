@@ -7,8 +7,14 @@ from pymavlink.mavwp import MAVFenceLoader, MAVWPLoader
 
 from flight.mission.items import Home, Mission, MissionItem
 from flight.mission.itinerary import make_itinerary
-from flight.mission_files.formats import mission_text, parse_mission, read_fence
-from flight.mission_files.wpl import is_point_list, parse_fence_points, parse_waypoints, waypoints_text
+from flight.mission_files.formats import (
+    is_point_list,
+    mission_text,
+    parse_fence_points,
+    parse_mission,
+    read_fence,
+    waypoints_text,
+)
 from tests.flight.mission_files.malformed_files import BAD_WPL, refused
 from world.errors import MissionError
 
@@ -95,7 +101,7 @@ def test_items_whose_seq_jumps_are_counted_as_pymavlink_counts_them(tmp_path: Pa
     loader = MAVWPLoader()
     loader.load(str(file))
     theirs = [loader.wp(k) for k in range(1, loader.count())]
-    mission = parse_waypoints(JUMPING, "a.waypoints")
+    mission = parse_mission(JUMPING, "a.waypoints")
     assert [(item.seq, item.command, item.lat_deg) for item in mission.items] == [
         (one.seq, one.command, pytest.approx(one.x)) for one in theirs
     ]
@@ -114,7 +120,7 @@ def test_items_whose_seq_does_not_rise_are_counted_as_pymavlink_counts_them(tmp_
     file.write_text(text, encoding="utf-8")
     loader = MAVWPLoader()
     loader.load(str(file))
-    mission = parse_waypoints(text, "a.waypoints")
+    mission = parse_mission(text, "a.waypoints")
     assert [(item.seq, item.lat_deg) for item in mission.items] == [
         (loader.wp(k).seq, pytest.approx(loader.wp(k).x)) for k in range(1, loader.count())
     ]
@@ -130,7 +136,7 @@ def test_a_home_at_0_0_is_left_out_and_said(kind: str) -> None:
     """It is counted as home all the same: the first item is number 1."""
     text = JUMPING.replace("36.5 -84.2 300", "0 0 0").replace("\n3 ", "\n1 ").replace("\n7 ", "\n2 ")
     text = text.replace("\n9 ", "\n3 ").replace("\n40 ", "\n4 ")
-    mission = parse_waypoints(text, "a.waypoints")
+    mission = parse_mission(text, "a.waypoints")
     if kind == "plan":
         mission = parse_mission(mission_text(mission, "plan"), "a.plan")
     assert mission.home is None
@@ -163,7 +169,7 @@ def test_whatever_stands_in_the_line_of_home_is_home_as_in_pymavlink(
     file.write_text(text, encoding="utf-8")
     loader = MAVWPLoader()
     loader.load(str(file))
-    mission = parse_waypoints(text, "a.waypoints")
+    mission = parse_mission(text, "a.waypoints")
     # pymavlink's first is what ArduPilot takes for home.
     assert [(item.seq, item.command) for item in mission.items] == [
         (loader.wp(k).seq, loader.wp(k).command) for k in range(1, loader.count())
@@ -181,7 +187,7 @@ def test_whatever_stands_in_the_line_of_home_is_home_as_in_pymavlink(
 def test_what_is_written_has_no_gap_and_jumps_to_the_same_item() -> None:
     places = [MissionItem(seq, 16, 3, (0.0,) * 4, 36.5 + seq / 100, -84.2, 100.0) for seq in (2, 5, 9)]
     jumps = [MissionItem(seq, 177, 2, (float(to), 1.0, 0.0, 0.0), 0.0, 0.0, 0.0) for seq, to in ((11, 5), (12, 7))]
-    again = parse_waypoints(waypoints_text(Mission(None, (*places, *jumps))), "a.waypoints")
+    again = parse_mission(waypoints_text(Mission(None, (*places, *jumps))), "a.waypoints")
     assert [item.seq for item in again.items] == [1, 2, 3, 4, 5]
     # To the second, and to one that is not there.
     assert [item.params[0] for item in again.items[3:]] == [2.0, 7.0]

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from flight.mission.items import Mission
-from flight.mission.preflight_notes import preflight_notes
 from flight.mission.return_path import DEFAULT_RETURN_RULES, ReturnRules
 from logs.verdict.findings import NOT_FLOWN
 from logs.verdict.rules.mission_rule import mission_findings
+from planfly.workflow.open_flight import preflight_notes
 from tests.mission_lines import ORIGIN, setup_of, wp
 from world.airfield import LandingStrip, Launch
 from world.frames import to_geo
