@@ -1,7 +1,7 @@
 """Prove that no path exists, because ground, ceiling and missiles block every path on the map.
 
-In thin air an aircraft may not be able to climb or to hold its altitude at its cruise speed. The lowest such altitude acts
-as a ceiling (`highest_level_flight`, `highest_waypoint`).
+In thin air an aircraft may not be able to climb or to hold its altitude at its cruise speed. The lowest such altitude
+acts as a ceiling (`highest_level_flight`, `highest_waypoint`).
 
 The map is divided into square columns. An altitude is closed in a column if the whole square is inside one kill sphere
 there, or below the lowest ground of the square plus the clearance; all other altitudes are open, and a path may go from
@@ -65,11 +65,11 @@ def is_closed(data: ProblemArrays, missiles: Flags | None = None, margin: float 
 def highest_waypoint(data: ProblemArrays) -> float:
     """Return the highest altitude that a waypoint may have, m; inf as for `highest_level_flight`.
 
-    The leg to the highest waypoint is level or climbs, unless this waypoint is the start. Therefore the highest waypoint
-    is not above the start, or the aircraft can climb there by the margin to the slope limits, `angle_margin`.
+    The leg to the highest waypoint is level or climbs, unless this waypoint is the start. Therefore the highest
+    waypoint is not above the start, or the aircraft can climb there by the margin to the slope limits, `angle_margin`.
 
-    The steepest climb over the ground is in a headwind w. At the airspeed V, it is as steep as the margin m if the climb
-    through the air is m - asin(w / V sin m).
+    The steepest climb over the ground is in a headwind w. At the airspeed V, it is as steep as the margin m if the
+    climb through the air is m - asin(w / V sin m).
     """
     headwind_ratio = min(1.0, _max_wind_speed(data) / true_airspeed(data.aircraft, data.floor))
     air_angle = data.angle_margin - math.asin(headwind_ratio * math.sin(data.angle_margin))

@@ -35,7 +35,14 @@ from planner.search.search_state import (
 )
 from planner.seeding.airspace_grids import airspace_routes
 from planner.seeding.grids import GridRoute, grid_routes
-from planner.seeding.lattice import MAX_EXPANDED, ceiling_route, lattice_route, make_lattice, turning_step
+from planner.seeding.lattice import (
+    MAX_EXPANDED,
+    MAX_GUIDED_EXPANDED,
+    ceiling_route,
+    lattice_route,
+    make_lattice,
+    turning_step,
+)
 from planner.seeding.shortening import resample, shorten_path
 from planner.seeding.side_routes import close_places, optimistic_grid, side_routes
 from planner.seeding.waypoint_fitting import CLOSE_FIT, QUICK_FIT, fit_points, fit_waypoints
@@ -310,6 +317,8 @@ def shorten_best(search: Search) -> None:
 
 # Length of a safe path relative to the straight line above which a path that turns back may be shorter.
 LONG_DETOUR_RATIO = 1.25
+# Smallest number of waypoints of a path that may turn back: two turns lead away from the straight line, and two back.
+MIN_TURNING_WAYPOINTS = 6
 # Lattice steps as fractions of the step that turns require, tried until a path is safe.
 LATTICE_STEP_FRACTIONS = (1.0, 0.6)
 # Maximum length of a followed route as a fraction of the best safe path.
@@ -334,6 +343,8 @@ def may_turn_back(search: Search, certificate: Certificate) -> bool:
     This is the case if that path is not safe, or if it is long.
     """
     if not search.algorithm.seeded or search.encoding.name != "rotated" or search.must_end():
+        return False
+    if search.encoding.waypoints < MIN_TURNING_WAYPOINTS:
         return False
     if not search.meets_goal(certificate):
         return True
@@ -375,7 +386,7 @@ def _search_lattices(
     data, space = search.problem.search, search.problem.space
     frame, step = rotated_frame(space.start, space.destination), turning_step(data)
     lattices = [make_lattice(data, frame, step_fraction * step) for step_fraction in LATTICE_STEP_FRACTIONS]
-    remaining_states = MAX_EXPANDED
+    remaining_states = MAX_GUIDED_EXPANDED if is_guided else MAX_EXPANDED
     for index, step_fraction in enumerate(LATTICE_STEP_FRACTIONS):
         # If memory limits the step, a smaller step gives the same lattice again.
         if remaining_states <= 0 or search.must_end() or lattices[index] in lattices[:index]:

@@ -164,7 +164,9 @@ def test_a_destination_to_which_the_aircraft_can_only_climb_too_gently_is_closed
     assert math.degrees(data.angle_margin) == pytest.approx(0.5)
     climb = np.radians([1.3, 0.8, -0.2, -1.2, -2.2, -3.2])
     start, destination = np.array([*data.start[:2], start_up]), np.array([*data.destination[:2], 150.0])
-    assert is_closed(in_thin_air(data, *climb, wind_speed=wind)._replace(start=start, destination=destination)) is closed
+    assert (
+        is_closed(in_thin_air(data, *climb, wind_speed=wind)._replace(start=start, destination=destination)) is closed
+    )
 
 
 @pytest.mark.parametrize(("more", "closed"), [(-5.0, True), (15.0, False)])
