@@ -157,8 +157,8 @@ def test_a_destination_to_which_the_aircraft_can_only_climb_too_gently_is_closed
 ) -> None:
     """The destination is at 150 m, where the aircraft climbs 0.3°; 0.5° remain as a margin to slopes.
 
-    Over the ground it climbs up to 0.3° x 25 / (25 - 15) = 0.75° against a wind of 15 m/s. A path from a start above the
-    destination needs no climb.
+    Over the ground it climbs up to 0.3° x 25 / (25 - 15) = 0.75° against a wind of 15 m/s. A path from a start above
+    the destination needs no climb.
     """
     data = arrays(small, make_limits, [])
     assert math.degrees(data.angle_margin) == pytest.approx(0.5)
