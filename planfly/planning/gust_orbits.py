@@ -73,7 +73,8 @@ def limit_waypoint_orbits(
         return shorter_plan
     remaining_orbits = expected_orbits(shorter_plan, autopilot, limits)
     count = len(shorter_plan.waypoints) - 2
-    if search is not None:
+    # If the plan has more waypoints than the scenario states, a search with that number has found no safe path.
+    if search is not None and len(plan.waypoints) <= plan.scenario.planner.waypoints:
         # Assume the orbit probability per waypoint of this path; it may be lower on another path.
         allowed_count, scenario = max(1, int(MAX_EXPECTED_ORBITS * count / remaining_orbits)), plan.scenario
         planner_table = scenario.planner.model_copy(update={"waypoints": allowed_count + 2})

@@ -19,7 +19,7 @@ from planner.evaluation.encoding import rotated_frame
 from planner.evaluation.problem import Problem, make_problem
 from planner.plan import Plan, Violation
 from planner.search.algorithms import ALGORITHMS, limits_for
-from planner.search.infeasibility_proof import blocking_missiles, highest_level_flight
+from planner.search.infeasibility_proof import blocking_missiles, highest_level_flight, highest_waypoint
 from world.airspace.zone_kernels import ZoneRecords, edge_distance, height_outside_band, zone_records
 from world.arrays import Flags, Floats, Ints
 from world.kernels import compiled
@@ -405,6 +405,14 @@ def _describe_proven_closure(problem: Problem) -> list[str]:
         for name, end in (("start", data.start), ("destination", data.destination)):
             if end[2] > max_level_altitude:
                 return [f"no path exists: the {name} is at {end[2]:.0f} m, higher than {ceiling}"]
+    max_waypoint_altitude = highest_waypoint(data)
+    if max_waypoint_altitude < min(data.ceiling, max_level_altitude):
+        ceiling = (
+            f"{max_waypoint_altitude:.0f} m, the highest altitude to which the aircraft can climb at"
+            f" {data.aircraft.airspeed:g} m/s with the planner's slope margin of {math.degrees(data.angle_margin):g}°"
+        )
+        if data.destination[2] > max_waypoint_altitude:
+            return [f"no path exists: the destination is at {data.destination[2]:.0f} m, higher than {ceiling}"]
     if not missiles:
         return [f"no path exists: the ground blocks every path below {ceiling}"]
     names = [problem.scenario.threats.names[k] for k in missiles[:MAX_NAMED_MISSILES]]

@@ -1,7 +1,7 @@
 """Prove that no path exists, because ground, ceiling and missiles block every path on the map.
 
-In thin air an aircraft may not be able to hold its altitude at its cruise speed; no leg may begin or end there, so that
-the lowest such altitude acts as a ceiling.
+In thin air an aircraft may not be able to climb or to hold its altitude at its cruise speed. The lowest such altitude
+acts as a ceiling (`highest_level_flight`, `highest_waypoint`).
 
 The map is divided into square columns. An altitude is closed in a column if the whole square is inside one kill sphere
 there, or below the lowest ground of the square plus the clearance; all other altitudes are open, and a path may go from
@@ -56,28 +56,40 @@ def is_closed(data: ProblemArrays, missiles: Flags | None = None, margin: float 
     [False, True]
     """
     is_considered = np.ones(len(data.threats), dtype=np.bool_) if missiles is None else missiles
-    max_altitude = highest_level_flight(data)
-    if max(data.start[2], data.destination[2]) > max_altitude:
+    ceiling = min(data.ceiling, highest_level_flight(data), highest_waypoint(data))
+    if max(data.start[2], data.destination[2]) > ceiling:
         return True
-    return bool(
-        _is_proven_closed(
-            data._replace(ceiling=min(data.ceiling, max_altitude)), is_considered, column_side(data), margin
-        )
-    )
+    return bool(_is_proven_closed(data._replace(ceiling=ceiling), is_considered, column_side(data), margin))
 
 
-def highest_level_flight(data: ProblemArrays) -> float:
+def highest_waypoint(data: ProblemArrays) -> float:
+    """Return the highest altitude that a waypoint may have, m; inf as for `highest_level_flight`.
+
+    The leg to the highest waypoint is level or climbs, unless this waypoint is the start. Therefore the highest
+    waypoint is not above the start, or the aircraft can climb there by the margin to the slope limits, `angle_margin`.
+
+    The steepest climb over the ground is in a headwind w. At the airspeed V, it is as steep as the margin m if the
+    climb through the air is m - asin(w / V sin m).
+    """
+    headwind_ratio = min(1.0, _max_wind_speed(data) / true_airspeed(data.aircraft, data.floor))
+    air_angle = data.angle_margin - math.asin(headwind_ratio * math.sin(data.angle_margin))
+    return max(float(data.start[2]), highest_level_flight(data, air_angle))
+
+
+def highest_level_flight(data: ProblemArrays, min_climb: float = 0.0) -> float:
     """Return the highest altitude at which the aircraft can fly level, m; no waypoint may be above it.
 
     Return inf if there is no such limit below the ceiling, or if the wind is too strong to hold a course. The limit
     applies only if both slope limits are the aircraft's limits, as in `planner.evaluation.leg_constraints`.
+
+    min_climb: climb angle through the air that must be possible, rad; 0 for level flight.
     """
     table = data.aircraft
     if not (math.isnan(data.max_climb) and math.isnan(data.max_dive) and table.equivalent > 0.0):
         return math.inf
     # The table entries that affect slopes below the ceiling.
     count = int(np.searchsorted(table.amsl, data.ceiling)) + 1
-    climb, amsl = table.climb[:count], table.amsl[:count]
+    climb, amsl = table.climb[:count] - min_climb, table.amsl[:count]
     level_rows = np.flatnonzero(climb >= 0.0)
     last_row = int(level_rows[-1]) if level_rows.size else -1
     if last_row == climb.size - 1:
@@ -90,10 +102,16 @@ def highest_level_flight(data: ProblemArrays) -> float:
         )
     max_slope = np.abs(np.concatenate([climb, table.descent[:count]])).max()
     min_speed = true_airspeed(table, max(max_altitude, data.floor)) * math.cos(max_slope)
-    wind = table.wind_speed, table.wind_gradient, table.wind_reference_amsl
-    max_wind = max(mean_wind_speed(*wind, data.floor), mean_wind_speed(*wind, data.ceiling))
+    max_wind = _max_wind_speed(data)
     # The comparison is False for an unknown slope (NaN).
     return max_altitude if max_wind < min_speed else math.inf
+
+
+def _max_wind_speed(data: ProblemArrays) -> float:
+    """Return the maximum wind speed between floor and ceiling, m/s."""
+    table = data.aircraft
+    wind = table.wind_speed, table.wind_gradient, table.wind_reference_amsl
+    return max(mean_wind_speed(*wind, data.floor), mean_wind_speed(*wind, data.ceiling))
 
 
 def blocking_missiles(data: ProblemArrays) -> list[int] | None:

@@ -71,6 +71,9 @@ def best_first(scores: Floats) -> Ints:
 SearchProgress = Callable[[int, int, str], None]
 StopCondition = Callable[[], str]
 Improved = Callable[[Floats], None]
+# Route (k, 3), m, over each searched lattice, and the number of states expanded; by the index of the lattice, and by
+# whether its search was guided.
+LatticeRoutes = dict[tuple[int, bool], tuple[Floats, int]]
 
 # Maximum number of paths in an archive.
 ARCHIVE_SIZE = 24
@@ -191,6 +194,7 @@ class Search:
     budget_exhausted: True if the budget is too small for another shortening.
     is_closed: True if it is proven that no safe path exists.
     grace: remaining pauses of a search without a result, once it is asked to stop.
+    lattice_routes: routes over lattices that were found so far; searches of the same problem share them.
     """
 
     problem: Problem
@@ -215,6 +219,7 @@ class Search:
     budget_exhausted: bool = False
     is_closed: bool = False
     grace: int = GRACE_PAUSES
+    lattice_routes: LatticeRoutes = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Create an empty archive."""

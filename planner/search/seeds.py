@@ -35,7 +35,14 @@ from planner.search.search_state import (
 )
 from planner.seeding.airspace_grids import airspace_routes
 from planner.seeding.grids import GridRoute, grid_routes
-from planner.seeding.lattice import MAX_EXPANDED, ceiling_route, lattice_route, make_lattice, turning_step
+from planner.seeding.lattice import (
+    MAX_EXPANDED,
+    MAX_GUIDED_EXPANDED,
+    ceiling_route,
+    lattice_route,
+    make_lattice,
+    turning_step,
+)
 from planner.seeding.shortening import resample, shorten_path
 from planner.seeding.side_routes import close_places, optimistic_grid, side_routes
 from planner.seeding.waypoint_fitting import CLOSE_FIT, QUICK_FIT, fit_points, fit_waypoints
@@ -50,9 +57,6 @@ SEED_SEARCH_EVALUATIONS = 300
 BAND_EFFORT_FACTOR = 3
 # Number of routes followed once a path is safe; after them other sides are tried.
 MAX_FOLLOWED_ROUTES = 2
-# Number of routes followed among zones, where other sides are not tried, in attempts after the first. Of 1,400 random
-# scenarios 16 needed such an attempt, and none found a safe path by it.
-MAX_FOLLOWED_RETRY_ROUTES = 3
 
 
 def try_straight_line(search: Search) -> bool:
@@ -78,9 +82,7 @@ def try_straight_line(search: Search) -> bool:
     return True
 
 
-def starting_vectors(
-    search: Search, grids: tuple[tuple[int, int], ...], previous: Floats | None, *, is_retry: bool = False
-) -> Floats:
+def starting_vectors(search: Search, grids: tuple[tuple[int, int], ...], previous: Floats | None) -> Floats:
     """Return the vectors from which a search starts, (n, d): one seed and the previous path, if any.
 
     The seed is made of a route over a grid; its waypoints are fitted to the route. Encodings other than "rotated" have
@@ -88,8 +90,6 @@ def starting_vectors(
 
     grids: number of stages and number of routes of each grid.
     previous: older path (w, 3), or None.
-    is_retry: True if an earlier attempt has failed. If there are zones, grids that are no finer than another grid are
-        then skipped, and only the best routes are followed.
 
     Only one seed is used, the one with the best result after improvement, because a distribution
     that is fitted to several routes describes none of them. The seed is used in its form before the improvement:
@@ -105,14 +105,12 @@ def starting_vectors(
     airspace = search.problem.search.airspace
     effort_factor = BAND_EFFORT_FACTOR if math.isfinite(airspace.max_height) else 1
     is_among_zones = is_limited(airspace)
-    # Among zones `search_other_sides` does not apply: the first attempt follows all routes.
+    # Among zones `search_other_sides` does not apply: all routes are followed.
     max_followed = math.inf if is_among_zones else MAX_FOLLOWED_ROUTES
     if search.can_shorten and search.algorithm.optimiser == "waypoints":
         max_followed = 0
-    for index, route in enumerate(_list_routes(search, grids, is_retry) if search.algorithm.seeded else ()):
+    for index, route in enumerate(_list_routes(search, grids) if search.algorithm.seeded else ()):
         if search.must_end() or search.first_safe_found() or (index >= max_followed and search.best_is_safe()):
-            break
-        if is_among_zones and is_retry and index >= MAX_FOLLOWED_RETRY_ROUTES:
             break
         path = fit_waypoints(search.problem.search, frame, route.points, waypoint_count)
         starts.append(rotated_vectors(space, encoding, path[None])[0])
@@ -123,10 +121,10 @@ def starting_vectors(
     return np.array([starts[order[0]], *previous_vectors])
 
 
-def _list_routes(search: Search, grids: tuple[tuple[int, int], ...], is_retry: bool) -> list[GridRoute]:
+def _list_routes(search: Search, grids: tuple[tuple[int, int], ...]) -> list[GridRoute]:
     """Return the routes over the grids, best first: in the order of paths that are quickly fitted to them.
 
-    grids, is_retry: as in `starting_vectors`.
+    grids: as in `starting_vectors`.
 
     Each fitted path is inserted into the archive at once. As soon as a path is safe, and if routes may be shortened,
     the following routes are only shortened and are not returned.
@@ -140,7 +138,7 @@ def _list_routes(search: Search, grids: tuple[tuple[int, int], ...], is_retry: b
     should_shorten = search.can_shorten and search.algorithm.optimiser == "waypoints" and not search.first_safe
     is_among_zones = is_limited(data.airspace)
     routes = (
-        airspace_routes(data, frame, span, grids, search.pause, finer_only=is_retry)
+        airspace_routes(data, frame, span, grids, search.pause)
         if is_among_zones
         else grid_routes(data, frame, span, grids, search.pause)
     )
@@ -319,6 +317,8 @@ def shorten_best(search: Search) -> None:
 
 # Length of a safe path relative to the straight line above which a path that turns back may be shorter.
 LONG_DETOUR_RATIO = 1.25
+# Smallest number of waypoints of a path that may turn back: two turns lead away from the straight line, and two back.
+MIN_TURNING_WAYPOINTS = 6
 # Lattice steps as fractions of the step that turns require, tried until a path is safe.
 LATTICE_STEP_FRACTIONS = (1.0, 0.6)
 # Maximum length of a followed route as a fraction of the best safe path.
@@ -343,6 +343,8 @@ def may_turn_back(search: Search, certificate: Certificate) -> bool:
     This is the case if that path is not safe, or if it is long.
     """
     if not search.algorithm.seeded or search.encoding.name != "rotated" or search.must_end():
+        return False
+    if search.encoding.waypoints < MIN_TURNING_WAYPOINTS:
         return False
     if not search.meets_goal(certificate):
         return True
@@ -384,19 +386,23 @@ def _search_lattices(
     data, space = search.problem.search, search.problem.space
     frame, step = rotated_frame(space.start, space.destination), turning_step(data)
     lattices = [make_lattice(data, frame, step_fraction * step) for step_fraction in LATTICE_STEP_FRACTIONS]
-    remaining_states = MAX_EXPANDED
+    remaining_states = MAX_GUIDED_EXPANDED if is_guided else MAX_EXPANDED
     for index, step_fraction in enumerate(LATTICE_STEP_FRACTIONS):
         # If memory limits the step, a smaller step gives the same lattice again.
         if remaining_states <= 0 or search.must_end() or lattices[index] in lattices[:index]:
             break
+        key = index, is_guided
         try:
-            route, expanded_count = lattice_route(
-                data, frame, step_fraction * step, search.pause, remaining_states, is_guided=is_guided
-            )
+            if key not in search.lattice_routes:
+                search.lattice_routes[key] = lattice_route(
+                    data, frame, step_fraction * step, search.pause, remaining_states, is_guided=is_guided
+                )
         except SearchEnded:
             break
+        route, expanded_count = search.lattice_routes[key]
         remaining_states -= expanded_count
-        if not len(route):
+        # A path cannot follow a route with more points than it has waypoints.
+        if not len(route) or len(route) > search.encoding.waypoints:
             continue
         is_safe = search.meets_goal(best[1])
         if is_safe and path_length(route) > MAX_ROUTE_FRACTION * path_length(best[0]):

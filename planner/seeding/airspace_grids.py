@@ -492,25 +492,19 @@ def airspace_routes(
     span: tuple[float, float],
     grids: tuple[tuple[int, int], ...],
     pause: Callable[[], None] = lambda: None,
-    *,
-    finer_only: bool = False,
 ) -> Iterator[GridRoute]:
     """Yield routes over grids, for a problem with zones or a maximum height.
 
     span: lowest and highest position across, m.
     grids: for each grid, its number of stages (multiplied by `STAGE_FACTOR`) and its number of different routes.
     pause: called from time to time; an exception raised there stops the search.
-    finer_only: True to skip a grid that is no finer than an earlier grid, because `MAX_CELLS` limits it.
 
     Grids are gentle (see `AirspaceGrid`), because their routes are easier to fly. Before that, the first grid is
     searched without this restriction, because narrow gaps may require steep or curved routes.
     """
-    expected_cost, max_stages = EXPECTED_COST_RATIO * math.dist(data.start, data.destination), 0
+    expected_cost = EXPECTED_COST_RATIO * math.dist(data.start, data.destination)
     for index, (stages, route_count) in enumerate(grids):
         grid = airspace_grid(data, frame, span, STAGE_FACTOR * stages)
-        if finer_only and grid.stages <= max_stages:
-            continue
-        max_stages = max(max_stages, grid.stages)
         if index == 0:
             route = _find_route(data, frame, grid._replace(gentle=False), (), expected_cost, pause)
             if route is not None:

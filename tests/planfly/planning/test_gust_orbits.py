@@ -14,7 +14,7 @@ from planfly.planning.gust_orbits import MAX_EXPECTED_ORBITS, expected_orbits, l
 from planfly.workflow.make_plan import make_plan
 from planfly.workflow.uav import Uav, load_uav
 from planner.plan import Plan
-from planner.search.plan_path import plan_path
+from planner.search.plan_path import plan_path, with_waypoints
 from tests.setups import spec_around, with_path
 from world.scenario import Scenario, scenario_from_spec
 
@@ -125,6 +125,22 @@ def test_a_plan_that_needs_more_says_what_would_help(airframe_of_x8: Uav) -> Non
     enough, less = (tight.with_parameters(NAV_FW_ALT_RAD=asked) for asked in (value, value - 5.0))
     assert expected_orbits(plan, enough, uav.limits) <= MAX_EXPECTED_ORBITS
     assert expected_orbits(plan, less, uav.limits) > MAX_EXPECTED_ORBITS
+
+
+@pytest.mark.parametrize(("waypoints", "asked_counts"), [(12, [3]), (24, [])])
+def test_no_path_with_few_waypoints_is_sought_if_the_usual_number_was_too_small(
+    waypoints: int, asked_counts: list[int], airframe_of_x8: Uav
+) -> None:
+    """A plan has more waypoints than the scenario states (12) only if a search with 12 has found no safe path.
+
+    With a NAV_FW_ALT_RAD of 5 m the expected orbits allow one inner waypoint, so that three are asked for.
+    """
+    found = plan_path(scenario_of("moderate"), airframe_of_x8.limits.with_margin(), seed=SEED)
+    tight = Px4(airframe_of_x8.autopilot.with_parameters(NAV_FW_ALT_RAD=5.0).parameters)  # type: ignore[arg-type]
+    uav, asked = replace(airframe_of_x8, autopilot=tight), list[int]()
+    plan = with_path(found, with_waypoints(found.waypoints, waypoints))
+    assert not limit_waypoint_orbits(plan, uav, searching(uav, asked)).safe
+    assert asked == asked_counts
 
 
 @pytest.mark.parametrize(("aside", "taken"), [(300.0, True), (2000.0, False)])

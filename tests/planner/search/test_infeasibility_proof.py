@@ -149,6 +149,26 @@ def test_an_end_above_level_flight_is_closed(climb: float, closed: bool, small: 
     assert is_closed(data) is closed
 
 
+@pytest.mark.parametrize(
+    ("start_up", "wind", "closed"), [(140.0, 0.0, True), (140.0, 15.0, False), (160.0, 0.0, False)]
+)
+def test_a_destination_to_which_the_aircraft_can_only_climb_too_gently_is_closed(
+    start_up: float, wind: float, closed: bool, small: Small, make_limits: MakeLimits
+) -> None:
+    """The destination is at 150 m, where the aircraft climbs 0.3°; 0.5° remain as a margin to slopes.
+
+    Over the ground it climbs up to 0.3° x 25 / (25 - 15) = 0.75° against a wind of 15 m/s. A path from a start above
+    the destination needs no climb.
+    """
+    data = arrays(small, make_limits, [])
+    assert math.degrees(data.angle_margin) == pytest.approx(0.5)
+    climb = np.radians([1.3, 0.8, -0.2, -1.2, -2.2, -3.2])
+    start, destination = np.array([*data.start[:2], start_up]), np.array([*data.destination[:2], 150.0])
+    assert (
+        is_closed(in_thin_air(data, *climb, wind_speed=wind)._replace(start=start, destination=destination)) is closed
+    )
+
+
 @pytest.mark.parametrize(("more", "closed"), [(-5.0, True), (15.0, False)])
 def test_ground_is_not_passed_above_level_flight(
     more: float, closed: bool, small: Small, make_limits: MakeLimits
@@ -180,3 +200,14 @@ def test_the_search_ends_where_an_end_is_above_level_flight(monkeypatch: pytest.
     assert line.startswith(f"no path exists: the start is at {scenario.start[2]:.0f} m, higher than 3")
     assert "cannot fly level at 15 m/s" in line
     assert not any("--budget" in line for line in explain_failure(plan, limits))
+
+
+def test_a_destination_above_the_highest_climb_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A Zagi from 2,985 m to 3,054 m: it climbs 0.25 degrees at 3,000 m, half of the margin to slopes."""
+    scenario = fresh_scenario(2378)
+    limits = load_uav(scenario).limits.with_margin()
+    plan = plan_path(scenario, limits, seed=1)
+    assert not plan.safe
+    line = next(line for line in explain_failure(plan, limits) if line.startswith("no path exists"))
+    assert line.startswith("no path exists: the destination is at 3054 m, higher than 29")
+    assert "with the planner's slope margin of 0.5°" in line

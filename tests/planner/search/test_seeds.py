@@ -1,6 +1,8 @@
 """What a seeded search starts from: the straight line, routes that are fitted, an older path."""
 
+import math
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +19,7 @@ from planner.evaluation.encoding import ENCODINGS, RotatedFrame, rotated_frame
 from planner.evaluation.problem import CERTIFIED_KILL_MARGIN_M, ProblemArrays, make_problem
 from planner.plan import Certificate, Objective
 from planner.search.algorithms import ALGORITHMS
-from planner.search.plan_path import certify_waypoints, plan_path
+from planner.search.plan_path import DEFAULT_WAYPOINTS, MORE_WAYPOINTS, certify_waypoints, plan_path
 from planner.search.search_state import Search
 from planner.search.seeds import (
     MIN_DETOUR_FRACTION,
@@ -26,7 +28,6 @@ from planner.search.seeds import (
     starting_vectors,
     try_straight_line,
 )
-from planner.seeding.grids import GridRoute
 from tests.instances import random_scenario
 from tests.soak import some
 from world.arrays import Floats
@@ -34,6 +35,7 @@ from world.geometry import leg_courses, leg_runs
 from world.random_streams import PLANNER, stream
 from world.scenario import Scenario, load_scenario, scenario_from_spec
 from world.scenario_file import parse_scenario
+from world.scenario_tables import PlannerTable
 
 FLAT = {"kind": "flat", "amsl_m": 0}
 GRIDS = ((24, 2),)
@@ -96,14 +98,15 @@ def test_a_lattice_that_memory_makes_the_same_is_searched_once(
     ("seen", "allowed"),
     [
         (25_000, [(False, 60_000), (False, 35_000)]),
-        (60_000, [(False, 60_000), (True, 60_000)]),
-        (30_000, [(False, 60_000), (False, 30_000), (True, 60_000), (True, 30_000)]),
+        (60_000, [(False, 60_000), (True, 20_000)]),
+        (30_000, [(False, 60_000), (False, 30_000), (True, 20_000)]),
+        (10_000, [(False, 60_000), (False, 50_000)]),
     ],
 )
 def test_a_second_lattice_expands_no_more_states_than_the_first_has_left(
     scenario: Scenario, limits: Limits, monkeypatch: pytest.MonkeyPatch, seen: int, allowed: list[tuple[bool, int]]
 ) -> None:
-    """Neither finds a route, and 60,000 states are for both; if that is not enough, as many for a guided search."""
+    """Neither finds a route, and 60,000 states are for both; if that is not enough, 20,000 for guided searches."""
     asked: list[tuple[bool, int]] = []
 
     def find_none(
@@ -125,26 +128,46 @@ def test_a_second_lattice_expands_no_more_states_than_the_first_has_left(
     assert asked == allowed
 
 
-def test_among_zones_a_later_attempt_follows_the_best_routes_alone(
+def test_searches_with_other_numbers_of_waypoints_share_the_routes_over_lattices(
     small: Callable[..., Scenario], make_limits: Callable[[Scenario], Limits], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Seven routes that lead straight through a zone: none is safe, and each that is followed is improved."""
-    zone = {"name": "it", "kind": "exclusion", "east_m": 3000, "north_m": 0, "radius_m": 500}
-    scenario = small(terrain=FLAT, zones=[zone])
-    followed: list[int] = []
-    for again in (False, True):
-        search = search_of(scenario, make_limits(scenario))
-        route = GridRoute(np.array([[0.0, 0.0, 150.0], [6000.0, 0.0, 150.0]]), 6000.0)
-        monkeypatch.setattr(seeds_module, "_list_routes", lambda *_, route=route: [route] * 7)
-        improved: list[int] = []
-        monkeypatch.setattr(
-            Search,
-            "improve",
-            lambda self, *_, improved=improved: improved.append(0) or self.evaluate(straight(self))[0],
-        )
-        starting_vectors(search, GRIDS, None, is_retry=again)
-        followed.append(len(improved))
-    assert followed == [7, 3]
+    """Zones enclose the destination: nothing is safe, so that the search is repeated with 24 waypoints.
+
+    Zones do not take part in the proof that no path exists.
+    """
+    # Eight circles of radius 300 m, whose centres are 459 m apart.
+    centres = 600.0 * np.exp(0.25j * math.pi * np.arange(8))
+    zones = [
+        {"name": f"z{k}", "kind": "exclusion", "east_m": 6000 + z.real, "north_m": z.imag, "radius_m": 300}
+        for k, z in enumerate(centres)
+    ]
+    scenario = small(terrain=FLAT, zones=zones)
+    scenario = replace(scenario, planner=PlannerTable(population=scenario.planner.population))
+    searched: list[tuple[float, bool]] = []
+    counts: list[int] = []
+
+    def record_search(
+        data: ProblemArrays,
+        frame: RotatedFrame,
+        step: float,
+        pause: Callable[[], None],
+        max_states: int,
+        *,
+        is_guided: bool,
+    ) -> tuple[Floats, int]:
+        searched.append((step, is_guided))
+        return np.empty((0, 3)), 100
+
+    def record_attempt(search: Search, *_: object) -> None:
+        counts.append(search.encoding.waypoints)
+        search.evaluate(search.straight_vectors())
+
+    monkeypatch.setattr(seeds_module, "lattice_route", record_search)
+    monkeypatch.setattr(plan_path_module, "_run_attempt", record_attempt)
+    assert not plan_path(scenario, make_limits(scenario), seed=1).safe
+    # Two attempts with the default number of waypoints, one with more.
+    assert counts == [DEFAULT_WAYPOINTS, DEFAULT_WAYPOINTS, MORE_WAYPOINTS]
+    assert len(searched) == len(set(searched)) == 2
 
 
 def straight(search: Search) -> Floats:

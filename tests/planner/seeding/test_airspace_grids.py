@@ -256,18 +256,3 @@ def test_what_a_pause_raises_ends_the_routes(made: Made) -> None:
     data = made(zones=[wall(-2900.0, 700.0)])
     with pytest.raises(KeyboardInterrupt):
         next(airspace_routes(data, rotated_frame(data.start, data.destination), (-2000.0, 2000.0), ((20, 1),), end))
-
-
-def test_of_grids_that_memory_makes_as_coarse_only_the_first_may_be_searched(
-    made: Made, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    data = made(zones=[wall(-2900.0, 700.0)])
-    frame, span = rotated_frame(data.start, data.destination), (-2000.0, 2000.0)
-    # 20 stages fit; 30 and 40 do not, and are divided by 1.2 until they do.
-    most = airspace_grid(data, frame, span, 25)
-    monkeypatch.setattr(airspace_grids, "MAX_CELLS", (most.stages + 1) * most.across.size * most.layers)
-    assert [airspace_grid(data, frame, span, number).stages for number in (20, 30, 40)] == [20, 25, 22]
-    # The first grid is searched twice.
-    for finer_only, stages in ((False, [20, 20, 25, 22, 25]), (True, [20, 20, 25])):
-        found = airspace_routes(data, frame, span, ((10, 1), (15, 1), (20, 1), (15, 1)), finer_only=finer_only)
-        assert [len(one.points) - 1 for one in found] == stages
