@@ -28,8 +28,9 @@ from planner.optimisers.front_sampling import FrontSampling
 from planner.optimisers.hypervolume import covering_order
 from planner.plan import Objective, Objectives, Plan, Violations
 from planner.search.algorithms import find_algorithm, limits_for
-from planner.search.plan_path import plan_path, with_waypoints
+from planner.search.plan_path import plan_path
 from planner.search.search_state import SearchProgress, StopCondition
+from planner.search.seeds import with_waypoints
 from planner.seeding.airspace_grids import airspace_routes
 from planner.seeding.first_samples import bridge_modes
 from planner.seeding.shortening import resample, shorten_path

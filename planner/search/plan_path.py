@@ -41,10 +41,11 @@ from planner.search.seeds import (
     shorten_best,
     starting_vectors,
     try_straight_line,
+    with_waypoints,
 )
 from world.arrays import Floats
 from world.errors import ScenarioError
-from world.geometry import leg_runs, path_length
+from world.geometry import path_length
 from world.random_streams import PLANNER, stream
 from world.scenario import Scenario
 from world.scenario_tables import PlannerTable
@@ -195,15 +196,6 @@ def _is_better(result: _Result, other: _Result) -> bool:
         return meets
     key, other_key = ((item.ok, item.kill_distance) for item in (certificate, other_certificate))
     return key > other_key
-
-
-def with_waypoints(path: Floats, count: int) -> Floats:
-    """Return a path (w, 3) with its longest legs halved until it has `count` waypoints."""
-    waypoints = [np.asarray(point, dtype=np.float64) for point in path]
-    while len(waypoints) < count:
-        longest_leg = int(np.argmax(leg_runs(np.array(waypoints))))
-        waypoints.insert(longest_leg + 1, 0.5 * (waypoints[longest_leg] + waypoints[longest_leg + 1]))
-    return np.array(waypoints)
 
 
 def certify_waypoints(scenario: Scenario, limits: Limits, waypoints: Floats, *, seed: int) -> Plan:

@@ -12,8 +12,9 @@ from planner.evaluation.problem import make_problem
 from planner.plan import Objectives, Plan, Violations
 from planner.search.algorithms import find_algorithm, limits_for
 from planner.search.explain_failure import violated_zones
-from planner.search.plan_path import plan_path, with_waypoints
+from planner.search.plan_path import plan_path
 from planner.search.search_state import SearchProgress, StopCondition
+from planner.search.seeds import with_waypoints
 from planner.search.shared_budget import Search, SharedBudget
 from world.errors import MissionError
 from world.geometry import leg_courses

@@ -47,7 +47,7 @@ from planner.seeding.shortening import resample, shorten_path
 from planner.seeding.side_routes import close_places, optimistic_grid, side_routes
 from planner.seeding.waypoint_fitting import CLOSE_FIT, QUICK_FIT, fit_points, fit_waypoints
 from world.arrays import Floats
-from world.geometry import path_length
+from world.geometry import leg_runs, path_length
 
 # Maximum evaluations of the pattern search on a quickly fitted path.
 QUICK_SEARCH_EVALUATIONS = 50
@@ -408,6 +408,12 @@ def _search_lattices(
         if is_safe and path_length(route) > MAX_ROUTE_FRACTION * path_length(best[0]):
             break
         path, certificate, is_shortened = _search_along_route(search, route)
+        if not search.meets_goal(certificate):
+            # The route itself may be safe, with its points as waypoints.
+            route_path = with_waypoints(route, search.encoding.waypoints)
+            route_certificate = certify(search.problem, route_path)
+            if search.meets_goal(route_certificate):
+                path, certificate = route_path, route_certificate
         if search.meets_goal(certificate) and (not is_safe or path_length(path) < path_length(best[0])):
             best = (path, certificate) if is_shortened else _follow_shortened(search, (path, certificate))
             break
@@ -417,6 +423,15 @@ def _search_lattices(
         ):
             best = path, certificate
     return best, remaining_states > 0
+
+
+def with_waypoints(path: Floats, count: int) -> Floats:
+    """Return a path (w, 3) with its longest legs halved until it has `count` waypoints."""
+    waypoints = [np.asarray(point, dtype=np.float64) for point in path]
+    while len(waypoints) < count:
+        longest_leg = int(np.argmax(leg_runs(np.array(waypoints))))
+        waypoints.insert(longest_leg + 1, 0.5 * (waypoints[longest_leg] + waypoints[longest_leg + 1]))
+    return np.array(waypoints)
 
 
 def _follow_shortened(search: Search, best: tuple[Floats, Certificate]) -> tuple[Floats, Certificate]:

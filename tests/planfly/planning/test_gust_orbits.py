@@ -14,7 +14,8 @@ from planfly.planning.gust_orbits import MAX_EXPECTED_ORBITS, expected_orbits, l
 from planfly.workflow.make_plan import make_plan
 from planfly.workflow.uav import Uav, load_uav
 from planner.plan import Plan
-from planner.search.plan_path import plan_path, with_waypoints
+from planner.search.plan_path import plan_path
+from planner.search.seeds import with_waypoints
 from tests.setups import spec_around, with_path
 from world.scenario import Scenario, scenario_from_spec
 

@@ -1,5 +1,6 @@
 """Whole searches: the same plan from the same seed, options refused, honest failures."""
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -12,6 +13,7 @@ from planner.search.algorithms import ALGORITHMS
 from planner.search.plan_path import plan_path
 from planner.search.search_state import Search
 from world.errors import ScenarioError
+from world.geometry import path_length
 from world.scenario import Scenario, load_scenario
 
 FLAT = {"kind": "flat", "amsl_m": 0}
@@ -26,7 +28,7 @@ def test_among_zones_there_are_two_attempts_at_most(
     monkeypatch.setattr(plan_path_module, "may_turn_back", lambda *_: False)
     made: list[int] = []
 
-    def attempt(search: Search, number: int, _: object) -> None:
+    def attempt(search: Search, number: int, *_: object) -> None:
         made.append(number)
         search.evaluate(search.straight_vectors())
 
@@ -198,6 +200,9 @@ def test_more_waypoints_are_tried_unless_their_number_is_stated(
     plan = plan_path(scenario, make_limits(scenario), seed=1)
     assert plan.safe
     assert len(plan.waypoints) == 24
+    # A string that is pulled tight around the walls, without turns.
+    length = 2 * math.hypot(1900, 8500) + 6 * math.hypot(1800, 17000) + 7 * 200
+    assert length < path_length(plan.waypoints) < 1.05 * length
     scenario = serpentine(small, 7, waypoints=12)
     plan = plan_path(scenario, make_limits(scenario), seed=1)
     assert not plan.safe

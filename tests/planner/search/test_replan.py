@@ -9,8 +9,9 @@ import pytest
 
 from aircraft.path_limits import Limits
 from planner.plan import Plan, parse_plan, plan_json
-from planner.search.plan_path import plan_path, with_waypoints
+from planner.search.plan_path import plan_path
 from planner.search.replan import replan
+from planner.search.seeds import with_waypoints
 from world.airspace.zones import Cylinder, Zone
 from world.errors import MissionError, ScenarioError
 from world.geometry import turning_angles
