@@ -418,8 +418,7 @@ def winds(
     directions: number of wind directions, 4 to 72; None takes 16.
     most: strongest wind that is searched, m/s; None takes 20.
     flights: maximum number of flights for all directions together; None takes 5,000.
-    confidence: confidence level of each interval; None takes 0.95.
-    For a resumed search, None takes the earlier value of each of these five.
+    confidence: confidence level of each interval; None takes 0.95.  A resumed search keeps its values for None.
     spread, seed, workers, scheduler: see `planfly.campaign`.  For the other options, see `planfly.fly`.
     out: a folder for ``winds.html``, ``winds.png``, ``winds.json`` and the flights; None keeps no files.
     resume: True continues the search in the folder.  overwrite: True replaces the search.

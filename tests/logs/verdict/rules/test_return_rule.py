@@ -130,11 +130,12 @@ def test_a_return_too_low_over_ground_fails_by_the_clearance(parameters: dict[st
     failed = {item.rule for item in verdict.findings if item.ok is False}
     assert failed == ({"clearance"} if parameters else set())
     assert {item.rule for item in judge_geometry(setup).findings if item.ok is False} == failed
-    # Its legs have no items: its altitude is suggested first, 10 m and a margin higher in steps of 5 m.
-    suggested = [item.suggestions[0] for item in verdict.findings if item.suggestions]
-    assert [[(change.parameter, change.wanted) for change in way] for way in suggested] == (
-        [[("RTL_ALTITUDE", 35.0)]] if parameters else []
-    )
+    # Its legs have no items: its altitude is suggested first, higher by what lacks of 30 m and by 1 m, rounded up.
+    suggested = [(item.suggestions[0], item.flown) for item in verdict.findings if item.suggestions]
+    assert len(suggested) == len(parameters)
+    for (change,), height in suggested:
+        assert height is not None
+        assert (change.parameter, change.wanted) == ("RTL_ALTITUDE", math.ceil(20.0 + 30.0 - height + 1.0))
 
 
 def test_a_return_that_meets_a_ridge_has_not_got_to_its_end() -> None:
