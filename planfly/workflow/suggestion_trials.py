@@ -273,8 +273,7 @@ class SuggestionTrials:
     def find_passing(self) -> list[PassedTrial]:
         """Try the first suggestion of each finding, then the second and so on; return those that pass.
 
-        A suggestion is left out if a part of its changes passes by itself. The moves of a suggestion are the fewest that
-        are enough.
+        A suggestion is left out if a part of its changes passes by itself. Its moves are the fewest that are enough.
         """
         requests = [
             (number, rank, finding)

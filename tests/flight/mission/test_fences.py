@@ -16,8 +16,7 @@ from flight.mission.fences import (
 )
 from flight.mission.from_plan import plan_mission
 from flight.mission.items import Command, Frame, Mission, MissionItem
-from flight.mission_files.formats import mission_text, parse_mission
-from flight.mission_files.wpl import fence_text
+from flight.mission_files.formats import fence_text, mission_text, parse_mission
 from planner.plan import Plan
 from tests.mission_lines import a_plan
 from tests.setups import small_scenario
