@@ -321,7 +321,7 @@ def make_itinerary(mission: Mission, *, resets_jump_counters: bool = False) -> I
     if steps.endless is not None:
         name = command_name(mission.items[steps.index[steps.endless]].command)
         builder.notes.add(
-            f"{name} repeats indefinitely; the simulated flight flies its items once more and then ends",
+            f"{name} repeats indefinitely, so the simulated flight flies its items once more and then ends",
             steps.endless,
         )
     _add_command_limits(mission, steps, builder)
@@ -776,7 +776,7 @@ class _ItineraryBuilder:
             item = replace(item, lat_deg=self.stops[-1].lat_deg, lon_deg=self.stops[-1].lon_deg, alt=alt)
         elif not item.has_position:
             self.add_open_item(
-                f"{name} without a position: the autopilot would use its current position; planfly does not fly it",
+                f"{name} without a position: not flown (the autopilot would use its current position)",
                 item.seq,
             )
             return

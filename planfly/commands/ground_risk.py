@@ -21,7 +21,7 @@ def add_ground_risk_parser(command_line: LineParser) -> None:
     parser = command_line.add_command(
         "ground-risk",
         "find flight geography, contingency volume, ground risk buffer and intrinsic ground risk class by SORA 2.5,"
-        " from many flights with their returns and falls, and by formulas",
+        " from many simulated flights, their returns and falls, and from the formulas of SORA",
         "planfly ground-risk mission.waypoints --terrain dem.tif --population GHS_POP.tif --out risk",
         extra="campaigns",
     )

@@ -75,8 +75,12 @@ def terrain(args: argparse.Namespace) -> int:
         more_text = (
             f" and {len(result.absent) - _MAX_LISTED_CELLS} more" if len(result.absent) > _MAX_LISTED_CELLS else ""
         )
-        absent_text = "treated as sea, at 0 m" if args.sea else "open sea, or not published (--sea treats it as sea)"
-        print_warnings([f"no tile at {corner_text}{more_text} (south-west corners, degrees): {absent_text}"])
+        absent_text = (
+            "Treated as sea at 0 m" if args.sea else ("Open sea, or tiles not published (--sea treats both as sea)")
+        )
+        print_warnings(
+            [(f"there are no tiles with the south-west corners {corner_text}{more_text} (degrees). {absent_text}")]
+        )
     if result.empty:
         print_warnings([f"{result.empty:,} of {rows * cols:,} pixels have no data"])
     print(f"next      planfly fly MISSION --terrain {shlex.quote(str(result.file))}")

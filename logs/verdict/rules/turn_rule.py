@@ -205,9 +205,9 @@ def _sharp_turn_message(
                 f"the turn takes {requirements.length_after[waypoint]:.0f} m of the next leg, after the waypoint"
             )
     length_before, length_after = requirements.runs[waypoint - 1], requirements.runs[waypoint]
-    legs_text = f"its legs of {length_before:.0f} m and {length_after:.0f} m"
+    legs_text = f"its legs ({length_before:.0f} m and {length_after:.0f} m)"
     room_text = (
-        f"{legs_text} have room for only {math.degrees(limit):.1f}°" if limit > 0.0 else f"{legs_text} have no room"
+        f"{legs_text} leave room for only {math.degrees(limit):.1f}°" if limit > 0.0 else f"{legs_text} leave no room"
     )
     return message(
         f"{turn_text}, but {room_text}",

@@ -141,7 +141,7 @@ def test_jumps_are_followed_as_often_as_they_say() -> None:
     endless = route(*corners, "2 177 2 -1 0 0 0 0 0")
     assert endless.items.tolist() == [1, 2, 3, 2, 3]
     assert endless.notes == (
-        "item 4: DO_JUMP repeats indefinitely; the simulated flight flies its items once more and then ends",
+        "item 4: DO_JUMP repeats indefinitely, so the simulated flight flies its items once more and then ends",
     )
     assert (endless.endless_jump, route(*corners, "2 177 2 2 0 0 0 0 0").endless_jump) == (4, None)
     # What follows a jump without end is never flown.

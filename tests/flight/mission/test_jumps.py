@@ -135,7 +135,7 @@ def test_a_tag_leads_to_the_first_item_of_its_number_wherever_the_jump_stands() 
     endless = route(wp(0, 0), "2 600 4 0 0 0 0 0 0", wp(0, 900), wp(900, 900), "2 601 4 -1 0 0 0 0 0")
     assert endless.items.tolist() == [1, 3, 4, 3, 4]
     assert (
-        "item 5: DO_JUMP_TAG repeats indefinitely; the simulated flight flies its items once more and then ends"
+        "item 5: DO_JUMP_TAG repeats indefinitely, so the simulated flight flies its items once more and then ends"
         in endless.notes
     )
     assert "DO_JUMP_TAG p1 7: the mission has no JUMP_TAG 7" in refusal(wp(0, 0), wp(0, 900), "2 601 7 1 0 0 0 0 0")

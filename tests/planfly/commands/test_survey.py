@@ -83,7 +83,7 @@ def test_a_flight_and_its_log_say_the_same(tmp_path: Path, capsys: pytest.Captur
     assert main(asked) == 4
     out = capsys.readouterr().out
     assert "front overlap 8" in out
-    assert "95 % required" in out
+    assert "95 % is required" in out
     [found] = json.loads((tmp_path / "a.json").read_text(encoding="utf-8"))["overlaps"]
     assert (found["front"], found["front_asked"]) == (pytest.approx(seen.front, abs=1e-3), 0.95)
     assert (found["side"], found["side_asked"]) == (pytest.approx(seen.side, abs=1e-3), 0.6)

@@ -202,9 +202,11 @@ def test_where_no_tile_is_has_no_data_unless_it_is_sea(here: Path, capsys: pytes
     with serving(here / "coast") as server:
         assert main(["terrain", *AREA, "--source", server.url, "--out", "open.tif", "--json", "a.json"]) == 0
         said = capsys.readouterr().err
-        assert "no tile at 46 9, 47 9 (south-west corners, degrees): open sea, or not published (--sea treats" in said
+        assert (
+            "no tiles with the south-west corners 46 9, 47 9 (degrees). Open sea, or tiles not published (--sea treats"
+        ) in said
         assert main(["terrain", *AREA, "--source", server.url, "--sea", "--out", "sea.tif"]) == 0
-        assert "46 9, 47 9 (south-west corners, degrees): treated as sea, at 0 m" in capsys.readouterr().err
+        assert "46 9, 47 9 (degrees). Treated as sea at 0 m" in capsys.readouterr().err
     for name, value in (("open.tif", -32768.0), ("sea.tif", 0.0)):
         heights, lat, lon = seen(here / name)
         west = lon < 9.0 - 0.5 / ROWS

@@ -70,8 +70,10 @@ def test_a_path_of_ones_own_that_does_not_hold_names_the_leg_and_the_wind(tmp_pa
     steep = np.array([[-6000.0, 0.0, 250.0], [2e3, 0.0, 300.0], [3e3, 0.0, 300.0 + rise], [6000.0, 0.0, 250.0]])
     plan = planfly.plan(file, waypoints=steep)
     (problem,) = plan.certificate.problems
-    assert problem.startswith("in the local wind of the forecast: leg 1 climbs at 8.2° for 1000 m;")
-    assert problem.endswith("limit is 7.6° in this 18 m/s tailwind")
+    assert problem.startswith(
+        "in the local wind of the forecast: leg 1 climbs at 8.2° for 1000 m; the aircraft's limit is 7.6° at "
+    )
+    assert problem.endswith(", with 18 m/s tailwind")
     assert not plan.safe
 
 
