@@ -191,9 +191,9 @@ class ContainerWriter:
                 index.setdefault(number, []).append((log_time, position))
         parts, channels, position = [], [], 0
         for number, pairs in sorted(index.items()):
-            data = np.array(pairs, dtype="<u8").tobytes()
-            header = number.to_bytes(2, "little") + len(data).to_bytes(4, "little")
-            parts.append(FRAME.pack(Opcode.MESSAGE_INDEX, _PAIRS_HEAD + len(data)) + header + data)
+            encoded_pairs = np.array(pairs, dtype="<u8").tobytes()
+            header = number.to_bytes(2, "little") + len(encoded_pairs).to_bytes(4, "little")
+            parts.append(FRAME.pack(Opcode.MESSAGE_INDEX, _PAIRS_HEAD + len(encoded_pairs)) + header + encoded_pairs)
             channels.append(ChannelIndex(number, position, len(pairs)))
             position += len(parts[-1])
         times = [log_time for pairs in index.values() for log_time, _ in pairs]

@@ -106,7 +106,7 @@ def test_the_last_line_of_progress_counts_every_flight(base: CampaignBase, tmp_p
         _fly_remaining(cast("WorkerPool", AtOnce()), book, store, pace)
     # How many there are is said before the first; they were quicker than another line is due.
     assert [said[:2] for said in told] == [(0.0, 6.0), (6.0, 6.0)]
-    assert told[-1][2].startswith("6 flights, P ")
+    assert told[-1][2].startswith("6 flights, probability ")
     assert told[-1][2].endswith(", 0 s left")
 
 

@@ -111,7 +111,7 @@ TO_ARDUPLANE = "but PX4 is to fly; --autopilot ardupilot simulates ArduPlane ins
         ("copter.plan", "copter.plan: mission.vehicleType: 2: a multicopter or helicopter"),
         ("vtol.plan", "vtol.plan: mission.vehicleType: 22: a VTOL aircraft"),
         ("tracker.plan", "tracker.plan: mission.vehicleType: 5: not a fixed-wing aircraft"),
-        ("slugs.plan", "slugs.plan: mission.firmwareType: 1: another autopilot"),
+        ("slugs.plan", "slugs.plan: mission.firmwareType: 1: not an autopilot that planfly simulates"),
     ],
 )
 @pytest.mark.usefixtures("files")

@@ -305,7 +305,7 @@ def test_the_smallest_part_of_the_moves_that_passes_is_suggested(
     if len(moved) < 4:
         assert [change.place.index for change in trial.suggestion] == sorted(moved)
         change = trial.suggestion[0]
-        assert f"(item {items[min(moved)]}) by 12 m (move item" in suggestion_text((change,))
+        assert f"(item {items[min(moved)]}) by 12 m: move item" in suggestion_text((change,))
 
 
 def test_one_end_of_a_leg_is_raised_if_that_is_enough() -> None:
@@ -313,7 +313,7 @@ def test_one_end_of_a_leg_is_raised_if_that_is_enough() -> None:
     lines = [wp(0, 500, 80.0), wp(0, 2500, 80.0), wp(0, 4500, 20.0)]
     judged = judge_mission_geometry(setup_of(*lines, home="36.5 -84.2 100"))
     (finding,) = [finding for finding in judged.failed if finding.rule == "clearance"]
-    assert finding.suggestion == "raise waypoint 2 (item 3) by 11 m (move item 3 up by 11 m)"
+    assert finding.suggestion == "raise waypoint 2 (item 3) by 11 m: move item 3 up by 11 m"
 
 
 def test_a_distance_from_a_missile_is_enlarged_by_what_is_missing() -> None:

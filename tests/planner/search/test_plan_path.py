@@ -235,4 +235,4 @@ def test_the_last_progress_is_of_the_path_that_turns_back(
     plan = plan_path(scenario, make_limits(scenario), seed=1, progress=lambda done, total, text: texts.append(text))
     assert plan.safe
     assert "no feasible path yet" in texts
-    assert texts[-1] == f"length ratio {plan.objectives.length_ratio:.4f}, kill exposure 0"
+    assert texts[-1] == f"{plan.objectives.length_ratio:.4f} times the straight line, kill exposure 0"
