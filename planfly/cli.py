@@ -6,7 +6,8 @@ Heavy imports are left to the commands.
 import errno
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import NoReturn
 
 from planfly._version import __version__
 from planfly.commands.registry import COMMANDS, COMMANDS_BY_NAME
@@ -37,40 +38,21 @@ first steps:
 _MACHINE_ERRORS = (errno.EMFILE, errno.ENFILE, errno.ENOMEM, errno.EIO)
 
 
+# Errors that end a command with one line: bad input, errors of the machine, and interruptions.
+_REPORTED_ERRORS = (PlanflyError, OSError, MemoryError, KeyboardInterrupt)
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command, and return its exit code.
 
     argv: arguments without the program's name; None for the arguments of the process.  With None this function does not
     return: the process ends with the exit code of the command, or after SIGINT or SIGTERM.
-    """
-    if argv is not None:
-        return _run_command(argv)
-    prepare_process()
-    open_standard_streams()
-    if COMPLETION_VARIABLE in os.environ:
-        complete_for_shell(build_parser())
-    with end_on_signals() as received_signals:
-        try:
-            code = with_large_stack(lambda: _run_command(argv))
-        except Exception:
-            if not received_signals:
-                raise
-            # An interrupted compiler may fail with any error.
-            code = _report_error(128 + received_signals[0], "interrupted")
-    # End the process directly, because the shutdown of an interpreter with compiled code takes up to a second.
-    end_process(code)
-
-
-# Errors that end a command with one line: bad input, errors of the machine, and interruptions.
-_REPORTED_ERRORS = (PlanflyError, OSError, MemoryError, KeyboardInterrupt)
-
-
-def _run_command(argv: Sequence[str] | None) -> int:
-    """Parse the command line, run its command, and return the exit code.
 
     Bad input, errors of the machine and interruptions are reported in one line.  Errors are also written to the files
     of --json and --junit, so that files of an earlier run are not mistaken for this run's.
     """
+    if argv is None:
+        _run_as_process(lambda: main(sys.argv[1:]))
     command_parser = None
     try:
         with safe_streams():
@@ -78,7 +60,7 @@ def _run_command(argv: Sequence[str] | None) -> int:
             try:
                 args = parser.parse_args(argv)
             except UsageExit as usage:
-                write_usage_error_if_requested(sys.argv[1:] if argv is None else argv, usage.line, parser.commands)
+                write_usage_error_if_requested(argv, usage.line, parser.commands)
                 raise
             command_parser = parser.commands[args.command]
             with redirect_output(args):
@@ -93,6 +75,24 @@ def _run_command(argv: Sequence[str] | None) -> int:
                     raise
     except _REPORTED_ERRORS as error:
         return _report_error(*_exit_code_and_text(error, command_parser))
+
+
+def _run_as_process(run: Callable[[], int]) -> NoReturn:
+    """Set up this process, run a command, and end the process with the command's exit code, or after a signal."""
+    prepare_process()
+    open_standard_streams()
+    if COMPLETION_VARIABLE in os.environ:
+        complete_for_shell(build_parser())
+    with end_on_signals() as received_signals:
+        try:
+            code = with_large_stack(run)
+        except Exception:
+            if not received_signals:
+                raise
+            # An interrupted compiler may fail with any error.
+            code = _report_error(128 + received_signals[0], "interrupted")
+    # End the process directly, because the shutdown of an interpreter with compiled code takes up to a second.
+    end_process(code)
 
 
 def build_parser() -> LineParser:

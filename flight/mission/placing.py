@@ -637,32 +637,19 @@ def implied_scenario(
     >>> scenario.external, scenario.bounds.round().tolist()
     (True, [[-2000.0, 2000.0], [-2000.0, 3110.0]])
     """
-    flight = flight or FlightTable(aircraft_by_default=True)
     itinerary = make_itinerary(mission)
     origin = mission_origin(mission, itinerary.stops)
     points = project_stops(mission.source, itinerary.stops, origin)
     area = _mission_area(mission, itinerary, origin, points)
-    terrain, table = _load_terrain(terrain_path, origin, area, points)
+    terrain = None
+    if terrain_path is not None:
+        raster, (lat, lon) = open_raster(terrain_path), to_geo(origin, *points.T)
+        if _covers_any(raster, lat, lon):
+            terrain = read_terrain(raster, origin, area, GROUND_BUFFER)
+        if terrain is None or not np.isfinite(terrain.height(points[:, 0], points[:, 1])).any():
+            raise _coverage_error(terrain_path, raster, lat, lon)
     placed_mission = place_stops(mission, origin, terrain, itinerary=itinerary, vertical_legs=vertical_legs)
-    max_altitude = max(placed_stop.map_position[2] for placed_stop in placed_mission.stops)
-    if terrain is not None:
-        max_altitude = max(max_altitude, float(np.nanmax(terrain.heights)))
-    file_name = re.split(r"[/\\]", mission.source)[-1]
-    name = "".join(character if character.isprintable() else "?" for character in file_name)
-    spec = ScenarioFile(
-        name=name[:100] or "mission",
-        description="Made around a mission that came without a scenario",
-        origin=OriginTable(lat_deg=origin.lat_deg, lon_deg=origin.lon_deg),
-        terrain=table,
-        area=AreaTable(
-            east_m=area[0].tolist(),
-            north_m=area[1].tolist(),
-            ceiling_amsl_m=min(max_altitude + AREA_MARGIN_M, MAX_ALTITUDE_M),
-        ),
-        start=_end_table_above_ground(placed_mission.stops[0].map_position, terrain),
-        destination=_end_table_above_ground(placed_mission.stops[-1].map_position, terrain),
-        flight=flight,
-    )
+    spec = _make_spec(placed_mission, area, terrain_path, terrain, flight)
     return ImpliedScenario(scenario_from_spec(spec, mission.source, ground=terrain, external=True), placed_mission)
 
 
@@ -707,34 +694,19 @@ def _mission_area(mission: Mission, itinerary: Itinerary, origin: GeoOrigin, poi
     return np.clip(area + np.array([-margin, margin]), -MAP_EXTENT, MAP_EXTENT)
 
 
-def _load_terrain(
-    path: str | None, origin: GeoOrigin, area: Floats, points: Floats
-) -> tuple[Terrain | None, TerrainTable]:
-    """Read the terrain of an area; return it with the scenario's [terrain] table.
+def _coverage_error(path: str, raster: RasterFile, lat: Floats, lon: Floats) -> TerrainError:
+    """Return the error for an elevation file without data at all positions of a mission, as in another region's file.
 
-    path: elevation file or built-in name; None for no terrain.
-    area: [[west, east], [south, north]], (2, 2) m.
-    points: positions of the mission's stops, (n, 2) m.
-
-    Raises TerrainError if the ground is unknown at all of these positions, as in the file of another region.
+    path: elevation file or built-in name.
+    lat, lon: positions of the mission's stops, degrees, (n,).
     """
-    if path is None:
-        return None, TerrainTable(kind="none")
-    raster = open_raster(path)
-    file = Path(path)
-    table = TerrainTable(kind="dem", path=str(file.resolve()) if file.is_file() else path, sha256=raster.sha256)
-    lat, lon = to_geo(origin, *points.T)
-    if _covers_any(raster, lat, lon):
-        terrain = read_terrain(raster, origin, area, GROUND_BUFFER)
-        if np.isfinite(terrain.height(points[:, 0], points[:, 1])).any():
-            return terrain, table
     positions_text = f"latitude {lat.min():.4f}..{lat.max():.4f}, longitude {lon.min():.4f}..{lon.max():.4f}"
     swap_text = (
         ". With latitude and longitude swapped, the mission would lie in this terrain"
         if _covers_any(raster, lon, lat)
         else ""
     )
-    raise TerrainError(
+    return TerrainError(
         f"{path}: no data at any position of the mission, which flies to {positions_text};"
         f" the terrain covers {coverage_text(raster)}{swap_text}",
         file=path,
@@ -746,6 +718,43 @@ def _covers_any(raster: RasterFile, lat: Floats, lon: Floats) -> bool:
     (cols, rows), (row_count, col_count) = raster.to_pixels(lon, lat), raster.shape
     # False for a position that the file's coordinate system cannot express (NaN or inf).
     return bool(((cols >= 0.0) & (cols <= col_count - 1.0) & (rows >= 0.0) & (rows <= row_count - 1.0)).any())
+
+
+def _make_spec(
+    placed_mission: PlacedMission,
+    area: Floats,
+    terrain_path: str | None,
+    terrain: Terrain | None,
+    flight: FlightTable | None,
+) -> ScenarioFile:
+    """Return the tables of the scenario around a mission.
+
+    area: [[west, east], [south, north]], (2, 2) m.
+    terrain_path, terrain: an elevation file or a built-in name, and its terrain in the area; None for no terrain.
+    flight: the [flight] table; None for the defaults.
+    """
+    origin, stops, terrain_table = placed_mission.origin, placed_mission.stops, TerrainTable(kind="none")
+    max_altitude = max(placed_stop.map_position[2] for placed_stop in stops)
+    if terrain_path is not None and terrain is not None:
+        max_altitude = max(max_altitude, float(np.nanmax(terrain.heights)))
+        path = str(Path(terrain_path).resolve()) if Path(terrain_path).is_file() else terrain_path
+        terrain_table = TerrainTable(kind="dem", path=path, sha256=terrain.sha256)
+    file_name = re.split(r"[/\\]", placed_mission.mission.source)[-1]
+    name = "".join(character if character.isprintable() else "?" for character in file_name)
+    return ScenarioFile(
+        name=name[:100] or "mission",
+        description="Made around a mission that came without a scenario",
+        origin=OriginTable(lat_deg=origin.lat_deg, lon_deg=origin.lon_deg),
+        terrain=terrain_table,
+        area=AreaTable(
+            east_m=area[0].tolist(),
+            north_m=area[1].tolist(),
+            ceiling_amsl_m=min(max_altitude + AREA_MARGIN_M, MAX_ALTITUDE_M),
+        ),
+        start=_end_table_above_ground(stops[0].map_position, terrain),
+        destination=_end_table_above_ground(stops[-1].map_position, terrain),
+        flight=flight or FlightTable(aircraft_by_default=True),
+    )
 
 
 def _end_table_above_ground(position: Position, terrain: Terrain | None) -> EndTable:

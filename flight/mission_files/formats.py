@@ -5,7 +5,7 @@ ArduPilot's text formats are read and written here: QGC WPL 110 missions, and fe
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from decimal import Decimal
 from itertools import pairwise
@@ -168,6 +168,48 @@ def parse_mission(text: str, source: str) -> Mission:
     first_text = text.removeprefix("\ufeff").lstrip()
     if first_text[:1] in ("{", "[") or (source.lower().endswith(".plan") and not first_text.startswith("QGC")):
         return parse_plan_file(text, source)
+    items: list[MissionItem] = []
+    locations: list[TextLine] = []
+    has_current = False
+    for location, columns in _read_rows(text, source):
+        integers = {name: _parse_integer(location, name, columns[name]) for name in _ALLOWED_RANGES}
+        p1, p2, p3, p4, lat, lon, alt = (_parse_number(location, name, columns[name]) for name in _COLUMNS[4:11])
+        # A home line of Mission Planner may carry command 0.
+        command = int(integers["command"] or (Command.NAV_WAYPOINT if integers["seq"] == 0 else 0))
+        frame, continues = integers["frame"], bool(integers["autocontinue"])
+        if is_located(command, frame) and position_problem(lat, lon) is None:
+            lat, lon = round_to_grid(lat), round_to_grid(lon)
+        item = MissionItem(integers["seq"], command, frame, (p1, p2, p3, p4), lat, lon, alt, continues)
+        problem = item_problem(item)
+        if problem is not None:
+            raise MissionError(**problem.error_arguments(location.file, location))
+        items.append(item)
+        locations.append(location)
+        has_current |= bool(integers["current"])
+    if not items:
+        raise MissionError(f"{source}: no items after the header", file=source)
+    warnings = _collect_warnings(locations, items, has_current=has_current)
+    # Fence and rally items without a home line are numbered from 0, too.
+    first_number = 0 if _begins_with_home(items) or items[0].command in _COMMANDS_WITH_OWN_FILES else 1
+    home, body = _split_home([replace(item, seq=seq) for seq, item in enumerate(items, first_number)])
+    # Messages on a fence item state its number in the file, as ground stations show it.
+    fences = tuple(item for item in body if item.command in FENCES)
+    fence_shapes(fences, source)
+    return Mission(
+        home=home,
+        items=tuple(item for item in body if item.command not in _COMMANDS_WITH_OWN_FILES),
+        fences=fences,
+        rally=number_items([item for item in body if item.command == Command.NAV_RALLY_POINT]),
+        warnings=tuple(warnings),
+        source=source,
+    )
+
+
+def _read_rows(text: str, source: str) -> Iterator[tuple[TextLine, dict[str, str]]]:
+    """Yield the location and the columns of each item's line in a WPL 110 text.
+
+    Raises MissionError for a text that is too long or without the header, and for a line without twelve columns.
+    """
     line_break_count = max(text.count("\n"), text.count("\r"))
     if line_break_count > MAX_LINES:
         raise MissionError(f"{source}: too long: {line_break_count:,} lines; the limit is {MAX_LINES:,}", file=source)
@@ -192,57 +234,14 @@ def parse_mission(text: str, source: str) -> Mission:
         )
     if len(lines) - 1 > MAX_ITEMS:
         raise MissionError(f"{source}: too long: {len(lines) - 1:,} items; the limit is {MAX_ITEMS:,}", file=source)
-    locations = [TextLine(source, number) for number, _ in lines[1:]]
-    items = [_parse_row(location, line) for location, (_, line) in zip(locations, lines[1:], strict=True)]
-    if not items:
-        raise MissionError(f"{source}: no items after the header", file=source)
-    has_current = any(int(line.split()[_COLUMNS.index("current")]) for _, line in lines[1:])
-    warnings = _collect_warnings(locations, items, has_current=has_current)
-    # Fence and rally items without a home line are numbered from 0, too.
-    first_number = 0 if _begins_with_home(items) or items[0].command in _COMMANDS_WITH_OWN_FILES else 1
-    home, body = _split_home([replace(item, seq=seq) for seq, item in enumerate(items, first_number)])
-    # Messages on a fence item state its number in the file, as ground stations show it.
-    fences = tuple(item for item in body if item.command in FENCES)
-    fence_shapes(fences, source)
-    return Mission(
-        home=home,
-        items=tuple(item for item in body if item.command not in _COMMANDS_WITH_OWN_FILES),
-        fences=fences,
-        rally=number_items([item for item in body if item.command == Command.NAV_RALLY_POINT]),
-        warnings=tuple(warnings),
-        source=source,
-    )
-
-
-def _parse_row(location: TextLine, line: str) -> MissionItem:
-    """Parse a line of twelve columns. Raises MissionError, which names the column, for an invalid line."""
-    fields = line.split()
-    if len(fields) != len(_COLUMNS):
-        raise MissionError(
-            f"{location}: {count_text(len(fields), 'column')}: expected {len(_COLUMNS)} ({', '.join(_COLUMNS)})",
-            file=location.file,
-        )
-    values = dict(zip(_COLUMNS, fields, strict=True))
-    integers = {name: _parse_integer(location, name, values[name]) for name in _ALLOWED_RANGES}
-    p1, p2, p3, p4, lat, lon, alt = (_parse_number(location, name, values[name]) for name in _COLUMNS[4:11])
-    # A home line of Mission Planner may carry command 0.
-    command = integers["command"] or (Command.NAV_WAYPOINT if integers["seq"] == 0 else 0)
-    if is_located(command, integers["frame"]) and position_problem(lat, lon) is None:
-        lat, lon = round_to_grid(lat), round_to_grid(lon)
-    item = MissionItem(
-        integers["seq"],
-        int(command),
-        integers["frame"],
-        (p1, p2, p3, p4),
-        lat,
-        lon,
-        alt,
-        bool(integers["autocontinue"]),
-    )
-    problem = item_problem(item)
-    if problem is not None:
-        raise MissionError(**problem.error_arguments(location.file, location))
-    return item
+    for number, line in lines[1:]:
+        location, fields = TextLine(source, number), line.split()
+        if len(fields) != len(_COLUMNS):
+            raise MissionError(
+                f"{location}: {count_text(len(fields), 'column')}: expected {len(_COLUMNS)} ({', '.join(_COLUMNS)})",
+                file=location.file,
+            )
+        yield location, dict(zip(_COLUMNS, fields, strict=True))
 
 
 def _value_error(location: TextLine, field: str, value: str | int, value_text: str, allowed: str) -> MissionError:

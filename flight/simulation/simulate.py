@@ -413,27 +413,7 @@ class RunningFlight:
         self._work.settings.min_airspeed = 0.94 * aircraft.stall_speed
         self._work.settings.center_longitude = self.map.center_longitude
         self._work.settings.battery = setup.battery
-        length = self.path.length + _extra_loiter_length(setup, waypoints)
-        ground_speed = _min_ground_speed(setup, self._airspeeds)
-        if (wind_field := setup.scenario.wind.field) is not None:
-            # Allow for the largest deviation of the forecast's wind from the mean wind around the flight.
-            longest_time = TIME_LIMIT_FACTOR * length / MIN_GROUND_SPEED_MPS + TIME_LIMIT_BASE_S
-            flight_field = wind_field.between(0.0, longest_time)
-            flight_field = without_levels_above(flight_field, float(setup.route.positions[:, 2].max()))
-            ground_speed -= float(np.linalg.norm(flight_field.velocities, axis=-1).max())
-        time_limit = TIME_LIMIT_FACTOR * length / max(MIN_GROUND_SPEED_MPS, ground_speed) + TIME_LIMIT_BASE_S
-        # A loiter for a time lasts as long as its item states, although its path is only one circle.
-        timed_loiters = waypoints[(waypoints["loiter_time"] > 0.0) & (waypoints["loiter_time"] < math.inf)]
-        time_limit += sum(
-            dict(zip(timed_loiters["item"].tolist(), timed_loiters["loiter_time"].tolist(), strict=True)).values()
-        )
-        if setup.route.rtl_loiter is not None:
-            # An autopilot that flies an RTL by its own control law may loiter longer than the path does.
-            radius_factor = eas_to_tas_ratio(setup.route.rtl_loiter.up) ** 2
-            time_limit += rtl_loiter_timeout(radius_factor * setup.route.rtl_loiter.radius)
-        if waypoints["is_mission_end"][-1]:
-            time_limit += rtl_loiter_timeout(setup.autopilot.loiters.radius)
-        self.max_ticks = int(time_limit / self.dt)
+        self.max_ticks = int(_time_limit(setup, self.path, waypoints, self._airspeeds) / self.dt)
 
     @property
     def position(self) -> Floats:
@@ -559,6 +539,35 @@ class RunningFlight:
         if route.arc_radii[next_waypoint] > 0.0 and route.rtl_start is None:
             return f"{text} in the loiter of item {route.items[next_waypoint]}"
         return text
+
+
+def _time_limit(setup: FlightSetup, path: FlyByPath, waypoints: Records, airspeeds: Floats) -> float:
+    """Return the time limit of a flight along a route, s, a multiple of the predicted time.
+
+    path, waypoints: reference path, and `WAYPOINT` records of the route, (w,).
+    airspeeds: airspeed on each leg, m/s.
+    """
+    length = path.length + _extra_loiter_length(setup, waypoints)
+    ground_speed = _min_ground_speed(setup, airspeeds)
+    if (wind_field := setup.scenario.wind.field) is not None:
+        # Allow for the largest deviation of the forecast's wind from the mean wind around the flight.
+        longest_time = TIME_LIMIT_FACTOR * length / MIN_GROUND_SPEED_MPS + TIME_LIMIT_BASE_S
+        flight_field = wind_field.between(0.0, longest_time)
+        flight_field = without_levels_above(flight_field, float(setup.route.positions[:, 2].max()))
+        ground_speed -= float(np.linalg.norm(flight_field.velocities, axis=-1).max())
+    time_limit = TIME_LIMIT_FACTOR * length / max(MIN_GROUND_SPEED_MPS, ground_speed) + TIME_LIMIT_BASE_S
+    # A loiter for a time lasts as long as its item states, although its path is only one circle.
+    timed_loiters = waypoints[(waypoints["loiter_time"] > 0.0) & (waypoints["loiter_time"] < math.inf)]
+    time_limit += sum(
+        dict(zip(timed_loiters["item"].tolist(), timed_loiters["loiter_time"].tolist(), strict=True)).values()
+    )
+    if setup.route.rtl_loiter is not None:
+        # An autopilot that flies an RTL by its own control law may loiter longer than the path does.
+        radius_factor = eas_to_tas_ratio(setup.route.rtl_loiter.up) ** 2
+        time_limit += rtl_loiter_timeout(radius_factor * setup.route.rtl_loiter.radius)
+    if waypoints["is_mission_end"][-1]:
+        time_limit += rtl_loiter_timeout(setup.autopilot.loiters.radius)
+    return time_limit
 
 
 def _extra_loiter_length(setup: FlightSetup, waypoints: Records) -> float:

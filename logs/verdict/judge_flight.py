@@ -73,7 +73,12 @@ def judge_flight(
     if findings_only:
         return Verdict(findings, flyable, complete, (), "flown", unjudged=unjudged)
     findings = with_suggestions(air_requirements, aligned, findings)
-    levels = _level_answers(whole_requirements, findings, flyable)
+    levels: tuple[LevelAnswer, ...] = ()
+    if whole_requirements.envelope:
+        route_findings = run_rules(whole_requirements, None, geometric=True, flight_findings=findings)
+        levels = (_geometric_level(setup, route_findings, findings),)
+    own_headline = headline(findings, flyable, setup_notes(setup, findings))
+    levels += (LevelAnswer(setup.autopilot.answer_name, flyable, own_headline, undecided=_is_undecided(findings)),)
     conditions = judging_conditions(setup)
     verdict = Verdict(
         *(findings, flyable, complete, summary_lines(findings, setup, "flown", levels, conditions), "flown", levels),
@@ -105,34 +110,24 @@ def with_reference(verdict: Verdict, requirements: RouteRequirements, reference:
     return replace(verdict, findings=findings, lines=lines, levels=levels, deciding=deciding)
 
 
-def _level_answers(
-    requirements: RouteRequirements, flight_findings: tuple[Finding, ...], flyable: bool
-) -> tuple[LevelAnswer, ...]:
-    """Return the geometric answer, with its disagreements with the flight, and then the flight's answer.
+def _geometric_level(
+    setup: FlightSetup, route_findings: tuple[Finding, ...], flight_findings: tuple[Finding, ...]
+) -> LevelAnswer:
+    """Return the geometric answer from the findings on the route, with its disagreements with the flight."""
+    findings = (*blocking_item_findings(setup), *route_findings)
+    passes = not any(finding.ok is False for finding in findings) and not undecided_findings(findings)
+    return LevelAnswer(
+        "geometry",
+        passes,
+        headline(findings, passes, setup_notes(setup, flight_findings)),
+        _disagreements("geometry", findings, flight_findings),
+        undecided=_is_undecided(findings),
+    )
 
-    If the envelope is not applied, only the flight's own answer is returned.
-    """
-    levels, notes = [], setup_notes(requirements.setup, flight_findings)
-    if requirements.envelope:
-        route_findings = run_rules(requirements, None, geometric=True, flight_findings=flight_findings)
-        geometric = (*blocking_item_findings(requirements.setup), *route_findings)
-        has_failed = any(finding.ok is False for finding in geometric)
-        passes = not has_failed and not undecided_findings(geometric)
-        disagreements = _disagreements("geometry", geometric, flight_findings)
-        headline_text = headline(geometric, passes, notes)
-        levels.append(
-            LevelAnswer("geometry", passes, headline_text, disagreements, undecided=not passes and not has_failed)
-        )
-    undecided = bool(undecided_findings(flight_findings)) and not any(
-        finding.ok is False for finding in flight_findings
-    )
-    own_answer = LevelAnswer(
-        requirements.setup.autopilot.answer_name,
-        flyable,
-        headline(flight_findings, flyable, notes),
-        undecided=undecided,
-    )
-    return (*levels, own_answer)
+
+def _is_undecided(findings: tuple[Finding, ...]) -> bool:
+    """Return True if no finding has failed, but some leave the answer undecided."""
+    return bool(undecided_findings(findings)) and not any(finding.ok is False for finding in findings)
 
 
 def _airframe_level(airframe: AirframeAnswer, flight_findings: tuple[Finding, ...]) -> LevelAnswer:

@@ -168,7 +168,9 @@ def fly(
     limits = FlightLimits(options["max_hours"], options["max_log"])
     program = None if options["sitl"] is None else check_program(options["sitl"])
     setup = open_flight(mission, options, program, options["engine"])
-    target = None if log is None else _prepare_log_file(log, setup, mission, program, overwrite)
+    target = None if log is None else expand_path_pattern(log, setup.name, setup.seed)
+    if target is not None:
+        _clear_log_file(target, log, mission, program, overwrite)
     with stage(f"flying {length_and_duration_text(setup)}", computing_time_key(setup)) as advance:
         return fly_and_judge(
             setup,
@@ -214,16 +216,17 @@ def fly_by_each(
     return flights
 
 
-def _prepare_log_file(
-    log: str | Path, setup: FlightSetup, mission: Plan | str | Path, program: Path | None, overwrite: bool
-) -> Path:
-    """Remove an existing log and the autopilot program's log, and return the log file to write.
+def _clear_log_file(
+    target: Path, log: str | Path | None, mission: Plan | str | Path, program: Path | None, overwrite: bool
+) -> None:
+    """Make the folder of a flight log, and remove an existing log and the autopilot program's log.
 
+    target: the file of the log.
+    log: the file as the user named it.
     Raises PlanflyError for a file that cannot be written, and for an existing file without `overwrite`.
     """
     source = None if isinstance(mission, Plan) else Path(mission)
-    target = expand_path_pattern(log, setup.name, setup.seed)
-    folder_must_exist = target == Path(log)
+    folder_must_exist = log is not None and target == Path(log)
     check_output_file(target, overwrite, source, suffix=".mcap", folder_must_exist=folder_must_exist)
     if program is not None:
         program_log = autopilot_log_path(target, program)
@@ -233,7 +236,6 @@ def _prepare_log_file(
         # Remove the report and the pictures of the previous flight.
         prepare_folder(target.parent, LOG_FIGURES)
     report_replaced(target, *((autopilot_log_path(target, program),) if program is not None else ()))
-    return target
 
 
 # ----------------------------------------------------------------------

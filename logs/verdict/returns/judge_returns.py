@@ -53,7 +53,7 @@ from logs.verdict.tolerances import (
     HOME_ERROR_M,
     UNDECIDED_FRACTION,
 )
-from world.arrays import Floats
+from world.arrays import Flags, Floats
 from world.errors import MissionError
 from world.kernels import Record, Records
 from world.scenario import Scenario
@@ -564,7 +564,8 @@ def judge_returns(
         if not world.is_simulated or ("landing" in world.unjudged_parts and ending == "straight to land"):
             continue
         targets = [world.target(row, ending) for row in starts.rows]
-        results, paths = simulate_judged_returns(world, starts, targets, min_heights)
+        simulated = world.fly(starts.rows, targets, store_positions=bool(world.airspace.zones))
+        results, paths = exclude_approaches(world, starts, targets, simulated.results, min_heights), simulated.tracks
         judged_returns = []
         for k, row in enumerate(results):
             advance(number * len(starts) + k, total_count)
@@ -634,35 +635,26 @@ def sinks_to_ground(ret: SimulatedReturn, height: float) -> bool:
 _NO_PATH: Floats = np.zeros((0, 3))
 
 
-def simulate_judged_returns(
-    world: ReturnWorld,
-    starts: ReturnStarts,
-    targets: Sequence[ReturnTarget],
-    min_heights: Floats,
-    min_sphere_distances: Floats | None = None,
-) -> tuple[Records, tuple[Floats, ...]]:
-    """Simulate returns for judging; their clearance excludes the approach to a landing.
+def find_approaches(targets: Sequence[ReturnTarget]) -> Flags:
+    """Return a mask (n,): True for each target whose return flies the mission's approach to a landing."""
+    return np.array([target.landing is not None and bool(target.landing.next_stops) for target in targets], np.bool_)
+
+
+def exclude_approaches(
+    world: ReturnWorld, starts: ReturnStarts, targets: Sequence[ReturnTarget], results: Records, min_heights: Floats
+) -> Records:
+    """Return the results of simulated returns, with clearances that exclude the approach to a landing.
 
     After the first item of a landing sequence, a return flies the mission's approach, which descends to the landing.
     The clearance of a return that becomes too low on the approach is therefore measured only up to the first item.
 
     starts, targets: start and target of each return, n of each.
+    results: simulated returns, (n,) of dtype `RETURN_RESULT`.
     min_heights: required heights above ground, m, (n,).
-    min_sphere_distances: required distances outside spheres, m, (n,), to abort a return that is too close or too low;
-        None to simulate every return to its end.
-    Returns the results, (n,) of dtype `RETURN_RESULT`, and the paths; the paths are empty without zones.
     """
-    has_approach = np.array(
-        [target.landing is not None and bool(target.landing.next_stops) for target in targets], dtype=np.bool_
-    )
-    abort_limits = (
-        None if min_sphere_distances is None else (np.where(has_approach, -math.inf, min_heights), min_sphere_distances)
-    )
-    simulation = world.fly(starts.rows, targets, store_positions=bool(world.airspace.zones), abort_limits=abort_limits)
-    results = simulation.results
-    indices = np.flatnonzero((results["clearance"] < min_heights) & has_approach)
+    indices = np.flatnonzero((results["clearance"] < min_heights) & find_approaches(targets))
     if not indices.size:
-        return results, simulation.tracks
+        return results
     short_targets = [
         targets[k]._replace(landing=landing._replace(next_stops=()))
         for k in indices.tolist()
@@ -675,7 +667,7 @@ def simulate_judged_returns(
         # A return that hits the ground keeps the position of the impact.
         is_airborne = results["outcome"][indices] != RETURN_GROUND_IMPACT
         values[indices[is_airborne]] = short_results[name][is_airborne]
-    return results, simulation.tracks
+    return results
 
 
 def required_heights(world: ReturnWorld, starts: ReturnStarts) -> Floats:

@@ -20,11 +20,12 @@ from logs.verdict.returns.judge_returns import (
     TURN_HEIGHT_LOSS_M,
     Returns,
     ReturnWorld,
+    exclude_approaches,
+    find_approaches,
     heights_above_ground,
     most_violated_zone,
     possible_heights,
     required_heights,
-    simulate_judged_returns,
 )
 from logs.verdict.returns.return_starts import ReturnStarts
 from logs.verdict.tolerances import ENERGY_RESERVE_FRACTION
@@ -155,14 +156,22 @@ def _meets_criterion(
     criterion: `_clears_ground` or `_meets_all_limits`; with the latter, zones and energy are checked, too.
     """
     sphere_distances = limits.sphere_distance if criterion is _meets_all_limits else np.full(len(starts), -math.inf)
-    results, paths = simulate_judged_returns(world, starts, targets, limits.clearance, sphere_distances)
+    # A return that is too close or too low is aborted, but not on its approach to a landing.
+    abort_heights = np.where(find_approaches(targets), -math.inf, limits.clearance)
+    simulated = world.fly(
+        starts.rows,
+        targets,
+        store_positions=bool(world.airspace.zones),
+        abort_limits=(abort_heights, sphere_distances),
+    )
+    results = exclude_approaches(world, starts, targets, simulated.results, limits.clearance)
     is_met = criterion(world, results, limits)
     if criterion is not _meets_all_limits:
         return is_met
     if world.is_energy_known:
         energy_left = world.setup.battery - np.nan_to_num(starts.energy_used) - results["energy"]
         is_met &= ~(energy_left < ENERGY_RESERVE_FRACTION * world.setup.battery)
-    for k, path in enumerate(paths):
+    for k, path in enumerate(simulated.tracks):
         is_met[k] = is_met[k] and (len(path) < 2 or most_violated_zone(world, path) < 0)
     return is_met
 
