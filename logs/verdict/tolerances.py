@@ -299,13 +299,13 @@ GO_AROUND_MODEL_ERROR_M = 6.0
 # and more than a small aircraft's banked wing reaches down.
 LAUNCH_CLEARANCE_M = 2.0
 # m.  A climb-out that exceeds `LAUNCH_CLEARANCE_M` by less than this is undecided: the simulated ArduPlane's height was
-# within 2.3 m of the real one's in the first 14 s of five flights.
+# within 2.3 m of ArduPlane's own (SITL) in the first 14 s of five flights.
 CLIMB_MODEL_ERROR_M = 2.5
 # m.  Largest height loss of a launched aircraft: ArduPlane's catapult launches at 14 m/s and more lost none; in a hand
 # launch at 1.8 m a larger loss leaves no room for a wing.
 MAX_LAUNCH_HEIGHT_LOSS_M = 1.0
-# m.  Least runway length left where the aircraft leaves the ground: the simulated ArduPlane left it after 34 m, and the
-# real one after 37 m, in the one such flight that is known.
+# m.  Least runway length left where the aircraft leaves the ground: the simulated ArduPlane left it after 34 m, and
+# ArduPlane itself (SITL) after 37 m, in the one such flight that is known.
 RUNWAY_MARGIN_M = 10.0
 # m.  Required height above ground of the legs after a take-off and of a landing sequence, even if the scenario requires
 # more, because these legs are always near the ground. It equals the requirement on a go-around,
