@@ -298,7 +298,7 @@ def test_cruise_speed_is_no_command() -> None:
 def test_stops_at_one_position_are_merged() -> None:
     flown = route(wp(0, 0), wp(0, 900), wp(0.3, 900.3), wp(0, 900), wp(900, 900))
     assert flown.items.tolist() == [1, 2, 5]
-    assert flown.notes == ("items 3-4: same position as item 2, merged with it",)
+    assert flown.notes == ("items 3-4: merged with item 2, which has the same position",)
     assert "item 3: 150.0 m straight above item 2" in refusal(wp(0, 0), wp(0, 900), wp(0, 900, 250), wp(900, 900))
 
 
