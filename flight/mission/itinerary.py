@@ -668,7 +668,7 @@ class _ItineraryBuilder:
             # survey rule judges camera switches.
             return
         elif support.reason == CAMERA_REASON:
-            notes.add(f"{name} is {CAMERA_REASON}", item.seq)
+            notes.add(f"{name} only controls the camera", item.seq)
         else:
             notes.add(f"{name} is not flown", item.seq)
 

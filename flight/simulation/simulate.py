@@ -52,9 +52,7 @@ def make_loop(
     step_model: Callable[[], object],
     steps: int,
 ) -> Callable[[int], int]:
-    """Return a function that flies up to a given number of ticks in JSBSim, and returns the flight's end code.
-
-    The code is 0 if the flight has not ended.
+    """Return a function that flies up to a given number of ticks in JSBSim, and returns its end code or 0.
 
     getters: getters of the state, in the order of `flight.simulation.tick.READ_FIELDS`.
     setters: setters of the outputs, in the order of `flight.simulation.tick.OUTPUT`.

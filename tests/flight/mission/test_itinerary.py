@@ -100,12 +100,12 @@ def test_a_gate_changes_the_speed_where_its_plane_cuts_the_leg() -> None:
         (
             (wp(0, 0), wp(0, 1800), wp(0, 2000, command=4501)),
             [25.0],
-            ["item 3: CONDITION_GATE: no waypoint follows it, so it is passed at once"],
+            ["item 3: CONDITION_GATE is passed at once, because no waypoint follows it"],
         ),
         (
             (wp(0, 0), wp(0, 900, command=4501), "2 178 0 20 -1 0 0 0 0", wp(0, 1800, command=17, p="0 0 100 0")),
             None,
-            ["item 2: CONDITION_GATE not between waypoints: the speed after it applies from the leg's start"],
+            ["item 2: CONDITION_GATE is not between waypoints, so the speed after it applies from the leg's start"],
         ),
     ],
 )
@@ -123,7 +123,7 @@ def test_gates_that_leave_their_leg_whole(
 def test_what_is_the_cameras_is_not_called_not_flown() -> None:
     items = wp(0, 0), "2 206 25 0 1 0 0 0 0", wp(0, 900), "2 203 0 0 0 0 1 0 0", "2 181 0 1 0 0 0 0 0", wp(0, 1800)
     assert route(*items).notes == (
-        "item 4: DO_DIGICAM_CONTROL: for the camera, nothing to fly",
+        "item 4: DO_DIGICAM_CONTROL only controls the camera",
         "item 5: DO_SET_RELAY is not flown",
     )
 

@@ -178,7 +178,7 @@ def test_a_home_at_zero_degrees_is_ignored_only_at_altitude_zero(altitude: str, 
     """`AP_AHRS::set_home` refuses latitude, longitude and altitude of 0 alone, the altitude in whole centimetres."""
     made = route(wp(0, 0), wp(0, 900), f"{frame} 179 0 0 0 0 0 0 {altitude}", wp(900, 900))
     assert [one.item for one in made.open_items] == [3] * opens
-    assert any("ignored, as ArduPlane does" in note for note in made.notes) != opens
+    assert any("ignored, as in ArduPlane" in note for note in made.notes) != opens
 
 
 @pytest.mark.parametrize(("jumps", "open_item"), [(63, None), (64, 2)])

@@ -269,8 +269,8 @@ def test_a_circle_left_when_its_time_is_over_is_drawn_no_longer() -> None:
 def test_what_comes_after_the_last_waypoint_is_said() -> None:
     rules = LoiterRules(80.0, "NAV_LOITER_RAD", ends_in_circle=True)
     note = (
-        "item 2: after the last waypoint the aircraft loiters around it indefinitely, with NAV_LOITER_RAD, 80 m:"
-        " one lap is flown"
+        "item 2: after the last waypoint the aircraft loiters around it indefinitely, with NAV_LOITER_RAD, 80 m;"
+        " one lap is simulated"
     )
     assert any(line.startswith(note) for line in laid_for(rules, wp(0, -1500), wp(0, 0)).notes)
     for last in (wp(0, 0, command=17, p="0 0 150 0"), "3 20 0 0 0 0 0 0 0", wp(0, 0, command=21)):
@@ -306,11 +306,11 @@ def test_a_radius_is_what_the_autopilot_reads_of_it_and_grows_with_height() -> N
         radius_of=lambda one: 0.0 if one.seconds else 200.0,
         radius_scale=lambda up: 1.0 + up / 1000.0,
     )
-    unread = "its radius of 150 m is ignored, so WP_LOITER_RAD (60 m) is used"
+    unread = "its radius of 150 m is ignored, so WP_LOITER_RAD ({} is used"
     # 100 m above home's 300 m: 1.4 times as wide.
     for loiter, radius, note in (
-        (wp(0, 0, 100, 19, p="60 0 -150 0"), -84.0, f"{unread} to the left"),
-        (wp(0, 0, 100, 19, p="60 0 150 0"), 84.0, unread),
+        (wp(0, 0, 100, 19, p="60 0 -150 0"), -84.0, unread.format("60 m to the left)")),
+        (wp(0, 0, 100, 19, p="60 0 150 0"), 84.0, unread.format("60 m)")),
         (
             wp(0, 0, 100, 18, p="2 0 207 0"),
             280.0,

@@ -341,7 +341,10 @@ def test_a_return_climbs_first_and_descends_over_its_target_to_another_height() 
 
 def test_a_landing_that_counts_as_a_place_to_return_to_is_noted() -> None:
     lines = wp(0, 3000), wp(2000, 3000), RTL, wp(0, 0, 0, command=21)
-    told = "item 3: the autopilot may also return to the mission's landing, which is not simulated. The simulated RTL goes to home"
+    told = (
+        "item 3: the autopilot may also return to the mission's landing, which is not simulated. The simulated RTL goes"
+        " to home"
+    )
 
     def notes(rules: ReturnRules, *items: str) -> tuple[str, ...]:
         return make_route(mission(*items), ORIGIN, None, 25.0, False, rules=RouteRules(rules)).notes
