@@ -453,7 +453,7 @@ class Px4(Autopilot):
         other_types = sorted({0.0, 1.0, 3.0} - {return_type})
         first_height, last_height = f"{parameters['RTL_RETURN_ALT']:g} m", f"{parameters['RTL_DESCEND_ALT']:g} m"
         path_text = (
-            f"with RTL_TYPE {return_type:g}, a return goes to {_DESTINATION_TEXTS[int(return_type)]}. An aircraft below"
+            f"RTL_TYPE {return_type:g}: a return goes to {_DESTINATION_TEXTS[int(return_type)]}. An aircraft below"
             f" RTL_RETURN_ALT ({first_height} above the destination) first climbs to this height in a loiter. Then it"
             " flies level. Before a landing sequence, the climb may end up to NAV_FW_ALT_RAD"
             f" ({parameters['NAV_FW_ALT_RAD']:g} m) below this height. Over home or a rally point, the aircraft"
