@@ -861,7 +861,7 @@ def _solve_by_newton(errors: Callable[[Floats], Floats], x: Floats) -> Floats | 
 def _no_propeller_error(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> FlightError:
     """Return the error for a sheet that no propeller meets.
 
-    For a stated climb, top speed or motor, the error states the range of it that some propeller meets.
+    If the sheet states a climb angle, a top speed or a motor, the error names the values for which a propeller exists.
 
     sheet: the sheet with missing values filled in.
     """
@@ -895,9 +895,9 @@ def _no_propeller_error(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -
 
 
 def _with_performance(sheet: DataSheet, motor: Motor, drag: Drag) -> DataSheet:
-    """Return the sheet with the climb and the top speed that the aircraft reaches with a motor.
+    """Return the sheet with the climb angle and the top speed that the aircraft reaches with a motor.
 
-    Raises _NoPropellerError if the climb is below the lowest climb of `RANGES`.
+    Raises _NoPropellerError if the climb angle is below the minimum in `RANGES`.
     """
     excess_thrust = motor.thrust(1.0, sheet.cruise, SHEET_DENSITY) - drag(sheet.cruise)
     climb = math.asin(max(-1.0, min(0.95, excess_thrust / _weight(sheet))))

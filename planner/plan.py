@@ -22,7 +22,7 @@ from world.errors import ArgumentError, MissionError
 from world.files import json_value, read_small_file
 from world.html_table import html_table
 from world.scenario import Scenario, scenario_from_spec, with_amsl_endpoints
-from world.scenario_file import first_fault
+from world.scenario_file import JSON_OBJECT, first_fault
 from world.terrain import Terrain
 
 PLAN_SCHEMA = "planfly.plan/1"
@@ -437,7 +437,7 @@ def parse_plan(
     try:
         plan_file = _PlanFile.model_validate(data)
     except ValidationError as error:
-        raise MissionError(**first_fault(error, data).at(source)) from None
+        raise MissionError(**first_fault(error, data, container=JSON_OBJECT).at(source)) from None
     _check_names(source, "violations", plan_file.violations, Violations._fields)
     _check_names(source, "objectives", plan_file.objectives, Objectives._fields)
     waypoints = np.array(plan_file.waypoints_east_north_amsl_m)

@@ -38,7 +38,7 @@ def tile_files(path: Path) -> list[Path] | None:
         if not files:
             raise TerrainError(f"{path}: a folder without an elevation file ({', '.join(SUFFIXES)})", file=path)
     elif path.suffix.lower() == VIRTUAL:
-        files = _virtual_files(path)
+        files = _source_files(path)
     else:
         return None
     if len(files) > MAX_TILES:
@@ -47,8 +47,8 @@ def tile_files(path: Path) -> list[Path] | None:
     return files
 
 
-def _virtual_files(path: Path) -> list[Path]:
-    """Return the files that a virtual raster (.vrt) joins, sorted by name.
+def _source_files(path: Path) -> list[Path]:
+    """Return the files to which a virtual raster (.vrt) refers, sorted by name.
 
     Raises TerrainError for an invalid .vrt, for one that computes heights, and for files outside its folder.
     """

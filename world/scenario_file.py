@@ -61,7 +61,7 @@ def check_scenario(data: Any, source: str) -> ScenarioFile:
     """
     if not isinstance(data, dict):
         raise ScenarioError(
-            f"{source}: scenario: expected a table of keys, got {type(data).__name__}", file=source, field="scenario"
+            f"{source}: scenario: expected an object, got {type(data).__name__}", file=source, field="scenario"
         )
     try:
         return ScenarioFile.model_validate(data)
@@ -114,12 +114,15 @@ class Fault(NamedTuple):
         return {"message": message, "file": source, "field": self.field, "value": self.value, "allowed": self.allowed}
 
 
-def first_fault(error: ValidationError, data: Any = None, model: type[BaseModel] | None = None) -> Fault:
+def first_fault(
+    error: ValidationError, data: Any = None, model: type[BaseModel] | None = None, container: str = "a table"
+) -> Fault:
     """Convert an error of pydantic to its first fault, with the text ``key: value: allowed values``.
 
     data: data that was checked. It is needed if a field allows several types, because pydantic's location then contains
         names that are not keys of the data.
     model: model of the data, needed to suggest a known key for an unknown key.
+    container: name of keys with values in the file's format: "a table" in TOML, or `JSON_OBJECT`.
 
     >>> from pydantic import ValidationError
     >>> from world.scenario_tables import WindTable
@@ -138,7 +141,7 @@ def first_fault(error: ValidationError, data: Any = None, model: type[BaseModel]
     ]
     first_error = (misspelt_keys or errors)[0]
     keys = [str(part) for part in (first_error["loc"] if data is None else _data_keys(first_error["loc"], data))]
-    message = expected_values(first_error)
+    message = expected_values(first_error, container)
     value = first_error.get("input")
     if isinstance(value, dict | list):
         value = None
@@ -156,12 +159,14 @@ def first_fault(error: ValidationError, data: Any = None, model: type[BaseModel]
     return Fault(field, value, message, f"{prefix}{message}{remainder}")
 
 
-# Expected values by the type of pydantic's error; placeholders are keys of the error's context.
+# Name of keys with values in a JSON file.
+JSON_OBJECT = "an object"
+# Expected values by the type of pydantic's error; placeholders are the container and keys of the error's context.
 _EXPECTED_VALUES = {
     "missing": "missing",
-    "model_type": "expected a table",
-    "model_attributes_type": "expected a table",
-    "dict_type": "expected a table",
+    "model_type": "expected {container}",
+    "model_attributes_type": "expected {container}",
+    "dict_type": "expected {container}",
     "list_type": "expected a list",
     "tuple_type": "expected a list",
     "string_type": "expected text",
@@ -188,15 +193,18 @@ _EXPECTED_VALUES = {
 }
 
 
-def expected_values(error_entry: Mapping[str, Any]) -> str:
-    """Return the expected values of a field, from one entry of a pydantic error's list; pydantic's words if unknown."""
+def expected_values(error_entry: Mapping[str, Any], container: str) -> str:
+    """Return the expected values of a field, from one entry of a pydantic error's list; pydantic's words if unknown.
+
+    container: name of keys with values, as in `first_fault`.
+    """
     template = _EXPECTED_VALUES.get(error_entry["type"])
     if template is None:
         return str(error_entry["msg"])
     context = error_entry.get("ctx", {})
     if "expected" in context:
         context = {"expected": context["expected"].replace("'", '"')}
-    return re.sub(r"\b1 (value|character)s$", r"1 \1", template.format(**context))
+    return re.sub(r"\b1 (value|character)s$", r"1 \1", template.format(container=container, **context))
 
 
 # Tables of the ends of a flight, which a scenario for a mission needs, too.

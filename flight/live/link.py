@@ -514,7 +514,7 @@ class Link:
         )
 
     def pop_notices(self) -> list[str]:
-        """Return the notices about senders that are not answered, and clear them."""
+        """Return and clear the notices about senders whose messages are ignored."""
         notices, self._notices = self._notices, []
         return notices
 

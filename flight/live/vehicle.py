@@ -308,13 +308,13 @@ class Vehicle:
         self._progress = MissionProgress(self.server, self.arming, self.status, self.downlink)
 
     def load(self, mission: Mission) -> None:
-        """Load a mission from a file, as if a station had uploaded it."""
+        """Load a mission with its fence and rally points, as if a ground station had uploaded them."""
         for kind, items in zip(MissionType, mission_lists(mission), strict=True):
             self.server.lists[kind] = items
         self.server.changed.add(MissionType.MISSION)
 
-    def load_fence(self, fences: Sequence[MissionItem], rally: Sequence[MissionItem] = ()) -> None:
-        """Load fence and rally points from files, as if a station had uploaded them.
+    def load_fence_and_rally(self, fences: Sequence[MissionItem], rally: Sequence[MissionItem] = ()) -> None:
+        """Load fence items and rally points, as if a ground station had uploaded them.
 
         They apply to missions that are loaded later.
         """

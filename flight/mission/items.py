@@ -18,13 +18,13 @@ class Notes:
 
     >>> notes = Notes()
     >>> for seq in (9, 3, 4, 5):
-    ...     notes.add("DO_SET_SERVO: not flown", seq)
+    ...     notes.add("DO_SET_SERVO is not flown", seq)
     >>> notes.lines()
-    ('items 3-5, 9: DO_SET_SERVO: not flown',)
+    ('items 3-5, 9: DO_SET_SERVO is not flown',)
     >>> for seq in (12, 14, 16, 17):
-    ...     notes.add("DO_SET_SERVO: not flown", seq)
+    ...     notes.add("DO_SET_SERVO is not flown", seq)
     >>> notes.lines()
-    ('items 3-5, 9, 12 and 3 more: DO_SET_SERVO: not flown',)
+    ('items 3-5, 9, 12 and 3 more: DO_SET_SERVO is not flown',)
     """
 
     _items: dict[str, list[int]] = field(default_factory=dict)
@@ -36,7 +36,7 @@ class Notes:
             items.append(seq)
 
     def lines(self) -> tuple[str, ...]:
-        """Return one line per note: "items 3-5, 9: DO_SET_SERVO: not flown"."""
+        """Return one line per note: "items 3-5, 9: DO_SET_SERVO is not flown"."""
         lines = []
         for text, items in self._items.items():
             numbers = sorted(set(items))

@@ -57,7 +57,9 @@ ENDLESS_LOITER_TIME_S = 60.0
 # Note on items after a mission's end.
 NEVER_REACHED = "never reached"
 # Note on a landing item whose landing is not simulated.
-LANDING_NOTE = "not flown to the ground; the flight ends above the landing point, at the altitude of the previous item"
+LANDING_NOTE = (
+    "is not flown to the ground. The flight ends above the landing point, at the altitude of the previous item"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -326,7 +328,7 @@ def make_itinerary(mission: Mission, *, resets_jump_counters: bool = False) -> I
         )
     _add_command_limits(mission, steps, builder)
     for gate in builder.gates:
-        builder.notes.px4.add("CONDITION_GATE: no waypoint follows it, so it is passed at once", gate.item)
+        builder.notes.px4.add("CONDITION_GATE is passed at once, because no waypoint follows it", gate.item)
     unreached = [
         item.seq
         for item in mission.items
@@ -361,13 +363,13 @@ def _add_command_limits(mission: Mission, steps: "_Steps", builder: "_ItineraryB
     """
     jumps = [item.seq for item in mission.items if item.command in JUMPS and item.seq in steps.reached]
     if len(jumps) > _MAX_COUNTED_JUMPS:
-        text = f"flown, but ArduPlane skips jumps beyond the first {_MAX_COUNTED_JUMPS}"
-        builder.add_open_item(f"DO_JUMP: {text}", jumps[_MAX_COUNTED_JUMPS], px4=False)
+        text = f"DO_JUMP is flown, but ArduPlane skips jumps beyond the first {_MAX_COUNTED_JUMPS}"
+        builder.add_open_item(text, jumps[_MAX_COUNTED_JUMPS], px4=False)
     elif len(jumps) > _MAX_COUNTED_JUMPS_SMALL_BOARD:
         board_text = f"a board with little memory skips jumps beyond the first {_MAX_COUNTED_JUMPS_SMALL_BOARD}"
-        builder.notes.arduplane.add(f"{len(jumps)} jumps: {board_text}")
+        builder.notes.arduplane.add(f"the mission has {len(jumps)} jumps, but {board_text}")
     if _MAX_JUMPS_IN_A_ROW in steps.jump_chains:
-        text = f"DO_JUMP: flown, but PX4 ends the mission after {_MAX_JUMPS_IN_A_ROW} jumps in a row"
+        text = f"DO_JUMP is flown, but PX4 ends the mission after {_MAX_JUMPS_IN_A_ROW} jumps in a row"
         builder.add_open_item(text, steps.jump_chains[_MAX_JUMPS_IN_A_ROW], arduplane=False)
     if _MAX_JUMPS_IN_A_ROW_ARDUPLANE in steps.jump_chains:
         text = f"DO_JUMP: flown, but ArduPlane ends the mission after {_MAX_JUMPS_IN_A_ROW_ARDUPLANE} jumps in a row"
@@ -578,13 +580,13 @@ class _ItineraryBuilder:
         for item in step.commands_on_leg:
             if item not in step.commands:
                 self.notes.arduplane.add(
-                    f"{command_name(item.command)}: flown one loop early, as ArduPlane runs it", item.seq
+                    f"{command_name(item.command)} is flown one loop early, as in ArduPlane", item.seq
                 )
         if step.target is not None:
             self._fly_item(step.target)
         else:
             for item in step.commands[1:]:
-                text = f"{command_name(item.command)}: not run, because no waypoint follows it"
+                text = f"{command_name(item.command)} is not run, because no waypoint follows it"
                 self.notes.arduplane.add(text, item.seq)
         for item in arduplane_commands[1:]:
             if item.command == Command.DO_SET_HOME:
@@ -615,14 +617,14 @@ class _ItineraryBuilder:
         elif item.command == Command.DO_SET_HOME:
             self._set_home(item)
         elif item.command == Command.CONDITION_GATE:
-            self.add_open_item(f"{command_name(item.command)}: not flown", item.seq, px4=False)
+            self.add_open_item(f"{command_name(item.command)} is not flown", item.seq, px4=False)
         elif item.command in (Command.CONDITION_DELAY, Command.CONDITION_DISTANCE):
             delayed = [
                 command
                 for command in later_commands
                 if command.command in (Command.DO_CHANGE_SPEED, Command.DO_SET_HOME)
             ]
-            text = f"{command_name(item.command)}: not flown"
+            text = f"{command_name(item.command)} is not flown"
             if delayed:
                 delay_text = f"; {command_name(delayed[0].command)} (item {delayed[0].seq}) is flown without the delay"
                 self.add_open_item(text + delay_text, item.seq, px4=False)
@@ -642,7 +644,7 @@ class _ItineraryBuilder:
             if item.has_position and self.stops:
                 self.gates.append(Gate(item.seq, item.lat_deg, item.lon_deg, self.px4_airspeed))
             else:
-                self.notes.px4.add(f"{command_name(item.command)}: passed at once", item.seq)
+                self.notes.px4.add(f"{command_name(item.command)} is passed at once", item.seq)
         else:
             if item.command in CAMERA_SWITCHES and self.gates:
                 self.gates[-1] = self.gates[-1]._replace(switches_camera=True)
@@ -660,23 +662,25 @@ class _ItineraryBuilder:
         treatment = support.px4 if as_px4 else support.arduplane
         notes = self.notes.px4 if as_px4 else self.notes.arduplane
         if treatment == Treatment.OPEN:
-            self.add_open_item(f"{name}: not flown; {support.reason}", item.seq, arduplane=not as_px4, px4=as_px4)
+            self.add_open_item(f"{name} is not flown; {support.reason}", item.seq, arduplane=not as_px4, px4=as_px4)
         elif item.command in MARKS or item.command in CAMERA_SWITCHES:
             # A marker command (such as DO_LAND_START or JUMP_TAG) needs no note, because it does nothing by itself. The
             # survey rule judges camera switches.
             return
         elif support.reason == CAMERA_REASON:
-            notes.add(f"{name}: {CAMERA_REASON}", item.seq)
+            notes.add(f"{name} only controls the camera", item.seq)
         else:
-            notes.add(f"{name}: not flown", item.seq)
+            notes.add(f"{name} is not flown", item.seq)
 
     def _note_wait(self, item: MissionItem) -> None:
         """Add a note for an item after which PX4 waits (`MissionBase::on_active`); ArduPlane does not wait."""
-        self.notes.arduplane.add("autocontinue is 0: ignored, as ArduPlane does", item.seq)
+        self.notes.arduplane.add("autocontinue 0 is ignored, as in ArduPlane", item.seq)
         if item.seq == self.last_seq:
-            self.notes.px4.add("autocontinue is 0: no effect on the last item", item.seq)
+            self.notes.px4.add("autocontinue 0 has no effect on the last item", item.seq)
         else:
-            self.add_open_item("autocontinue is 0: the flight continues, but PX4 would wait", item.seq, arduplane=False)
+            self.add_open_item(
+                "autocontinue is 0, so PX4 would wait, but the simulated flight continues", item.seq, arduplane=False
+            )
 
     def _fly_item(self, item: MissionItem) -> None:
         """Add the stops of a navigation item, or note that its command is not simulated."""
@@ -725,10 +729,10 @@ class _ItineraryBuilder:
         is_vertical = item.command == Command.NAV_VTOL_TAKEOFF
         if self.stops:
             if item.has_position and not is_vertical:
-                self.add_open_item(f"{name} in the air: flown through as a waypoint", item.seq)
+                self.add_open_item(f"{name} in the air is flown through as a waypoint", item.seq)
                 self.stops.append(self._make_stop(item))
             else:
-                self.add_open_item(f"{name} in the air: not flown", item.seq)
+                self.add_open_item(f"{name} in the air is not flown", item.seq)
             return
         if math.isnan(item.alt):
             message = f"{self.source}: item {item.seq}: {name} has no altitude: expected a number"
@@ -737,17 +741,17 @@ class _ItineraryBuilder:
         if item.frame in OVER_TERRAIN:
             # `Plane::do_takeoff` subtracts home's altitude from the item's number, and `Plane::verify_takeoff` compares
             # the result with the height over home.
-            text = f"{name} above terrain: flown as written, but ArduPlane reads its height as an altitude AMSL"
+            text = f"{name} above terrain is flown as written, but ArduPlane reads its height as an altitude AMSL"
             self.add_open_item(text, item.seq, px4=False)
         if is_vertical:
-            self.add_open_item(f"{name}: not flown straight up", item.seq)
+            self.add_open_item(f"{name} is not flown straight up", item.seq)
         home = self.first_home
         over_home = replace(self._make_stop(item), lat_deg=home.lat_deg, lon_deg=home.lon_deg)
         has_own_position = item.has_position and (item.lat_deg, item.lon_deg) != (home.lat_deg, home.lon_deg)
         if has_own_position and is_vertical:
             # ArduPlane climbs vertically and continues at that altitude (QuadPlane::takeoff_controller and
             # verify_vtol_takeoff); its fixed wings skip the item.
-            self.notes.add(f"{name}: its position is not flown to, as in ArduPlane; PX4 would fly to it", item.seq)
+            self.notes.add(f"the position of {name} is not flown to, as in ArduPlane; PX4 would fly to it", item.seq)
         if has_own_position and not is_vertical:
             self.stops += [replace(over_home, item=NO_ITEM), self._make_stop(item)]
         else:
@@ -763,12 +767,12 @@ class _ItineraryBuilder:
         is_later_loiter = stated_loiter(item) is not None and bool(self.stops)
         if is_later_loiter and item.alt == 0.0 and item.frame in OVER_HOME | OVER_TERRAIN:
             # `Location::sanitize`, which ArduPlane's `do_loiter_*` call, takes such an altitude for the present one.
-            text = f"{name} at a height of 0 m: flown at the altitude of the previous item, as in ArduPlane"
+            text = f"{name} at a height of 0 m is flown at the altitude of the previous item, as in ArduPlane"
             self.notes.arduplane.add(text, item.seq)
             self.add_open_item(text, item.seq, arduplane=False)
             item = replace(item, alt=math.nan)
         if not item.has_position and is_later_loiter:
-            text = f"{name} without a position: flown around the previous position"
+            text = f"{name} without a position is flown around the previous position"
             self.notes.arduplane.add(text, item.seq)
             # PX4 reads 0, 0 as a position.
             self.add_open_item(text, item.seq, arduplane=False)
@@ -776,7 +780,7 @@ class _ItineraryBuilder:
             item = replace(item, lat_deg=self.stops[-1].lat_deg, lon_deg=self.stops[-1].lon_deg, alt=alt)
         elif not item.has_position:
             self.add_open_item(
-                f"{name} without a position: not flown (the autopilot would use its current position)",
+                f"{name} without a position is not flown (the autopilot would use its current position)",
                 item.seq,
             )
             return
@@ -784,27 +788,30 @@ class _ItineraryBuilder:
             if item.params[0] > 0.0:
                 # Fixed-wing aircraft do not hold: ArduPlane stores no time, PX4 (`MissionBlock::get_time_inside`) reads
                 # none.
-                self.notes.add("NAV_WAYPOINT with a time to hold: flown through without a hold", item.seq)
+                self.notes.add("NAV_WAYPOINT with a time to hold is flown through without a hold", item.seq)
             if pass_by := pass_by_distance(item):
-                self.notes.arduplane.add(f"{name}: flown on for {pass_by:.0f} m beyond it, as ArduPlane does", item.seq)
+                self.notes.arduplane.add(
+                    f"after {name} the flight continues straight for {pass_by:.0f} m, as in ArduPlane", item.seq
+                )
             elif item.params[2] <= -1.0:
                 # Converting a negative number to an unsigned one gives 0 on ARM and 255 on a PC; PX4 does not read it.
-                text = f"{name}: {item.params[2]:g} m to fly on beyond it: flown as 0 m, but ArduPlane may fly 255 m"
+                distance_text = f"{item.params[2]:g} m to fly on beyond it"
+                text = f"{name} with {distance_text} is flown with 0 m, but ArduPlane may fly 255 m"
                 self.add_open_item(text, item.seq, px4=False)
         elif item.command == Command.NAV_SPLINE_WAYPOINT:
-            self.add_open_item(f"{name}: flown as a straight waypoint", item.seq)
+            self.add_open_item(f"{name} is flown as a straight waypoint", item.seq)
         elif item.command == Command.NAV_LOITER_UNLIM:
             duration_text = f"{ENDLESS_LOITER_TIME_S:.0f} s and at least one lap"
-            self.notes.add(f"{name}: flown for {duration_text}; the mission ends there", item.seq)
+            self.notes.add(f"{name} is flown for {duration_text}; the mission ends there", item.seq)
             self.has_ended = True
         elif item.command == Command.NAV_LOITER_TURNS and (turns := arduplane_turns(item.params[0])) != item.params[0]:
             self.notes.arduplane.add(
-                f"{name} with {item.params[0]:g} turns: flown as {turns:g}, as in ArduPlane", item.seq
+                f"{name} with {item.params[0]:g} turns is flown as {turns:g}, as in ArduPlane", item.seq
             )
         elif stated_loiter(item) is None:
-            self.add_open_item(f"{name}: flown through as a waypoint", item.seq)
+            self.add_open_item(f"{name} is flown through as a waypoint", item.seq)
         if math.isnan(item.alt):
-            self.notes.add(f"{name} without an altitude: flown at the altitude of the previous item", item.seq)
+            self.notes.add(f"{name} without an altitude is flown at the altitude of the previous item", item.seq)
         radius = item.params[1] if item.command in (Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT) else 0.0
         self.stops.append(self._make_stop(item, radius if radius > 0.0 else 0.0))
 
@@ -814,9 +821,9 @@ class _ItineraryBuilder:
         Without a home or a previous stop the RTL is not flown.
         """
         if not self.has_home and self.home is self.first_home:
-            self.add_open_item("NAV_RETURN_TO_LAUNCH without a home: not flown", item.seq)
+            self.add_open_item("NAV_RETURN_TO_LAUNCH without a home is not flown", item.seq)
         elif not self.stops:
-            self.add_open_item("NAV_RETURN_TO_LAUNCH before the start: not flown", item.seq)
+            self.add_open_item("NAV_RETURN_TO_LAUNCH before the start is not flown", item.seq)
         else:
             # The autopilot chooses destination and altitude: `flight.mission.return_path`. Earlier speed changes do not
             # apply to the RTL.
@@ -828,43 +835,43 @@ class _ItineraryBuilder:
         """Add a landing, which ends the mission above the landing point."""
         name = command_name(item.command)
         if not self.stops:
-            self.add_open_item(f"{name} before the start: not flown", item.seq)
+            self.add_open_item(f"{name} before the start is not flown", item.seq)
             return
         self.has_ended = True
         if item.has_position:
-            self.notes.add(f"{name}: {LANDING_NOTE}", item.seq)
+            self.notes.add(f"{name} {LANDING_NOTE}", item.seq)
             if self.stops[-1].frame in OVER_TERRAIN or item.frame in OVER_TERRAIN:
                 # `AP_Landing::type_slope_setup_landing_glide_slope` compares the altitudes of both items.
-                text = f"{name} with an approach above terrain: flown on another glide path than ArduPlane's"
+                text = f"{name} with an approach above terrain is flown on another glide path than ArduPlane's"
                 self.add_open_item(text, item.seq, px4=False)
             self.landing = self._make_stop(item)
             self.stops.append(replace(self.landing, alt=math.nan))
         else:
             self.add_open_item(
-                f"{name} without a position: not flown; the flight ends at the previous position", item.seq
+                f"{name} without a position is not flown; the flight ends at the previous position", item.seq
             )
         if item.command == Command.NAV_VTOL_LAND:
-            self.add_open_item(f"{name}: not flown straight down", item.seq)
+            self.add_open_item(f"{name} is not flown straight down", item.seq)
 
     def _set_home(self, item: MissionItem) -> None:
         """Apply a DO_SET_HOME to all later altitudes and RTLs, as ArduPlane does (`Plane::do_set_home`)."""
         name = command_name(item.command)
         if item.params[0] == 1.0:
             if self.stops:
-                self.add_open_item(f"{name} to the aircraft's current position: not flown", item.seq, px4=False)
+                self.add_open_item(f"{name} to the aircraft's current position is not flown", item.seq, px4=False)
             else:
-                self.notes.arduplane.add(f"{name} before the start: home is the position of the aircraft", item.seq)
+                self.notes.arduplane.add(f"{name} before the start sets home to the position of the aircraft", item.seq)
             return
         if not item.has_position and abs(item.alt) >= _ALTITUDE_STEP_M:
             # `AP_AHRS::set_home` ignores a home only if its altitude is 0, too.
-            self.add_open_item(f"{name} to 0° N 0° E: not flown", item.seq, px4=False)
+            self.add_open_item(f"{name} to 0° N 0° E is not flown", item.seq, px4=False)
             return
         if not item.has_position:
-            self.notes.arduplane.add(f"{name} without a position: ignored, as ArduPlane does", item.seq)
+            self.notes.arduplane.add(f"{name} without a position is ignored, as in ArduPlane", item.seq)
             return
         altitude = item.alt + self.home.alt if item.frame in OVER_HOME else item.alt if item.frame in AMSL else math.nan
         if math.isnan(altitude):
-            self.add_open_item(f"{name} to an unknown altitude: not flown", item.seq, px4=False)
+            self.add_open_item(f"{name} to an unknown altitude is not flown", item.seq, px4=False)
             return
         self.home = Home(item.lat_deg, item.lon_deg, altitude)
 
@@ -875,11 +882,13 @@ class _ItineraryBuilder:
         sets_speed = speed_type == 1.0 or (speed_type == 0.0 and (speed > 0.0 or speed == -2.0))
         if throttle > 0.0 and not sets_speed:
             # Without a speed the item changes TRIM_THROTTLE.
-            self.add_open_item("DO_CHANGE_SPEED's throttle: not flown", item.seq, px4=False)
+            self.add_open_item("DO_CHANGE_SPEED's throttle is not flown", item.seq, px4=False)
         elif throttle > 0.0:
-            notes.add("DO_CHANGE_SPEED's throttle: ignored", item.seq)
+            notes.add("DO_CHANGE_SPEED's throttle is ignored", item.seq)
         if speed_type not in (0.0, 1.0):
-            notes.add(f"DO_CHANGE_SPEED of type {speed_type:g}, neither airspeed nor ground speed: ignored", item.seq)
+            notes.add(
+                f"DO_CHANGE_SPEED of type {speed_type:g}, neither airspeed nor ground speed, is ignored", item.seq
+            )
         elif speed_type == 1.0:
             # The airspeed is unchanged.
             self.min_ground_speed = 0.0 if math.isnan(speed) else speed
@@ -891,7 +900,7 @@ class _ItineraryBuilder:
         elif speed > 0.0:
             self.airspeed = speed
         elif speed != -1.0:
-            notes.add(f"DO_CHANGE_SPEED to {speed:g} m/s: ignored", item.seq)
+            notes.add(f"DO_CHANGE_SPEED to {speed:g} m/s is ignored", item.seq)
 
     def _change_speed_as_px4(self, item: MissionItem) -> None:
         """Apply a DO_CHANGE_SPEED as PX4 does (`navigator_main.cpp`, VEHICLE_CMD_DO_CHANGE_SPEED)."""
@@ -901,13 +910,14 @@ class _ItineraryBuilder:
             self.px4_airspeed = speed
             if speed_type != 0.0:
                 notes.add(
-                    f"DO_CHANGE_SPEED of type {speed_type:g}: flown as airspeed, because PX4 ignores the type", item.seq
+                    f"DO_CHANGE_SPEED of type {speed_type:g} is flown as airspeed, because PX4 ignores the type",
+                    item.seq,
                 )
             return
         self.px4_airspeed = math.nan
-        notes.add(f"DO_CHANGE_SPEED to {speed:g} m/s: returns to PX4's default airspeed", item.seq)
+        notes.add(f"DO_CHANGE_SPEED to {speed:g} m/s returns to PX4's default airspeed", item.seq)
         if throttle > 0.0:
-            notes.add("DO_CHANGE_SPEED's throttle: not flown", item.seq)
+            notes.add("DO_CHANGE_SPEED's throttle is not flown", item.seq)
 
 
 def _error_without_position(mission: Mission) -> MissionError:

@@ -98,11 +98,11 @@ class LoiterRules:
         """Return a note for an autopilot that loiters about the last waypoint after the mission's end.
 
         >>> LoiterRules(80.0, "NAV_LOITER_RAD", ends_in_circle=True).end_note()
-        'after the last waypoint the aircraft loiters around it indefinitely, with NAV_LOITER_RAD, 80 m: ...'
+        'after the last waypoint the aircraft loiters around it indefinitely, with NAV_LOITER_RAD, 80 m; ...'
         """
         name = f"{self.radius_name}," if self.radius_name else "a radius of"
         circle = f"with {name} {abs(self.radius):g} m"
-        return f"after the last waypoint the aircraft loiters around it indefinitely, {circle}: one lap is flown"
+        return f"after the last waypoint the aircraft loiters around it indefinitely, {circle}; one lap is simulated"
 
 
 # Rules of an autopilot without loiter rules.
@@ -223,7 +223,7 @@ def _make_nodes(
             ):
                 unjoined.append(UnjoinedStop(stop.item, previous.item, is_circle=True))
             notes.add(
-                f"no tangent joins its circle to the circle of item {previous.item}: flown on the circle of that item",
+                f"no tangent joins its circle to the circle of item {previous.item}, so it is flown on that circle",
                 stop.item,
             )
             node = node.placed_at((previous.east, previous.north, node.up), previous.arc_radius)
@@ -234,7 +234,7 @@ def _make_nodes(
 def _note_omitted_stop(stop: RoutePoint, circle: RoutePoint, notes: Notes) -> None:
     """Add a note on a stop that is omitted because it lies inside a loiter circle."""
     text = f"not flown to, because it lies inside the circle of item {circle.item}, which is joined on a tangent"
-    notes.add(text if stop.item >= 0 else f"home: {text}", stop.item if stop.item >= 0 else None)
+    notes.add(text if stop.item >= 0 else f"home is {text}", stop.item if stop.item >= 0 else None)
 
 
 def _signed_radius(
@@ -264,22 +264,22 @@ def _signed_radius(
     if radius == 0.0 and rules.radius != 0.0:
         is_left = rules.radius < 0.0 or loiter.radius < 0.0
         direction_text = " to the left" if is_left else ""
-        reason = f"its radius of {stated_radius:g} m is ignored" if stated_radius > 0.0 else "loiter without a radius"
-        notes.add(f"{reason}: flown with {rules.radius_name}, {abs(rules.radius):g} m{direction_text}", stop.item)
+        reason = f"its radius of {stated_radius:g} m is ignored" if stated_radius > 0.0 else "the loiter has no radius"
+        notes.add(f"{reason}, so {rules.radius_name} ({abs(rules.radius):g} m{direction_text}) is used", stop.item)
         return math.copysign(max(MIN_LOITER_RADIUS_M, abs(rules.radius) * radius_scale), -1.0 if is_left else 1.0)
     if radius == 0.0:
         radius = default_radius(stop.airspeed, up)
-        notes.add(f"loiter without a radius: flown with a radius of {radius:.0f} m", stop.item)
+        notes.add(f"the loiter has no radius, so a radius of {radius:.0f} m is used", stop.item)
     elif radius < MIN_LOITER_RADIUS_M:
         notes.add(
-            f"loiter radius below {MIN_LOITER_RADIUS_M:.0f} m: simulated with a radius of {MIN_LOITER_RADIUS_M:.0f} m",
+            f"a loiter radius below {MIN_LOITER_RADIUS_M:.0f} m is simulated as {MIN_LOITER_RADIUS_M:.0f} m",
             stop.item,
         )
         radius = MIN_LOITER_RADIUS_M
     elif round(radius * radius_scale) != round(stated_radius):
         notes.add(
-            f"loiter radius {stated_radius:g} m: flown with a radius of {radius * radius_scale:.0f} m,"
-            " because the autopilot enlarges it with altitude",
+            f"the loiter radius of {stated_radius:g} m is flown as {radius * radius_scale:.0f} m, because the autopilot"
+            " enlarges it with altitude",
             stop.item,
         )
     return math.copysign(radius * radius_scale, loiter.radius)

@@ -528,13 +528,13 @@ class _AltitudeConverter:
                 shift_text = f"{abs(home.alt - ground):.0f} m {'lower' if home.alt > ground else 'higher'}"
                 self.notes.add(
                     f"home is at {home.alt:.1f} m AMSL, but the ground there is at {ground:.1f} m AMSL, {shift_text}."
-                    " Heights above home are measured from home's altitude: after arming on that ground they are"
+                    " Heights above home are measured from home's altitude. After arming on that ground they are"
                     f" {shift_text} than here. For a launch from that ground, set home to {ground:.1f} m AMSL{hint}"
                 )
             return home.alt
         if math.isnan(ground):
             self.notes.add(
-                "home has no altitude, and there is no terrain: heights above home are measured from 0 m AMSL"
+                "home has no altitude, and there is no terrain, so heights above home are measured from 0 m AMSL"
             )
             return 0.0
         self.notes.add(
@@ -579,7 +579,7 @@ def _merge_stops(source: str, previous: RoutePoint, stop: RoutePoint, notes: Not
             f"no aircraft climbs or sinks on the spot, so these {abs(climb):.0f} m are flown on the next leg", stop.item
         )
     else:
-        notes.add(f"same position as {_stop_name(previous)}, merged with it", stop.item)
+        notes.add(f"merged with {_stop_name(previous)}, which has the same position", stop.item)
     return previous if previous.item >= 0 else stop
 
 

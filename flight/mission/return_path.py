@@ -335,7 +335,7 @@ def rtl_note(target: ReturnTarget, rules: ReturnRules, start_altitude: float, co
     continuation: name of the sequence after the loiter; "" if the RTL stays in the loiter.
 
     >>> rtl_note(ReturnTarget((0.0, 0.0, 435.0), "home", "", 3210.0), ReturnRules(), 1090.0)
-    'NAV_RETURN_TO_LAUNCH: returns to home, 3.2 km away, descending 655 m on a straight slope to 435 m AMSL; ...'
+    'NAV_RETURN_TO_LAUNCH returns to home, 3.2 km away, descending 655 m on a straight slope to 435 m AMSL; ...'
     """
     altitude_gain = target.position[2] - start_altitude
     reason = f" ({target.reason})" if target.reason else ""
@@ -365,7 +365,7 @@ def rtl_note(target: ReturnTarget, rules: ReturnRules, start_altitude: float, co
         else f"the simulated flight ends after {ENDLESS_LOITER_TIME_S:.0f} s of the loiter there"
     )
     return (
-        f"NAV_RETURN_TO_LAUNCH: returns to {target.name}, {_distance_text(target.distance)} away{reason},"
+        f"NAV_RETURN_TO_LAUNCH returns to {target.name}, {_distance_text(target.distance)} away{reason},"
         f" {altitude_text}"
         f" {target.position[2]:.0f} m AMSL{climb_text}; {end_text}"
     )

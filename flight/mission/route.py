@@ -578,8 +578,8 @@ def _find_direct_landing(
     if landing is None:
         return None
     distance, seq = math.dist((east, north), landing.start.position[:2]), placed_mission.itinerary.stops[-1].item
-    text = f"at once to the landing sequence at item {landing.start.item}, {distance / 1000.0:.1f} km away"
-    notes.add(f"{Command.NAV_RETURN_TO_LAUNCH.name}: {text}{_landing_choice_text(placed_mission)}", seq)
+    text = f"flies at once to the landing sequence at item {landing.start.item}, {distance / 1000.0:.1f} km away"
+    notes.add(f"{Command.NAV_RETURN_TO_LAUNCH.name} {text}{_landing_choice_text(placed_mission)}", seq)
     return landing
 
 
@@ -594,7 +594,7 @@ def _find_landing(
     landing = next((landing for landing in placed_mission.landings if landing.start == start), None)
     if start is not None and landing is None:
         reason = "begins with the landing itself" if start.is_landing else "does not lead to a landing"
-        text = f"the landing sequence at item {start.item} {reason}: {RTL_NOT_CONTINUED_TEXT}"
+        text = f"the landing sequence at item {start.item} {reason}, so {RTL_NOT_CONTINUED_TEXT}"
         notes.add(text, placed_mission.itinerary.stops[-1].item)
     return landing
 
@@ -679,8 +679,8 @@ def _append_rtl(
     notes.add(rtl_note(target, rules, start[2], next_text), stop.item)
     if rules.may_use_landing and any(item.command in LANDINGS for item in placed_mission.mission.items):
         notes.add(
-            "the autopilot may also return to the mission's landing, which is not simulated: the "
-            f"RTL goes to {target.name}",
+            "the autopilot may also return to the mission's landing, which is not simulated."
+            f" The simulated RTL goes to {target.name}",
             stop.item,
         )
     if rules.deviation_note:
@@ -713,14 +713,14 @@ def _insert_gates(placed_mission: PlacedMission, notes: Notes) -> list[RoutePoin
                 continue
             if not all(leg_end.loiter is None and leg_end.command in PLACES for leg_end in (previous, next_stop)):
                 if not keeps_airspeed:
-                    text = "CONDITION_GATE not between waypoints: the speed after it applies from the leg's start"
+                    text = "CONDITION_GATE is not between waypoints, so the speed after it applies from the leg's start"
                     notes.add(text, gate.item)
                 continue
             start, end = np.array(previous.map_position), np.array(next_stop.map_position)
             gate_position = to_map(placed_mission.origin, gate.lat_deg, gate.lon_deg)
             if gate.switches_camera and _distance_to_line(start, end, gate_position) > _MAX_GATE_DISTANCE_M:
                 distance_text = f"passed at more than {_MAX_GATE_DISTANCE_M:g} m"
-                notes.add(f"{distance_text}: {GATES_ARE_NO_WAYPOINTS}", gate.item)
+                notes.add(f"{distance_text}, because {GATES_ARE_NO_WAYPOINTS}", gate.item)
             # PX4 passes a gate at the vertical plane through its position, perpendicular to the line to the leg's end.
             gate_to_end = end[:2] - np.array([float(gate_position[0]), float(gate_position[1])])
             length_along_normal = float((end[:2] - start[:2]) @ gate_to_end)
@@ -778,8 +778,8 @@ def _note_cruise_speed(mission: Mission, airspeed: float, first_stop: RoutePoint
     """
     if mission.cruise_speed is not None and mission.cruise_speed != airspeed and first_stop.airspeed == airspeed:
         text = (
-            f"cruiseSpeed {mission.cruise_speed:g} m/s is only the ground station's planning value:"
-            f" the flight starts at {airspeed:g} m/s"
+            f"cruiseSpeed {mission.cruise_speed:g} m/s is only the ground station's planning value."
+            f" The flight starts at {airspeed:g} m/s"
         )
         if abs(mission.cruise_speed - airspeed) > MAX_CRUISE_SPEED_DIFFERENCE * airspeed:
             text += f" (--aircraft selects your aircraft, --airspeed {mission.cruise_speed:g} flies at that airspeed)"

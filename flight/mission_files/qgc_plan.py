@@ -33,7 +33,7 @@ from flight.mission.items import (
 )
 from world.errors import MissionError
 from world.files import json_value
-from world.scenario_file import first_fault
+from world.scenario_file import JSON_OBJECT, first_fault
 from world.wording import count_text
 
 # ----------------------------------------------------------------------
@@ -417,7 +417,7 @@ def parse_plan_file(text: str, source: str) -> Mission:
     try:
         file = _File.model_validate(data)
     except ValidationError as error:
-        raise MissionError(**first_fault(error, data).at(source)) from error
+        raise MissionError(**first_fault(error, data, container=JSON_OBJECT).at(source)) from error
     _check_vehicle(file.mission.vehicleType, source)
     # None or 0: the plan names no autopilot.
     firmware = file.mission.firmwareType or 0

@@ -52,7 +52,7 @@ def make_loop(
     step_model: Callable[[], object],
     steps: int,
 ) -> Callable[[int], int]:
-    """Return a function that flies up to a number of ticks in JSBSim; it returns the flight's end code, or 0.
+    """Return a function that flies up to a given number of ticks in JSBSim, and returns its end code or 0.
 
     getters: getters of the state, in the order of `flight.simulation.tick.READ_FIELDS`.
     setters: setters of the outputs, in the order of `flight.simulation.tick.OUTPUT`.
@@ -826,7 +826,10 @@ class Flight(RunningFlight):
         return model, f"compiled model, bit-identical to JSBSim {JSBSIM_VERSION} over {PROOF_STEPS} test steps"
 
     def _make_loop(self) -> Callable[[int], int]:
-        """Return a function that flies up to a number of ticks, fills the rows, and returns the end code or 0."""
+        """Return a function that flies up to a given number of ticks, and returns the flight's end code.
+
+        The code is 0 if the flight has not ended. The function writes the track into the rows of the workspace.
+        """
         record, workspace, access = self._work, self._workspace, self.fdm.loop_access()
         record.state_factors = access.factors[0]
         record.scale_positive, record.scale_negative = (tuple(scales) for scales in zip(*access.scales, strict=True))

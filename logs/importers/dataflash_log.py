@@ -132,14 +132,14 @@ def read_dataflash(path: Path) -> RawLog:
     return _Reader(index, str(path)).read()
 
 
-def find_program_and_vehicle(texts: Iterable[str], version: Messages) -> tuple[str, VehicleKind]:
-    """Return the program and the vehicle from the first MSG text that names a program, or else from VER.
+def find_firmware_and_vehicle(texts: Iterable[str], version: Messages) -> tuple[str, VehicleKind]:
+    """Return the firmware and the kind of vehicle, from the first MSG text that names a firmware, or else from VER.
 
     texts: texts of the MSG messages.
     version: VER messages.
 
     >>> none = Messages(np.zeros(0, np.int64), np.zeros(0, np.dtype([])), {})
-    >>> find_program_and_vehicle(["ArduCopter V4.5.7"], none), find_program_and_vehicle([], none)
+    >>> find_firmware_and_vehicle(["ArduCopter V4.5.7"], none), find_firmware_and_vehicle([], none)
     (('ArduCopter V4.5.7', 'copter'), ('', 'unknown'))
     """
     for text in texts:
@@ -164,7 +164,7 @@ class _Reader:
     def read(self) -> RawLog:
         """Return the log.  Raises LogError for a log without positions."""
         series = {name: values for name, values in self._read_series() if values is not None and len(values.time)}
-        program, vehicle = find_program_and_vehicle(
+        program, vehicle = find_firmware_and_vehicle(
             [text for _, text in self._read_events()], self._select_messages("VER")
         )
         if "position" not in series:

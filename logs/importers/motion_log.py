@@ -9,7 +9,7 @@ import numpy as np
 
 from logs.importers.columns.file_names import DATA_SUFFIXES, is_column_table_name
 from logs.importers.dataflash_frames import Dataflash, MappedFile, Messages, index_dataflash
-from logs.importers.dataflash_log import find_logged_home, find_program_and_vehicle
+from logs.importers.dataflash_log import find_firmware_and_vehicle, find_logged_home
 from logs.importers.motion import OUTPUTS, MotionLog, Samples, find_first_ground_position, sort_samples
 from world.errors import LogError
 from world.extras import require_extra
@@ -93,7 +93,7 @@ class _DataflashMotionReader:
         """Return the motion of the aircraft."""
         events = self._index.messages("MSG")
         texts = events.texts("Message") if events.has("Message") else []
-        program, vehicle = find_program_and_vehicle(texts, self._index.messages("VER"))
+        program, vehicle = find_firmware_and_vehicle(texts, self._index.messages("VER"))
         velocity = self._read_first_samples((name, ("VN", "VE", "VD")) for name in ("XKF1", "NKF1"))
         inertial = self._read_first_samples((("IMU", ("AccX", "AccY", "AccZ", "GyrX", "GyrY", "GyrZ")),))
         # Rows of a sensor that was not in use are left out.

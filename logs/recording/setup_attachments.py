@@ -42,7 +42,7 @@ from world.forecast.wind_field import MAX_FIELD_NUMBERS, WindField
 from world.frames import MAX_TERMS, PolyMap
 from world.raster import MAX_PIXELS
 from world.scenario import Scenario, scenario_from_spec
-from world.scenario_file import first_fault
+from world.scenario_file import JSON_OBJECT, first_fault
 from world.scenario_tables import Guidance, Navigation
 from world.terrain import Terrain
 from world.wind import Wind
@@ -146,7 +146,7 @@ def unpack_terrain(attachments: dict[str, bytes], source: str) -> Terrain:
     try:
         file = _TerrainFile.model_validate_json(attachments[TERRAIN_FILE])
     except ValidationError as error:
-        raise LogError(**first_fault(error).at(source, TERRAIN_FILE)) from error
+        raise LogError(**first_fault(error, container=JSON_OBJECT).at(source, TERRAIN_FILE)) from error
     if file.rows * file.cols > MAX_PIXELS:
         raise LogError(
             f"{source}: {TERRAIN_FILE}: {file.rows} x {file.cols} pixels: at most {MAX_PIXELS:,} are read", file=source
@@ -286,7 +286,7 @@ def unpack_forecast(attachments: dict[str, bytes], source: str, wind: Wind, *, i
     try:
         file = _ForecastFile.model_validate_json(attachments[FORECAST_FILE])
     except ValidationError as error:
-        raise LogError(**first_fault(error).at(source, FORECAST_FILE)) from error
+        raise LogError(**first_fault(error, container=JSON_OBJECT).at(source, FORECAST_FILE)) from error
     if not file.numbers:
         return replace(wind, forecast=file.facts)
     try:
@@ -421,7 +421,7 @@ def unpack_setup(attachments: dict[str, bytes], source: str) -> StoredSetup:
     try:
         file = _SetupFile.model_validate_json(attachments[SETUP_FILE])
     except ValidationError as error:
-        raise LogError(**first_fault(error).at(source, SETUP_FILE)) from error
+        raise LogError(**first_fault(error, container=JSON_OBJECT).at(source, SETUP_FILE)) from error
     for name, digest in file.sha256.items():
         if name not in attachments:
             raise LogError(

@@ -147,8 +147,8 @@ class Finding:
         return min(errors, key=lambda value: errors[value])
 
     @property
-    def nearest(self) -> float | None:
-        """Distance outside the nearest missile sphere or fence zone, m, negative inside; None if unknown.
+    def nearest_distance(self) -> float | None:
+        """Distance from the nearest kill zone or airspace zone, m, negative inside it; None if unknown.
 
         Only findings of the rules `threat` and `fence` have this fact.
         """

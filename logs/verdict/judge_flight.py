@@ -131,7 +131,9 @@ def _is_undecided(findings: tuple[Finding, ...]) -> bool:
 
 
 def _airframe_level(airframe: AirframeAnswer, flight_findings: tuple[Finding, ...]) -> LevelAnswer:
-    """Return the airframe's answer from the reference flight, with its disagreements with the flight.
+    """Return the answer of the level "airframe", which states if the reference flight is flyable.
+
+    The answer lists the findings that the judged flight decides differently.
 
     A flight that failed at take-off is not compared, because the reference flight begins in the air.
     """

@@ -15,7 +15,7 @@ from logs.verdict.places import AirframeAnswer, DecidingParameter, ReferenceFlig
 from logs.verdict.rule_words import RULE_WORDS
 from world.errors import LogError
 from world.json_schema import DocumentConfig
-from world.scenario_file import first_fault
+from world.scenario_file import JSON_OBJECT, first_fault
 
 # Name of the schema in stored logs.
 REFERENCE_SCHEMA: Final = "planfly.beside/1"
@@ -63,7 +63,7 @@ def parse_reference_flights(text: str | bytes, source: str) -> ReferenceFlights:
     try:
         file = _file_reader().validate_json(text)
     except ValidationError as error:
-        raise LogError(**first_fault(error).at(source)) from error
+        raise LogError(**first_fault(error, container=JSON_OBJECT).at(source)) from error
     rules = [rule for rule, _ in file.airframe.failed] if file.airframe is not None else []
     rules += [answer.rule for answer in (file.deciding, *(file.tried or ())) if answer is not None]
     unknown_rules = [rule for rule in rules if rule not in RULE_WORDS]

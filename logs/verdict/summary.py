@@ -337,8 +337,7 @@ def summary_lines(
     if setup.plan is not None and setup.plan.unmet_margins:
         lines.append(f"Planner's margins not met: {'; '.join(setup.plan.unmet_margins)}")
     lines += [f"Note: {warning}" for warning in setup.mission.warnings]
-    if setup.notes:
-        lines.append(f"Not flown as written: {'; '.join(setup.notes)}")
+    lines += [f"Not flown as written: {note}" for note in setup.notes]
     if level == "flown":
         lines += [line] if (line := corridor_line(setup, findings)) else []
     if level == "geometric":

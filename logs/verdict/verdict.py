@@ -163,7 +163,7 @@ class Verdict:
             [
                 *(finding.rule, finding.place.kind, finding.place.index),
                 *(getattr(finding, name) for name in names),
-                finding.nearest,
+                finding.nearest_distance,
             ]
             for finding in self.findings
         ]

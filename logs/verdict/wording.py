@@ -1,6 +1,7 @@
 """Describe places, changes and disagreements in texts that no code of planfly parses."""
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -32,6 +33,10 @@ RULE_NOUNS = {
 FLOWN_COUNTERPARTS = {"landing": "touchdown"}
 # Greatest length of a statement in a headline, characters.
 _MAX_STATEMENT_LENGTH = 80
+# Minimum length of a clause that can replace its statement, characters.
+_MIN_CLAUSE_LENGTH = 30
+# End of a clause within a statement.
+_CLAUSE_END = re.compile(r"[.;:] | \(|,? (?:but|because|so that) |, (?:so|and|which|while|where) ")
 
 
 def place_text(place: Place) -> str:
@@ -431,15 +436,24 @@ def gentle_launch_text(acceleration: float, trigger: tuple[float, str]) -> str:
 
 
 def shorten_statement(statement: str) -> str:
-    """Cut a statement to the maximum length for a headline, at the end of a word, but not between number and unit.
+    """Shorten a statement for a headline at the end of a clause, to 80 characters if its first clause is not longer.
 
-    >>> shorten_statement("bank 80° at 3.0 s"), len(shorten_statement("m" * 200))
-    ('bank 80° at 3.0 s', 80)
-    >>> shorten_statement("a climb of 3.8° at 26.0 m/s in a tailwind of 4.5 m/s and in a crosswind of 15.3 m/s")
-    'a climb of 3.8° at 26.0 m/s in a tailwind of 4.5 m/s and in a crosswind of...'
+    A first clause of more than 160 characters is cut at the end of a word, but not between number and unit.
+
+    >>> shorten_statement("the jump at item 5 repeats indefinitely. Each round uses 57.5 Wh, enough for 15 rounds")
+    'the jump at item 5 repeats indefinitely'
     """
     if len(statement) <= _MAX_STATEMENT_LENGTH:
         return statement
+    clauses = [statement[: end.start()] for end in _CLAUSE_END.finditer(statement)]
+    # A short clause, such as "not started", only introduces the statement, and a bracket is not cut.
+    clauses = [
+        clause for clause in clauses if len(clause) >= _MIN_CLAUSE_LENGTH and clause.count("(") == clause.count(")")
+    ]
+    fitting_clauses = [clause for clause in clauses if len(clause) <= _MAX_STATEMENT_LENGTH]
+    clause = fitting_clauses[-1] if fitting_clauses else clauses[0] if clauses else statement
+    if len(clause) <= 2 * _MAX_STATEMENT_LENGTH:
+        return clause
     cut_length = _MAX_STATEMENT_LENGTH - 3
     words = statement[: cut_length + 1].split(" ")[:-1]
     while words and words[-1].strip("(+-").replace(".", "").isdigit():

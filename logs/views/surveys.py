@@ -65,7 +65,7 @@ def _make_survey_panel(
     unit = np.array([np.sin(survey.course), np.cos(survey.course)])
     axes = np.stack([unit, [-unit[1], unit[0]]], axis=1)
 
-    def to_panel(positions: Floats) -> Floats:
+    def to_line_axes(positions: Floats) -> Floats:
         """Convert positions to distances along and across the survey's lines, m."""
         return (positions[:, :2] - origin) @ axes
 
@@ -75,7 +75,7 @@ def _make_survey_panel(
     labels = []
     step = -(-len(survey.lines) // _MAX_NUMBERED_LINES)
     for number, (line, measure) in enumerate(zip(survey.lines, line_measures, strict=True), 1):
-        corners = to_panel(requirements.points[line.first : line.last + 1])
+        corners = to_line_axes(requirements.points[line.first : line.last + 1])
         unknown_spans = () if measure is None else measure.unknown_spans
         # A line that was not flown is lost as a whole.
         lost_spans = ((0.0, np.inf),) if measure is None else measure.lost_spans
@@ -94,7 +94,7 @@ def _make_survey_panel(
                 parts.append(_cut_line(corners, span_start, span_end))
         if (number - 1) % step == 0:
             labels.append(Label(str(number), float(corners[0, 0]), float(corners[0, 1]), "number"))
-    track_points = to_panel(position[:: max(1, len(position) // _POINTS)])
+    track_points = to_line_axes(position[:: max(1, len(position) // _POINTS)])
     layers: tuple[Layer, ...] = (
         Layer("line", "usable part of a photo line", "planned", *join_with_gaps(usable_parts), quiet=True),
         Layer("line", "photo line, lost", "fail", *join_with_gaps(lost_parts), quiet=True),

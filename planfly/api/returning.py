@@ -46,7 +46,7 @@ from planfly.rtl.sitl_returns import (
     ProgramReturns,
     check_is_arduplane,
     check_returns_as_arduplane,
-    fly_by_program,
+    fly_with_autopilot,
 )
 from planfly.runtime.stages import stage
 from planfly.workflow.open_flight import open_flight
@@ -321,7 +321,7 @@ def _judge_flight(setup: FlightSetup, track: Track, request: _ReturnsRequest, en
         program_returns = None
         if request.program is not None:
             logs = None if request.folder is None else Path(log_folder)
-            program_returns = fly_by_program(world, starts, judged_returns, request.program, request.points, logs)
+            program_returns = fly_with_autopilot(world, starts, judged_returns, request.program, request.points, logs)
             judged_returns = program_returns.with_worse_results(judged_returns)
         with stage("gliding without the engine"):
             result = ReturnsResult(setup, judged_returns, judge_glides(world, starts), by_program=program_returns)

@@ -139,8 +139,8 @@ class CampaignResult:
     def path_arrays(self) -> dict[str, NDArray[np.float32]]:
         """Read each flight's clearance along the route and offset at each stop from the campaign's folder.
 
-        "clearance": minimum height above ground on each of 150 equal pieces of the route, (n, 150), m.
-        "crossings": distance right of and above each stop of the route at closest approach, (n, s, 2), m.
+        "clearance": minimum height above ground on each of 150 equally long parts of the route, m, (n, 150).
+        "crossings": offset from each waypoint at closest approach, m, (n, w, 2): to the right and upwards.
         Unknown values are NaN.
 
         Raises ValueError for a campaign without a folder.

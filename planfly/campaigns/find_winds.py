@@ -312,7 +312,7 @@ def find_winds(
                 _fly_round(pool, search, missing_requests, stored_flights, progress)
             for request in requests:
                 search.add_result(request, stored_flights.flown[request.number])
-    progress.report(len(search.flown), is_last=True)
+    progress.report(len(search.flown), force=True)
     return search.result()
 
 
@@ -575,13 +575,15 @@ class _ProgressReport:
             text = f"{count_text(flight_count, 'flight')} in calm air, none of them flyable"
             self._advance(float(flight_count), float(flight_count), text)
 
-    def report(self, flight_count: int, is_last: bool = False) -> None:
-        """Report the settled directions, the number and rate of flights, and the shortest remaining time.
+    def report(self, flight_count: int, force: bool = False) -> None:
+        """Report the settled directions, the number and rate of flights, and a lower bound of the remaining time.
 
-        No remaining time is given beyond `MIN_FLIGHTS_PER_DIRECTION`, because the number of flights is then unknown.
-        is_last: True to report even if no report is due.
+        If each open direction has `MIN_FLIGHTS_PER_DIRECTION` flights, the number of further flights is unknown. Then
+        no remaining time is given.
+
+        force: True to report even if no report is due.
         """
-        if self._advance is None or not (self._rate.is_due() or is_last):
+        if self._advance is None or not (self._rate.is_due() or force):
             return
         search, flights_per_second = self._search, self._rate.flights_per_second(flight_count)
         remaining = len(search.flown) + search.min_remaining_flights() - flight_count

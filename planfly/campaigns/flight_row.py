@@ -298,7 +298,9 @@ def fly_one(base: CampaignBase, index: int, wind: GivenWind | None = None, log: 
     undecided_text = "; ".join(text for rule, text in unjudged if rule in open_rules)
     # Smallest distances outside the spheres of the missiles' kill radii, m.
     distances = (
-        finding.nearest for finding in verdict.findings if finding.rule == "threat" and finding.nearest is not None
+        finding.nearest_distance
+        for finding in verdict.findings
+        if finding.rule == "threat" and finding.nearest_distance is not None
     )
     return FlightRow(
         draw=draw,
@@ -363,7 +365,7 @@ def find_minimum_margins(findings: tuple[Finding, ...]) -> tuple[tuple[str, Mini
     for finding in findings:
         if finding.ok is not None and MARGIN_SCALES[finding.rule] is not None:
             is_threat = finding.rule == "threat"
-            ranked = replace(finding, margin=finding.nearest, unit="m") if is_threat else finding
+            ranked = replace(finding, margin=finding.nearest_distance, unit="m") if is_threat else finding
             findings_by_rule.setdefault(finding.rule, []).append(ranked)
     closest_findings = [closest_to_limit(findings_of_rule) for findings_of_rule in findings_by_rule.values()]
     # A rule that fails for a reason other than its value has no margin.

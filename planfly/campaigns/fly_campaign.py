@@ -140,7 +140,7 @@ def _fly_remaining(pool: WorkerPool, flight_tally: _FlightTally, store: Store, p
         progress.report(flight_tally.tally)
         if flight_tally.is_decided:
             break
-    progress.report(flight_tally.tally, is_last=True)
+    progress.report(flight_tally.tally, force=True)
 
 
 class _ProgressReport:
@@ -169,12 +169,12 @@ class _ProgressReport:
         """
         return max(self._estimator.min_flights, tally.flown) if self._goal.stops else self._goal.flights
 
-    def report(self, tally: Tally, is_last: bool = False) -> None:
+    def report(self, tally: Tally, force: bool = False) -> None:
         """Report the number of flights, the fraction of flyable flights with its bounds, and the remaining time.
 
-        is_last: True to report even if no report is due.
+        force: True to report even if no report is due.
         """
-        if self._advance is None or not tally.flown or not (self._rate.is_due() or is_last):
+        if self._advance is None or not tally.flown or not (self._rate.is_due() or force):
             return
         estimate = self._estimator.estimate(tally)
         flights_per_second = self._rate.flights_per_second(tally.flown)

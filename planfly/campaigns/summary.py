@@ -357,7 +357,7 @@ def summary_json(summary: CampaignSummary) -> str:
         "lower_bound": _to_plain_number(estimate.lower),
         "upper_bound": _to_plain_number(estimate.upper),
         "interval": [_to_plain_number(estimate.interval.low), _to_plain_number(estimate.interval.high)],
-        "method": summary.goal.method,
+        "method": summary.goal.bound_method,
         "failed_by_rule": failures_document(summary.by_rule),
         **(deciding[0] if deciding else undefined),
         "tied_rules": deciding[1:],
@@ -466,7 +466,7 @@ def campaign_lines(summary: CampaignSummary) -> list[str]:
         f"{answer_text}: {_flyable_text(tally)}, {share_text}"
         + ("; return not judged" if summary.unjudged_return else ""),
         f"  probability at least {estimate.lower:.4f} and at most {estimate.upper:.4f} (each with {confidence_text}"
-        f" confidence; {goal.method})",
+        f" confidence; {goal.bound_method})",
         f"  two-sided {confidence_text} interval of the probability: {estimate.interval.low:.4f} to"
         f" {estimate.interval.high:.4f}",
         *_deciding_flights_lines(summary),

@@ -700,8 +700,8 @@ def count_flights(path: Path) -> int:
 def read_path_arrays(path: Path) -> dict[str, NDArray[np.float32]]:
     """Read the path data of each flight, in the order of flights; NaN for flights without them.
 
-    "clearance": minimum height above ground on each of 150 equal pieces of the route, m, (n, 150).
-    "crossings": distance right of and above each stop of the route at closest approach, m, (n, s, 2).
+    "clearance": minimum height above ground on each of 150 equally long parts of the route, m, (n, 150).
+    "crossings": offset from each waypoint at closest approach, m, (n, w, 2): to the right and upwards.
 
     Raises StoreError for a file that planfly did not write, or that another process has locked.
     """

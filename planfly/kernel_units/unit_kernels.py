@@ -66,7 +66,7 @@ UNIT_KERNELS: dict[str, tuple[str, ...]] = {
         "planner.evaluation.leg_constraints.slope_limits",
         "planner.seeding.grids.begin_route",
         "planner.seeding.grids.continue_route",
-        "planner.seeding.grids.end_route",
+        "planner.seeding.grids.extract_route",
         "planner.seeding.waypoint_fitting._choose_candidates",
     ),
     "sides": (

@@ -45,7 +45,7 @@ def serve_vehicle(
         if served_scenario.mission is not None:
             vehicle.load(served_scenario.mission)
         elif served_scenario.fence or served_scenario.rally:
-            vehicle.load_fence(served_scenario.fence, served_scenario.rally)
+            vehicle.load_fence_and_rally(served_scenario.fence, served_scenario.rally)
         exit_stack.callback(vehicle.close)
         vehicle.run(stop)
     dropped = ", ".join(f"{count:,} {reason}" for reason, count in asdict(link.dropped).items() if count)

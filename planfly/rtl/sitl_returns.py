@@ -224,20 +224,26 @@ def _is_lead_in_clear(world: ReturnWorld, row: Record) -> bool:
     return bool((path[:, 2] - world.scenario.terrain.height(path[:, 0], path[:, 1])).min() > _MIN_LEAD_IN_HEIGHT_M)
 
 
-def fly_by_program(
-    world: ReturnWorld, starts: ReturnStarts, returns: Returns, program: Path, points: int, folder: Path | None
+def fly_with_autopilot(
+    world: ReturnWorld, starts: ReturnStarts, returns: Returns, program: Path, max_returns: int, folder: Path | None
 ) -> ProgramReturns:
-    """Fly at most `points` of the worst returns with the ArduPlane program.
+    """Fly at most `max_returns` of the worst returns with the real ArduPlane autopilot (SITL).
 
     The wind is the mean wind, and the navigation is exact.
 
+    program: ArduPlane's SITL program.
     folder: folder for the flight logs of planfly and of the program; None writes no logs.
+
     Raises FlightError if the program does not start or stops during the flight.
     """
     program_returns, version = [], ""
-    for number, (simulated_return, start_index) in enumerate(choose_worst_returns(world, starts, returns, points), 1):
+    for number, (simulated_return, start_index) in enumerate(
+        choose_worst_returns(world, starts, returns, max_returns), 1
+    ):
         log = None if folder is None else folder / f"worst-return-{number}.mcap"
-        with stage(f"flying return {number} of {points} by the program", "flying a return by a program") as advance:
+        with stage(
+            f"flying return {number} of {max_returns} with ArduPlane", "flying a return with ArduPlane"
+        ) as advance:
             try:
                 setup, _ = return_setup(world, starts.rows[start_index], simulated_return.target.landing)
             except MissionError as error:

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
-from world.scenario_file import expected_values
+from world.scenario_file import JSON_OBJECT, expected_values
 
 # Maximum length of a message, characters.
 MAX_MESSAGE_CHARACTERS = 256 * 1024
@@ -232,7 +232,9 @@ def describe_error(error: ValidationError) -> str:
     'raise: by: expected at most 9000.0'
     """
     first = error.errors(include_url=False, include_input=False)[0]
-    return f"{': '.join(map(str, first['loc']))}: {expected_values(first)}" if len(first["loc"]) > 1 else ""
+    return (
+        f"{': '.join(map(str, first['loc']))}: {expected_values(first, JSON_OBJECT)}" if len(first["loc"]) > 1 else ""
+    )
 
 
 def message_schema() -> dict[str, Any]:

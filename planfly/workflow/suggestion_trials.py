@@ -549,12 +549,12 @@ def _has_passing_part(passed_trials: Sequence[PassedTrial], finding: Finding, su
 
 
 def _larger_suggestion(finding: Finding, suggestion: Suggestion, verdict: Verdict) -> Suggestion | None:
-    """Return a suggestion enlarged by the further change that the verdict suggests.
+    """Return a suggestion, increased by what the mission still needs after it; None if no increase is known.
 
-    Returns None without such a change.
+    If the finding still does not pass, the increase is what this finding needs. Otherwise it is what the other legs
+    need for the same rule.
 
-    verdict: verdict on the mission with the suggestion applied.  If the finding itself passes now, the changes that
-    other legs need for the same rule are added.
+    verdict: verdict on the mission with the suggestion applied.
     """
     same_finding = [
         open_finding

@@ -221,7 +221,7 @@ def _enlarge_missile_spheres(spec: Spec, failed_findings: list[Finding]) -> list
             # outside a larger sphere either.
             continue
         # The nearest distance is negative inside the sphere.
-        depth = None if finding.nearest is None else -finding.nearest
+        depth = None if finding.nearest_distance is None else -finding.nearest_distance
         if depth is None:
             continue
         threat = spec["threats"][finding.place.index]

@@ -479,7 +479,7 @@ def cheapest_route(
     while search.stage < grid.stages:
         search = continue_route(data, frame, grid, extra, bound, search, stages)
         pause()
-    cells, cost = end_route(search)
+    cells, cost = extract_route(search)
     return cells, cost
 
 
@@ -574,8 +574,8 @@ def continue_route(
 
 
 @compiled
-def end_route(search: GridSearch) -> tuple[Records, float]:
-    """Trace the route that a search found; return its `ROUTE_CELL` records (stages + 1,) and its cost.
+def extract_route(search: GridSearch) -> tuple[Records, float]:
+    """Return the route that a search found, as `ROUTE_CELL` records (stages + 1,), and its cost.
 
     Without a route, there are no records and the cost is inf.
     """

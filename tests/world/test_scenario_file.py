@@ -116,5 +116,5 @@ def test_a_dictionary_that_is_checked_is_not_changed() -> None:
     file = check_scenario(data, "x")
     assert data == kept
     assert check_scenario(file.model_dump(mode="json", exclude_none=True), "x") == file
-    with pytest.raises(ScenarioError, match="expected a table of keys, got list"):
+    with pytest.raises(ScenarioError, match="expected an object, got list"):
         check_scenario([1], "x")

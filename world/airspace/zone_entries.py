@@ -57,11 +57,13 @@ _FAA_NOT_APPLICABLE = -9998.0
 
 
 def zone_entries(properties: Mapping[str, Any], source: str) -> dict[str, Any]:
-    """Convert a zone's properties to the entries of a [[zones]] table; by default it is an exclusion.
+    """Convert a zone's properties to the entries of a [[zones]] table; a zone without a kind is an exclusion.
 
-    A flight level, or a height above the ellipsoid, limits an exclusion with a margin on the safe side. The margin is
-    `FLIGHT_LEVEL_ERROR`, or the range of the geoid. An inclusion with such a limit is an error. Raises ScenarioError
-    for an invalid limit, and for an unknown property that looks like a key of a scenario file.
+    A limit that is a flight level or a height above the ellipsoid becomes an altitude. Its error enlarges the
+    exclusion: `FLIGHT_LEVEL_ERROR` for a flight level, and the range of geoid heights for the ellipsoid.
+
+    Raises ScenarioError for such a limit of an inclusion, for an invalid limit, and for an unknown property that looks
+    like a key of a scenario file.
 
     >>> zone_entries({"lowerLimit": {"value": 0, "unit": 1, "referenceDatum": 0}, "ceiling_agl_m": 90.0}, "a file")
     {'kind': 'exclusion', 'ceiling_agl_m': 90.0}
@@ -148,7 +150,7 @@ def _limit_entry(value: Any, key: str, kind: Any, source: str) -> dict[str, floa
     A floor at the ground needs no entry. Raises ScenarioError for an invalid limit.
     """
     if not isinstance(value, dict):
-        allowed = "expected a table of value, unit and referenceDatum"
+        allowed = "expected an object with value, unit and referenceDatum"
         raise ScenarioError.at(source, key, value, allowed, shown="")
     height, unit, datum = value.get("value"), value.get("unit"), value.get("referenceDatum")
     if isinstance(height, bool) or not isinstance(height, int | float) or not math.isfinite(height):

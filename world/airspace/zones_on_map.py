@@ -143,7 +143,9 @@ def select_near_zones(tables: Sequence[ZoneTable], source: str, origin: GeoOrigi
 
 
 def _is_near_area(table: ZoneTable, origin: GeoOrigin, bounds: Floats) -> bool:
-    """Return True if a zone's bounding box is within `MAX_ZONE_DISTANCE` of an area, or if it is stated in m.
+    """Return True if a zone's bounding box is within `MAX_ZONE_DISTANCE` of an area.
+
+    A zone whose table states positions in m, without latitudes and longitudes, always counts as near.
 
     bounds: [[west, east], [south, north]] of the area, (2, 2) m.
     """

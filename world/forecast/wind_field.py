@@ -230,7 +230,10 @@ def interpolate_field(
 def _interpolate_points(
     field: Floats, seconds: Floats, latitudes: Floats, longitudes: Floats, altitudes: Floats
 ) -> Floats:
-    """Return the wind and its altitude at n points, (n, 3), by `interpolate_field`."""
+    """Return the wind at n points by `interpolate_field`, (n, 3): east and north, m/s, and the altitude, m AMSL.
+
+    The altitude is the one to which the wind applies: the point's altitude, limited to the levels of the field.
+    """
     winds = np.empty((seconds.size, 3))
     for k in range(seconds.size):
         east, north, altitude = interpolate_field(field, seconds[k], latitudes[k], longitudes[k], altitudes[k])

@@ -413,7 +413,9 @@ class ArduPlane(Autopilot):
         parameters, bank = self.parameters, self.parameters.navl1_lim_bank
         # With a bank limit for loiters, `AP_L1_Control::loiter_radius` increases the radius with altitude only if the
         # radius cannot be flown at this bank.
-        bank_text = f"NAVL1_LIM_BANK {bank:g} is not simulated: ArduPlane may fly smaller loiters than the simulation"
+        bank_text = (
+            f"NAVL1_LIM_BANK {bank:g} is not simulated, so ArduPlane may fly smaller loiters than the simulation"
+        )
         return LoiterRules(
             radius=parameters.loiter_radius,
             radius_name="WP_LOITER_RAD",
@@ -588,14 +590,14 @@ _COURSE_SPEED_MPS = 5.0
 # Join to the landing sequence after an RTL, by RTL_AUTOLAND; with 3 the landing sequence is only for go-arounds.
 _LANDING_JOIN_BY_AUTOLAND: dict[int, Literal["", "circle", "straight"]] = {1: "circle", 2: "straight"}
 _RETURN_PATH_TEXT = (
-    "RTL_AUTOLAND 4 returns along the mission's return path or landing sequence, which is not simulated: the simulated"
+    "RTL_AUTOLAND 4 returns along the mission's return path or landing sequence, which is not simulated. The simulated"
     " RTL ends in its loiter"
 )
 
 # `Plane::verify_loiter_heading` waits for the heading to the position of the next item.  The position of an RTL item is
 # 0 N 0 E.
 _EXIT_BEFORE_RTL_TEXT = (
-    "ArduPlane leaves the loiter on the heading to 0° N 0° E, because an RTL item has no position: the simulated flight"
+    "ArduPlane leaves the loiter on the heading to 0° N 0° E, because an RTL item has no position. The simulated flight"
     " does the same, but the route is judged with an exit on the heading to home"
 )
 

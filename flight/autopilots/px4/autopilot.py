@@ -105,12 +105,12 @@ _NEUTRAL = {
 }
 # Part of an RTL that is not simulated, by RTL_TYPE.
 _RTL_TYPES_NOT_FLOWN = {
-    2: "RTL_TYPE 2 (return along the mission to its landing, or in reverse to home) is not simulated: the return is "
-    "simulated with RTL_TYPE 1, to the nearest rally point or home",
-    3: "RTL_TYPE 3 (return to the nearest of home, rally points and the mission's landing) is not simulated: the "
-    "return is simulated with RTL_TYPE 0, which ignores the landing",
-    4: "RTL_TYPE 4 (return along the mission to its landing, or in reverse to home) is not simulated: the return is "
-    "simulated with RTL_TYPE 1, to the nearest rally point or home",
+    2: "RTL_TYPE 2 returns along the mission to its landing, or in reverse to home. This is not simulated. The "
+    "simulated return follows RTL_TYPE 1, to the nearest rally point or home",
+    3: "RTL_TYPE 3 returns to the nearest of home, rally points and the mission's landing. This is not simulated. The "
+    "simulated return follows RTL_TYPE 0, which ignores the landing",
+    4: "RTL_TYPE 4 returns along the mission to its landing, or in reverse to home. This is not simulated. The "
+    "simulated return follows RTL_TYPE 1, to the nearest rally point or home",
 }
 
 # Values of RTL_TYPE for an RTL along the mission.
@@ -455,8 +455,8 @@ class Px4(Autopilot):
         path_text = (
             f"RTL_TYPE {return_type:g}: a return goes to {_DESTINATION_TEXTS[int(return_type)]}. An aircraft below"
             f" RTL_RETURN_ALT ({first_height} above the destination) first climbs to this height in a loiter. Then it"
-            " flies level: to the loiter of a landing sequence up to NAV_FW_ALT_RAD"
-            f" ({parameters['NAV_FW_ALT_RAD']:g} m) lower, because the climb ends there. Over home or a rally point it"
+            " flies level. Before a landing sequence, the climb may end up to NAV_FW_ALT_RAD"
+            f" ({parameters['NAV_FW_ALT_RAD']:g} m) below this height. Over home or a rally point, the aircraft"
             f" descends in a loiter to RTL_DESCEND_ALT ({last_height})"
         )
         return ReturnBehaviour(

@@ -96,8 +96,7 @@ def imported_lines(
     if imported_log.damage.lossy or imported_log.damage.cut:
         lines.append(f"Lost: {damage_text(imported_log.damage)}")
     lines += [f"Note: {note}" for note in imported_log.notes]
-    if setup.route.notes:
-        lines.append(f"Not flown as written: {'; '.join(setup.route.notes)}")
+    lines += [f"Not flown as written: {note}" for note in setup.route.notes]
     return tuple(lines)
 
 

@@ -11,7 +11,7 @@ from flight.simulation.track import ROLL, THROTTLE, Track
 from logs.verdict.imported.flown_legs import FlownLegs
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.measures.track_alignment import AlignedTrack, align_track, project_onto_leg
-from logs.verdict.measures.turns import CornerPass, corner_passes, measure_turn
+from logs.verdict.measures.turns import WaypointPass, measure_passes, measure_turn
 from world.arrays import Floats
 from world.errors import LogError
 
@@ -70,7 +70,7 @@ class TurnPair:
 
     waypoint: index in the whole route.
     turn: planned course change, deg.
-    overshoot: m, as in `logs.verdict.measures.turns.CornerPass`.
+    overshoot: m, as in `logs.verdict.measures.turns.WaypointPass`.
     bank: maximum absolute bank, deg.
     passed: minimum distance from the waypoint, m.
     """
@@ -165,7 +165,7 @@ def compare_with_model(
         _leg_pair(stretch_legs.first + k, slice(int(counts[k]), int(counts[k + 1])), profiles)
         for k in range(requirements.legs)
     )
-    corners = [corner_passes(flight_requirements, track) for flight_requirements, track in pairs]
+    corners = [measure_passes(flight_requirements, track) for flight_requirements, track in pairs]
     turns = tuple(_turn_pair(stretch_legs.first, k, pairs, corners) for k in range(1, requirements.legs))
     flown_profile, model_profile = profiles
     return Reflight(
@@ -278,7 +278,7 @@ def _turn_pair(
     first_waypoint: int,
     waypoint: int,
     pairs: Sequence[tuple[RouteRequirements, AlignedTrack]],
-    corners: Sequence[Sequence[CornerPass]],
+    corners: Sequence[Sequence[WaypointPass]],
 ) -> TurnPair:
     """Compare the flown and the simulated turn at one waypoint of the stretch.
 

@@ -24,7 +24,7 @@ NEXT_LEG_FRACTION = 0.7
 
 
 @dataclass(frozen=True, slots=True)
-class CornerPass:
+class WaypointPass:
     """Measured pass of one waypoint of an imported flight.
 
     time: time of the closest approach, s.
@@ -40,15 +40,15 @@ class CornerPass:
     overrun: float = 0.0
 
 
-def corner_passes(requirements: RouteRequirements, aligned: AlignedTrack) -> tuple[CornerPass, ...]:
-    """Measure the pass of each waypoint of a route, in order of time.
+def measure_passes(requirements: RouteRequirements, aligned: AlignedTrack) -> tuple[WaypointPass, ...]:
+    """Measure how a track passes each waypoint of a route: time, distance and overshoot, in the order of the route.
 
     >>> from logs.recording.example_log import example_log
     >>> from logs.verdict.measures.route_requirements import route_requirements
     >>> from logs.verdict.measures.track_alignment import align_track
     >>> log = example_log()
     >>> requirements = route_requirements(log.setup)
-    >>> passes = corner_passes(requirements, align_track(requirements, log.track))
+    >>> passes = measure_passes(requirements, align_track(requirements, log.track))
     >>> len(passes) == requirements.legs + 1, passes[1].distance < 60.0
     (True, True)
     """
@@ -62,7 +62,7 @@ def corner_passes(requirements: RouteRequirements, aligned: AlignedTrack) -> tup
                 (other_time for other_time in times[k + 1 :] if other_time > time + tick), float(aligned.track.time[-1])
             )
             overshoot, overrun = _corner_overshoot(requirements, aligned, k, time, next_time)
-        passes.append(CornerPass(time, distance, overshoot, overrun))
+        passes.append(WaypointPass(time, distance, overshoot, overrun))
     return tuple(passes)
 
 
@@ -97,7 +97,7 @@ def _track_between(aligned: AlignedTrack, start: float, end: float) -> tuple[Flo
 def _corner_overshoot(
     requirements: RouteRequirements, aligned: AlignedTrack, waypoint: int, start: float, end: float
 ) -> tuple[float | None, float]:
-    """Return the overshoot at a waypoint (m) and the overrun (m), as in `CornerPass`.
+    """Return the overshoot at a waypoint (m) and the overrun (m), as in `WaypointPass`.
 
     If the aircraft was already beyond the end of the next leg at time `start`, the overshoot is None, and the overrun
     is its distance from that end.  Otherwise the overrun is 0.
@@ -150,18 +150,18 @@ class TurnMeasure:
     min_distance: float | None = None
     full_circles: int = 0
     is_complete: bool = False
-    corner: CornerPass | None = None
+    corner: WaypointPass | None = None
 
 
 def measure_turns(requirements: RouteRequirements, aligned: AlignedTrack) -> list[TurnMeasure]:
     """Measure the turn at every inner waypoint, in order.
 
-    In an imported flight, overshoot and minimum distance are those of the corner (`CornerPass`).
+    In an imported flight, overshoot and minimum distance are those of the corner (`WaypointPass`).
     """
     measures = [measure_turn(requirements, aligned, waypoint) for waypoint in range(1, requirements.legs)]
     if requirements.setup.imported_log is None:
         return measures
-    corners = corner_passes(requirements, aligned)[1:-1]
+    corners = measure_passes(requirements, aligned)[1:-1]
     return [
         replace(measure, overshoot=corner.overshoot, min_distance=corner.distance, corner=corner)
         for measure, corner in zip(measures, corners, strict=True)

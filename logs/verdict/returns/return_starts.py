@@ -283,7 +283,7 @@ def _sample_positions(moves: Records, interval: float) -> tuple[Floats, NDArray[
     return times, move_numbers, fraction, position
 
 
-def flown_end(track: Track) -> ReturnStarts:
+def return_start_at_track_end(track: Track) -> ReturnStarts:
     """Return the end of a flown track as the start of a return."""
     row = np.array([len(track) - 1], dtype=np.intp)
     roll = np.nan_to_num(track.attitude[row, ROLL].astype(np.float64))
@@ -292,10 +292,10 @@ def flown_end(track: Track) -> ReturnStarts:
     return ReturnStarts(track.time[row], records, energy, True, mask, mask, np.zeros(1))
 
 
-def planned_end(requirements: RouteRequirements) -> ReturnStarts:
+def return_start_at_path_end(requirements: RouteRequirements) -> ReturnStarts:
     """Return the end of the planned path as the start of a return, with the predicted energy.
 
-    The aircraft is in straight flight.
+    The aircraft is assumed to fly straight there.
     """
     course = float(requirements.courses[-1])
     slope = math.tan(float(requirements.slopes[-1]))

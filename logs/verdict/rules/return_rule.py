@@ -34,7 +34,13 @@ from logs.verdict.returns.judge_returns import (
     make_return_world,
     returning_title,
 )
-from logs.verdict.returns.return_starts import ReturnStarts, flown_end, flown_starts, planned_end, planned_starts
+from logs.verdict.returns.return_starts import (
+    ReturnStarts,
+    flown_starts,
+    planned_starts,
+    return_start_at_path_end,
+    return_start_at_track_end,
+)
 from logs.verdict.returns.returns_text import headline, measured_text, outcome_text
 from logs.verdict.rule import Rule
 from world.errors import MissionError
@@ -58,7 +64,7 @@ def return_findings(
         required_findings = _requirement_findings(
             requirements, partial(planned_starts, requirements.setup, requirements=requirements)
         )
-        end_findings = _automatic_return_findings(requirements, planned_end(requirements))
+        end_findings = _automatic_return_findings(requirements, return_start_at_path_end(requirements))
         return [*_rtl_findings(requirements, ok=None, outcome="not flown yet"), *end_findings, *required_findings]
     if requirements.setup.imported_log is None:
         return []
@@ -88,7 +94,7 @@ def flown_return_findings(
     starts = partial(planned_starts, requirements.setup, requirements=requirements)
     if track is not None:
         starts = partial(flown_starts, requirements.setup, track)
-    end = flown_end(track) if track is not None and has_arrived else None
+    end = return_start_at_track_end(track) if track is not None and has_arrived else None
     return [
         *_flown_rtl_findings(requirements, has_arrived, reason),
         *_automatic_return_findings(requirements, end),
@@ -255,7 +261,7 @@ def _rtl_findings(requirements: RouteRequirements, ok: bool | None, outcome: str
     route = requirements.setup.route
     if route.rtl_start is None:
         return []
-    name = f"{Command.NAV_RETURN_TO_LAUNCH.name}: "
+    name = f"{Command.NAV_RETURN_TO_LAUNCH.name} "
     note_text = next((note.partition(name)[2] for note in route.notes if name in note), "")
     reason = f"the simulated {requirements.setup.autopilot.title} {note_text or 'returns'}; {outcome}"
     unknown_reason = next((note.partition(": ")[2] for note in route.notes if RTL_NOT_CONTINUED_TEXT in note), "")

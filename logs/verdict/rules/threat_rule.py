@@ -179,13 +179,15 @@ def _sphere_finding(
     """
     judged_visit = planned_visit if flown_visit is None else flown_visit
     is_missing = math.isnan(judged_visit.closest)
+    zone_name = "detection" if place.kind == "radar" else "kill"
     facts = (
-        f"the planned path is inside the radius of {radius:.0f} m for {planned_visit.time_inside:.1f} s (exposure"
-        f" {planned_visit.exposure:.3g} s)"
+        f"the planned path is inside the {zone_name} zone (radius {radius:.0f} m) for {planned_visit.time_inside:.1f} s"
+        f" (weighted by distance: {planned_visit.exposure:.3g} s)"
     )
     if flown_visit is not None and not is_missing:
         facts += (
-            f"; the flight was inside for {flown_visit.time_inside:.1f} s (exposure {flown_visit.exposure:.3g} s)."
+            f"; the flight was inside for {flown_visit.time_inside:.1f} s"
+            f" (weighted by distance: {flown_visit.exposure:.3g} s)."
             f" It came within {flown_visit.closest:.0f} m of the missile site or radar"
         )
         facts += f" at {flown_visit.closest_time:.1f} s{nearest_place}"

@@ -161,9 +161,9 @@ def page_template(name: str, package: str = "logs.views.report") -> Template:
 
 
 def script_text(names: tuple[str, ...]) -> str:
-    """Join the theme's styles and scripts of ``templates/scripts`` to one script.
+    """Join the theme's styles and scripts of ``templates/scripts`` into one script.
 
-    names: names of the scripts in their order; ``start`` is added at the end.
+    names: names of the scripts, in order; the script ``start`` is added at the end.
     """
     files = resources.files("logs.views.report").joinpath("templates", "scripts")
     parts = [files.joinpath(f"{name}.js").read_text(encoding="utf-8") for name in (*names, "start")]

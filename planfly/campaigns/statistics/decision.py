@@ -289,8 +289,8 @@ class Goal:
     changed: bool = False
 
     @property
-    def method(self) -> str:
-        """Description of the method of the bounds."""
+    def bound_method(self) -> str:
+        """Method by which the bounds of the probability are computed, with its condition."""
         if self.stops:
             return "beta-binomial mixture, valid whenever the flights are stopped"
         if self.changed:

@@ -252,7 +252,7 @@ def test_a_mission_taken_back_while_it_is_judged_is_not_flown(fake: FakeVehicle)
 
 def test_a_fence_from_a_file_belongs_to_the_mission_that_is_uploaded_next(fake: FakeVehicle) -> None:
     circle = MissionItem(0, Command.NAV_FENCE_CIRCLE_EXCLUSION, Frame.GLOBAL, (200.0, 0.0, 0.0, 0.0), 46.0, 8.0, 0.0)
-    fake.vehicle.load_fence([circle])
+    fake.vehicle.load_fence_and_rally([circle])
     fake.turn()
     assert fake.orders == []
     fake.upload(many_items(3))

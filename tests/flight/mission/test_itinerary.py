@@ -32,18 +32,18 @@ def test_speeds_count_for_the_legs_after_them() -> None:
     # Of type 1 it is the least ground speed from there on, which is left as it is by a change of airspeed.
     assert np.array_equal(flown.points["min_ground_speed"], [math.nan] * 3 + [28.0] * 4, equal_nan=True)
     assert flown.notes == (
-        "item 5: DO_CHANGE_SPEED's throttle: ignored",
+        "item 5: DO_CHANGE_SPEED's throttle is ignored",
         "item 5: DO_CHANGE_SPEED of the ground speed sets MIN_GROUNDSPEED to 28 m/s",
-        "item 6: DO_CHANGE_SPEED of type 2, neither airspeed nor ground speed: ignored",
-        "item 12: DO_CHANGE_SPEED to 0 m/s: ignored",
+        "item 6: DO_CHANGE_SPEED of type 2, neither airspeed nor ground speed, is ignored",
+        "item 12: DO_CHANGE_SPEED to 0 m/s is ignored",
     )
 
 
 def test_a_distance_to_fly_on_beyond_a_waypoint_is_flown_and_a_negative_one_leaves_the_verdict_open() -> None:
     flown = route(wp(0, 0), wp(0, 900, p="0 0 150.9 0"), wp(900, 900, p="0 0 -50 0"), wp(900, 1800))
     assert flown.notes == (
-        "item 2: NAV_WAYPOINT: flown on for 150 m beyond it, as ArduPlane does",
-        "item 3: NAV_WAYPOINT: -50 m to fly on beyond it: flown as 0 m, but ArduPlane may fly 255 m",
+        "item 2: after NAV_WAYPOINT the flight continues straight for 150 m, as in ArduPlane",
+        "item 3: NAV_WAYPOINT with -50 m to fly on beyond it is flown with 0 m, but ArduPlane may fly 255 m",
     )
     assert [one.item for one in flown.open_items] == [3]
 
@@ -52,12 +52,12 @@ def test_a_distance_to_fly_on_beyond_a_waypoint_is_flown_and_a_negative_one_leav
     ("change", "airspeed", "noted"),
     [
         ("0 22 -1", 22.0, None),
-        ("1 22 -1", 22.0, "DO_CHANGE_SPEED of type 1: flown as airspeed, because PX4 ignores the type"),
-        ("2 22 80", 22.0, "DO_CHANGE_SPEED of type 2: flown as airspeed, because PX4 ignores the type"),
-        ("0 0 -1", 25.0, "DO_CHANGE_SPEED to 0 m/s: returns to PX4's default airspeed"),
-        ("0 -1 -1", 25.0, "DO_CHANGE_SPEED to -1 m/s: returns to PX4's default airspeed"),
-        ("0 -2 -1", 25.0, "DO_CHANGE_SPEED to -2 m/s: returns to PX4's default airspeed"),
-        ("0 -1 80", 25.0, "DO_CHANGE_SPEED's throttle: not flown"),
+        ("1 22 -1", 22.0, "DO_CHANGE_SPEED of type 1 is flown as airspeed, because PX4 ignores the type"),
+        ("2 22 80", 22.0, "DO_CHANGE_SPEED of type 2 is flown as airspeed, because PX4 ignores the type"),
+        ("0 0 -1", 25.0, "DO_CHANGE_SPEED to 0 m/s returns to PX4's default airspeed"),
+        ("0 -1 -1", 25.0, "DO_CHANGE_SPEED to -1 m/s returns to PX4's default airspeed"),
+        ("0 -2 -1", 25.0, "DO_CHANGE_SPEED to -2 m/s returns to PX4's default airspeed"),
+        ("0 -1 80", 25.0, "DO_CHANGE_SPEED's throttle is not flown"),
     ],
 )
 def test_a_speed_by_its_value_alone_is_that_or_the_autopilots_own(
@@ -79,7 +79,7 @@ def test_a_gate_changes_the_speed_where_its_plane_cuts_the_leg() -> None:
     # ArduPlane has no gates.
     plain = route(*items)
     assert (plain.leg_airspeeds.tolist(), plain.items.tolist()) == ([20.0], [1, 5])
-    assert plain.notes == ("item 3: CONDITION_GATE: not flown",)
+    assert plain.notes == ("item 3: CONDITION_GATE is not flown",)
 
 
 @pytest.mark.parametrize(
@@ -100,12 +100,12 @@ def test_a_gate_changes_the_speed_where_its_plane_cuts_the_leg() -> None:
         (
             (wp(0, 0), wp(0, 1800), wp(0, 2000, command=4501)),
             [25.0],
-            ["item 3: CONDITION_GATE: no waypoint follows it, so it is passed at once"],
+            ["item 3: CONDITION_GATE is passed at once, because no waypoint follows it"],
         ),
         (
             (wp(0, 0), wp(0, 900, command=4501), "2 178 0 20 -1 0 0 0 0", wp(0, 1800, command=17, p="0 0 100 0")),
             None,
-            ["item 2: CONDITION_GATE not between waypoints: the speed after it applies from the leg's start"],
+            ["item 2: CONDITION_GATE is not between waypoints, so the speed after it applies from the leg's start"],
         ),
     ],
 )
@@ -123,8 +123,8 @@ def test_gates_that_leave_their_leg_whole(
 def test_what_is_the_cameras_is_not_called_not_flown() -> None:
     items = wp(0, 0), "2 206 25 0 1 0 0 0 0", wp(0, 900), "2 203 0 0 0 0 1 0 0", "2 181 0 1 0 0 0 0 0", wp(0, 1800)
     assert route(*items).notes == (
-        "item 4: DO_DIGICAM_CONTROL: for the camera, nothing to fly",
-        "item 5: DO_SET_RELAY: not flown",
+        "item 4: DO_DIGICAM_CONTROL only controls the camera",
+        "item 5: DO_SET_RELAY is not flown",
     )
 
 
@@ -206,7 +206,7 @@ def test_a_return_or_a_landing_ends_the_itinerary() -> None:
     assert (home.rtl_start, home.rtl_loiter) == (1, pytest.approx((0.0, 0.0, 400.0, 80.0, 0.0), abs=0.01))
     assert home.notes == (
         "item 4: never reached",
-        "item 3: NAV_RETURN_TO_LAUNCH: returns to home, 1.5 km away, descending 100 m on a straight slope to 400"
+        "item 3: NAV_RETURN_TO_LAUNCH returns to home, 1.5 km away, descending 100 m on a straight slope to 400"
         " m AMSL;"
         " the simulated flight ends after 60 s of the loiter there",
     )
@@ -220,7 +220,7 @@ def test_a_return_or_a_landing_ends_the_itinerary() -> None:
     assert "without a position" in here.notes[0]
     ignored = route(wp(0, 500), wp(0, 1500), "0 20 0 0 0 0 0 0 0", home="0 0 0", terrain=ground())
     assert ignored.legs == 1
-    assert ignored.notes[0] == "item 3: NAV_RETURN_TO_LAUNCH without a home: not flown"
+    assert ignored.notes[0] == "item 3: NAV_RETURN_TO_LAUNCH without a home is not flown"
 
 
 # One line each of the commands that a fixed wing's mission may hold; none but a mark may go in silence.
@@ -266,9 +266,9 @@ def test_a_vertical_take_off_is_over_home_and_its_place_is_not_flown_to() -> Non
     flown = route(wp(0, 700, 80, command=84), wp(900, 700))
     assert flown.positions == pytest.approx(np.array([[0, 0, 380], [900, 700, 400]]), abs=0.01)
     assert flown.notes[:2] == (
-        "item 1: NAV_VTOL_TAKEOFF: not flown straight up",
-        "item 1: NAV_VTOL_TAKEOFF: its position is not flown to, as in ArduPlane; PX4 would fly to it",
+        "item 1: NAV_VTOL_TAKEOFF is not flown straight up",
+        "item 1: the position of NAV_VTOL_TAKEOFF is not flown to, as in ArduPlane; PX4 would fly to it",
     )
     later = route(wp(0, 0), wp(700, 700, command=84), wp(0, 900))
     assert later.items.tolist() == [1, 3]
-    assert later.notes == ("item 2: NAV_VTOL_TAKEOFF in the air: not flown",)
+    assert later.notes == ("item 2: NAV_VTOL_TAKEOFF in the air is not flown",)

@@ -105,7 +105,7 @@ def test_commands_behind_a_spent_jump_run_a_round_early_in_arduplane_and_in_thei
     assert flown.items.tolist() == [1, 2, 3, 4, 2, 3, 4, 2, 3, 4, 8, 9]
     # ArduPilot #30376: at the begin of the last round the jump's counter is used up, and item 7 runs.
     assert flown.leg_airspeeds.tolist() == [25.0] * 3 + [22.0] * 3 + [30.0] * 5
-    assert flown.notes == ("item 7: DO_CHANGE_SPEED: flown one loop early, as ArduPlane runs it",)
+    assert flown.notes == ("item 7: DO_CHANGE_SPEED is flown one loop early, as in ArduPlane",)
     by_px4 = make_route(mission(*items), ORIGIN, None, 25.0, False, rules=RouteRules(reads_as_px4=True))
     assert by_px4.leg_airspeeds.tolist() == [25.0] * 3 + [22.0] * 6 + [30.0] * 2
     assert by_px4.notes == ()
@@ -178,7 +178,7 @@ def test_a_home_at_zero_degrees_is_ignored_only_at_altitude_zero(altitude: str, 
     """`AP_AHRS::set_home` refuses latitude, longitude and altitude of 0 alone, the altitude in whole centimetres."""
     made = route(wp(0, 0), wp(0, 900), f"{frame} 179 0 0 0 0 0 0 {altitude}", wp(900, 900))
     assert [one.item for one in made.open_items] == [3] * opens
-    assert any("ignored, as ArduPlane does" in note for note in made.notes) != opens
+    assert any("ignored, as in ArduPlane" in note for note in made.notes) != opens
 
 
 @pytest.mark.parametrize(("jumps", "open_item"), [(63, None), (64, 2)])

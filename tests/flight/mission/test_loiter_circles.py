@@ -93,7 +93,7 @@ def test_loiters_last_as_long_as_asked() -> None:
     assert endless.items[-1] == 2
     assert circled(endless, 2)[0] * TURN * -150.0 == pytest.approx(ENDLESS_LOITER_TIME_S * 25.0)
     assert any(
-        "item 2: NAV_LOITER_UNLIM: flown for 60 s and at least one lap; the mission ends" in note
+        "item 2: NAV_LOITER_UNLIM is flown for 60 s and at least one lap; the mission ends" in note
         for note in endless.notes
     )
     assert any("item 3: never reached" in note for note in endless.notes)
@@ -118,7 +118,7 @@ def test_a_loiter_without_a_radius_has_the_aircrafts_own() -> None:
     """R = 625 / (9.80665 tan 30) = 110.39 m in calm air; a tenth over it in whole tens of metres is 130 m."""
     lines = (wp(0, 0), wp(0, 2000, command=18, p="1 0 0 0"), wp(3000, 2000))
     assert circled(setup_of(*lines).route, 2)[1] == 130.0
-    assert "item 2: loiter without a radius: flown with a radius of 130 m" in setup_of(*lines).route.notes
+    assert "item 2: the loiter has no radius, so a radius of 130 m is used" in setup_of(*lines).route.notes
     # (25 + 8)^2 / (9.80665 tan 30) = 192.3 m downwind.
     assert circled(setup_of(*lines, wind={"speed_mps": 8.0, "from_deg": 0.0}).route, 2)[1] == 220.0
 
@@ -244,7 +244,7 @@ def test_a_loiter_without_a_radius_has_that_of_the_autopilots_parameter() -> Non
     turns, radius = circled(left, 2)
     assert turns < -1.0
     assert radius == 130.0
-    assert "item 2: loiter without a radius: flown with NAV_LOITER_RAD, 130 m to the left" in left.notes
+    assert "item 2: the loiter has no radius, so NAV_LOITER_RAD (130 m to the left) is used" in left.notes
     stated = laid_for(LoiterRules(radius=-130.0), wp(0, -1500), wp(0, 0, 100, 19, p="60 0 200 0"), wp(1500, 1500))
     assert circled(stated, 2)[1] == 200.0
 
@@ -269,8 +269,8 @@ def test_a_circle_left_when_its_time_is_over_is_drawn_no_longer() -> None:
 def test_what_comes_after_the_last_waypoint_is_said() -> None:
     rules = LoiterRules(80.0, "NAV_LOITER_RAD", ends_in_circle=True)
     note = (
-        "item 2: after the last waypoint the aircraft loiters around it indefinitely, with NAV_LOITER_RAD, 80 m:"
-        " one lap is flown"
+        "item 2: after the last waypoint the aircraft loiters around it indefinitely, with NAV_LOITER_RAD, 80 m;"
+        " one lap is simulated"
     )
     assert any(line.startswith(note) for line in laid_for(rules, wp(0, -1500), wp(0, 0)).notes)
     for last in (wp(0, 0, command=17, p="0 0 150 0"), "3 20 0 0 0 0 0 0 0", wp(0, 0, command=21)):
@@ -306,15 +306,15 @@ def test_a_radius_is_what_the_autopilot_reads_of_it_and_grows_with_height() -> N
         radius_of=lambda one: 0.0 if one.seconds else 200.0,
         radius_scale=lambda up: 1.0 + up / 1000.0,
     )
-    unread = "its radius of 150 m is ignored: flown with WP_LOITER_RAD, 60 m"
+    unread = "its radius of 150 m is ignored, so WP_LOITER_RAD ({} is used"
     # 100 m above home's 300 m: 1.4 times as wide.
     for loiter, radius, note in (
-        (wp(0, 0, 100, 19, p="60 0 -150 0"), -84.0, f"{unread} to the left"),
-        (wp(0, 0, 100, 19, p="60 0 150 0"), 84.0, unread),
+        (wp(0, 0, 100, 19, p="60 0 -150 0"), -84.0, unread.format("60 m to the left)")),
+        (wp(0, 0, 100, 19, p="60 0 150 0"), 84.0, unread.format("60 m)")),
         (
             wp(0, 0, 100, 18, p="2 0 207 0"),
             280.0,
-            "loiter radius 207 m: flown with a radius of 280 m, because the autopilot enlarges it with altitude",
+            "the loiter radius of 207 m is flown as 280 m, because the autopilot enlarges it with altitude",
         ),
     ):
         made = laid_for(rules, wp(0, -1500), loiter, wp(1500, 1500))

@@ -72,7 +72,7 @@ def test_the_height_of_a_rally_point_may_be_counted_from_the_sea_for_the_slope()
 def test_why_it_goes_there_is_said() -> None:
     far = choose_target(ReturnRules(rally_limit=1900.0), (0.0, 6000.0, 900.0), HOME, RALLY)
     assert rtl_note(far, ReturnRules(), 900.0) == (
-        "NAV_RETURN_TO_LAUNCH: returns to home, 6.0 km away (rally point 1, the nearest, is 2.0 km away, beyond"
+        "NAV_RETURN_TO_LAUNCH returns to home, 6.0 km away (rally point 1, the nearest, is 2.0 km away, beyond"
         " RALLY_LIMIT_KM"
         " 1.9), descending 500 m on a straight slope to 400 m AMSL; the simulated flight ends after 60 s"
         " of the loiter there"
@@ -315,7 +315,7 @@ def test_a_return_that_holds_its_height_comes_down_over_its_target() -> None:
     # Level until the circle about home, down to 100 m over it there.
     assert (ups[0], ups[-1]) == (900.0, 400.0)
     assert rtl_note(target, rules, 900.0).startswith(
-        "NAV_RETURN_TO_LAUNCH: returns to home, 8.0 km away, level, and descending 500 m in a loiter there, to"
+        "NAV_RETURN_TO_LAUNCH returns to home, 8.0 km away, level, and descending 500 m in a loiter there, to"
         " 400 m AMSL; the"
     )
     low = choose_target(rules, (0.0, 8000.0, 350.0), HOME, ())
@@ -342,7 +342,8 @@ def test_a_return_climbs_first_and_descends_over_its_target_to_another_height() 
 def test_a_landing_that_counts_as_a_place_to_return_to_is_noted() -> None:
     lines = wp(0, 3000), wp(2000, 3000), RTL, wp(0, 0, 0, command=21)
     told = (
-        "item 3: the autopilot may also return to the mission's landing, which is not simulated: the RTL goes to home"
+        "item 3: the autopilot may also return to the mission's landing, which is not simulated. The simulated RTL goes"
+        " to home"
     )
 
     def notes(rules: ReturnRules, *items: str) -> tuple[str, ...]:

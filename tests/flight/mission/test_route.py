@@ -282,7 +282,7 @@ def test_a_home_off_the_ground_is_noted() -> None:
     assert "home is at 0.0 m AMSL, but the ground there is at 300.0 m" in flown.notes[0]
     # The difference and the altitude to set, beyond the error of elevation files.
     flown = route(wp(0, 100), wp(0, 900), home="36.5 -84.2 328", terrain=ground())
-    assert "after arming on that ground they are 28 m lower than here" in flown.notes[0]
+    assert "After arming on that ground they are 28 m lower than here" in flown.notes[0]
     assert flown.notes[0].endswith("set home to 300.0 m AMSL")
     for home, is_noted in ((310.1, True), (309.9, False), (290.1, False), (289.9, True)):
         flown = route(wp(0, 100), wp(0, 900), home=f"36.5 -84.2 {home}", terrain=ground())
@@ -298,7 +298,7 @@ def test_cruise_speed_is_no_command() -> None:
 def test_stops_at_one_position_are_merged() -> None:
     flown = route(wp(0, 0), wp(0, 900), wp(0.3, 900.3), wp(0, 900), wp(900, 900))
     assert flown.items.tolist() == [1, 2, 5]
-    assert flown.notes == ("items 3-4: same position as item 2, merged with it",)
+    assert flown.notes == ("items 3-4: merged with item 2, which has the same position",)
     assert "item 3: 150.0 m straight above item 2" in refusal(wp(0, 0), wp(0, 900), wp(0, 900, 250), wp(900, 900))
 
 
@@ -325,7 +325,7 @@ def test_null_in_a_plan_keeps_what_is() -> None:
     assert flown.items.tolist() == [1, 3]
     assert flown.positions[:, 2].tolist() == [400.0, 400.0]
     assert "item 2: NAV_WAYPOINT without a position" in flown.notes[0]
-    assert flown.notes[1] == "item 3: NAV_WAYPOINT without an altitude: flown at the altitude of the previous item"
+    assert flown.notes[1] == "item 3: NAV_WAYPOINT without an altitude is flown at the altitude of the previous item"
     first[6] = None
     with pytest.raises(MissionError, match="item 1: no altitude, and no earlier item has one to keep"):
         make_route(parse_mission(json.dumps(data), "a.plan"), ORIGIN, None, 25.0, False)

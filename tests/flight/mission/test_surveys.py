@@ -610,6 +610,6 @@ def test_a_survey_of_gates_alone_is_told_that_none_is_flown() -> None:
     between = mission(wp(-300, 0), *gates, wp(-300, 900), home="36.5 -84.2 0")
     notes = make_route(between, ORIGIN, None, 15.0, False, rules=rules).notes
     reason = "no autopilot flies to a gate (CONDITION_GATE): a survey with gates needs turn-arounds"
-    assert f"items 2, 4, 6 and 3 more: passed at more than 10 m: {reason}" in notes
+    assert f"items 2, 4, 6 and 3 more: passed at more than 10 m, because {reason}" in notes
     _, route = gated_grid()
     assert not any("gate" in note for note in route.notes)

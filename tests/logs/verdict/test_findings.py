@@ -320,7 +320,7 @@ def test_the_closest_of_each_rule() -> None:
         "slope": (1, -1.5),
         "threat": (None, 0.0),
     }
-    assert closest["threat"].nearest == 18.0
+    assert closest["threat"].nearest_distance == 18.0
 
 
 def test_a_table_has_a_row_a_finding(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -173,14 +173,29 @@ def test_changes_together_and_alternatives() -> None:
     assert suggestions_text(()) == ""
 
 
-def test_a_headline_takes_eighty_characters_of_a_statement() -> None:
+def test_a_headline_ends_with_a_clause() -> None:
     assert shorten_statement("m" * 80) == "m" * 80
-    assert shorten_statement("m" * 81) == "m" * 77 + "..."
+    first, second, third = ("m" * 60, "n" * 17, "o" * 17)
+    # The last clause that ends within 80 characters, at each kind of end.
+    for end in (". ", "; ", ": ", " because ", ", but ", ", which "):
+        assert shorten_statement(f"{first} {second}{end}{third} {first}") == f"{first} {second}", end
+    assert shorten_statement(f"{first}; {second}; {third}") == f"{first}; {second}"
+    # A short introduction is no statement, and a bracket is not cut.
+    assert shorten_statement(f"{'m' * 29}: {first}; {second}") == f"{'m' * 29}: {first}"
+    assert shorten_statement(f"{'m' * 30}: {first}; {second}") == "m" * 30
+    assert shorten_statement(f"{first} ({second}; {third}) {third}") == first
+    # A list is not cut at its commas.
+    assert shorten_statement(f"{first}, {second}, {third}") == f"{first}, {second}, {third}"
+
+
+def test_a_headline_takes_eighty_characters_of_a_long_clause() -> None:
+    assert shorten_statement("m" * 160) == "m" * 160
+    assert shorten_statement("m" * 161) == "m" * 77 + "..."
     # At the end of a word, and not behind a number whose unit is cut off.
-    word = "m" * 70
-    assert shorten_statement(f"{word} whirls beyond") == f"{word} whirls..."
-    assert shorten_statement(f"{word} whirled away") == f"{word}..."
-    assert shorten_statement(f"{word}, 12.5 m/s of wind") == f"{word}..."
+    word, rest = "m" * 70, "m" * 90
+    assert shorten_statement(f"{word} whirls {rest}") == f"{word} whirls..."
+    assert shorten_statement(f"{word} whirled {rest}") == f"{word}..."
+    assert shorten_statement(f"{word}, 12.5 {rest}") == f"{word}..."
 
 
 STEEP = [[0, 0, 300], [0, 2000, 300], [0, 3000, 600], [0, 6000, 600]]

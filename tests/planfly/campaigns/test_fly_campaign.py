@@ -151,12 +151,12 @@ def test_a_number_of_flights_that_was_changed_is_said_to_be(base: CampaignBase, 
     more = resumed_goal(Goal(None, False, 6), tmp_path)
     assert more.changed
     assert "changed" in more.method
-    assert "changed" not in Goal(None, False, 6).method
+    assert "changed" not in Goal(None, False, 6).bound_method
     with open_store(base, more, tmp_path, resume=True):
         pass
     assert kept_goal(tmp_path) == resumed_goal(Goal(None, False, 6), tmp_path) == more
     # One that stops is valid at any number.
-    assert "changed" not in resumed_goal(Goal(0.9, True, 6), tmp_path).method
+    assert "changed" not in resumed_goal(Goal(0.9, True, 6), tmp_path).bound_method
 
 
 def test_fewer_flights_than_were_flown_are_refused_and_none_is_lost(base: CampaignBase, tmp_path: Path) -> None:

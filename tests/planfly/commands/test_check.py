@@ -96,7 +96,7 @@ def test_what_arduplane_passes_over_is_no_other_vehicles(
     mission.write_text(MISSION.format(up=201) + row, encoding="utf-8")
     assert main(["check", str(mission)]) == 0
     out = capsys.readouterr().out
-    assert f"{name}: not flown" in out
+    assert f"{name} is not flown" in out
     assert "ArduPlane accepts it" not in out
 
 

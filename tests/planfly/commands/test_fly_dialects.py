@@ -32,7 +32,7 @@ NOT_FLYABLE = {"endless.waypoints": "energy", "qgc.waypoints": "mission"}
 OPEN = {
     "mission_planner.waypoints": "the take-off at waypoint 0 (item 1) is not judged",
     "qgc_takeoff.plan": "the take-off climbs 180 m in 800 m, 12.7°",
-    "qgc_amsl.plan": "item 2: NAV_WAYPOINT without a position: not flown",
+    "qgc_amsl.plan": "item 2: NAV_WAYPOINT without a position is not flown",
 }
 ABOVE_TERRAIN = {"mavproxy_terrain.txt"}
 # One is flown without terrain, one over it, and in make soak all that can be: their items are flown in tests of

@@ -127,7 +127,9 @@ def test_an_open_item_is_named_in_the_headline_the_json_and_the_junit_of_check_a
         log = ["--log", str(tmp_path / "f.mcap")] if command == "fly" else []
         args = [command, path, "--terrain", "jacksboro", "--json", files[0], "--junit", files[1], *log]
         assert main(args) == 3
-        assert capsys.readouterr().out.startswith("not judged in full: item 3: NAV_CONTINUE_AND_CHANGE_ALT: not flown")
+        assert capsys.readouterr().out.startswith(
+            "not judged in full: item 3: NAV_CONTINUE_AND_CHANGE_ALT is not flown"
+        )
         verdict = json.loads(Path(files[0]).read_text(encoding="utf-8"))
         verdict = verdict if command == "check" else verdict["verdict"]
         assert verdict["answer"] == "not judged in full"

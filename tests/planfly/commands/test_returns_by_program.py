@@ -130,7 +130,7 @@ def test_a_program_may_fly_a_low_approach(tmp_path: Path, monkeypatch: pytest.Mo
     setup = open_flight(valley_mission(tmp_path), {"terrain": "jacksboro"})
     world, starts = make_return_world(setup).with_parameters(RTL_AUTOLAND=2), planned_starts(setup, 20.0)
     returns = judge_returns(world, starts.subset(np.array([1])), 20.0)
-    (pair,) = program_returns.fly_by_program(world, starts, returns, tmp_path / "program", 1, None).pairs
+    (pair,) = program_returns.fly_with_autopilot(world, starts, returns, tmp_path / "program", 1, None).pairs
     assert pair.flown is not None
     assert (pair.simulated.kind, pair.flown.kind) == ("safe", "safe")
     assert pair.flown.clearance == pytest.approx(pair.simulated.clearance, abs=15.0)

@@ -60,7 +60,7 @@ FAULTS: dict[str, tuple[dict[str, Any], str]] = {
     "another misspelt": ({"radius": 100.0}, "radius: unknown"),
     "a limit that is a number": (
         {"upperLimit": 100.0},
-        "upperLimit: expected a table of value, unit and referenceDatum",
+        "upperLimit: expected an object with value, unit and referenceDatum",
     ),
     "no value": ({"upperLimit": {"unit": 1, "referenceDatum": 1}}, "upperLimit.value: expected a number"),
     "a truth": ({"upperLimit": limit(True, 1, 1)}, "upperLimit.value: expected a number"),

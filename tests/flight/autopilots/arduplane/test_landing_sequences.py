@@ -95,7 +95,7 @@ def test_without_autoland_a_return_ends_in_its_circle() -> None:
         assert route.rtl_end == len(route.points)
         assert route.landing_ground is None
         assert any("never reached" in note for note in route.notes)
-        assert any("which is not simulated: the simulated RTL ends in its loiter" in note for note in route.notes) is (
+        assert any("which is not simulated. The simulated RTL ends in its loiter" in note for note in route.notes) is (
             autoland == 4.0
         )
 

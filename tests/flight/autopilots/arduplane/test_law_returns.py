@@ -34,7 +34,7 @@ def kind(flight: str) -> str:
 @pytest.mark.parametrize("flight", some(KEPT, 8))
 def test_a_return_is_flown_as_arduplane_flew_it(flight: str) -> None:
     real, flown = KEPT[flight], flown_return(flight)
-    assert f"NAV_RETURN_TO_LAUNCH: returns to {real['target']}, " in flown.route.notes[0]
+    assert f"NAV_RETURN_TO_LAUNCH returns to {real['target']}, " in flown.route.notes[0]
     assert flown.hit == (real["hit"] == "1")
     assert (flown.outside < 0.0) == (float(real["outside_spheres_m"]) < 0.0)
     low, high = CLEARANCE[kind(flight)]

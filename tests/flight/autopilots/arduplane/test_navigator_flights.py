@@ -95,7 +95,7 @@ def _outside(flown: Flown, east: float, north: float) -> float:
 def test_a_circle_that_a_parameter_makes_too_tight_is_no_fault_of_the_mission() -> None:
     """WP_LOITER_RAD's 60 m cannot be flown at 26 m/s and 30 degrees of bank; ArduPlane goes around wider."""
     setup, done = kept_setup("time"), simulated("time")
-    assert any("its radius of 200 m is ignored: flown with WP_LOITER_RAD, 60 m" in note for note in setup.route.notes)
+    assert any("its radius of 200 m is ignored, so WP_LOITER_RAD (60 m) is used" in note for note in setup.route.notes)
     (item,) = (one for one in judge_flight(setup, done.track, done.ended).findings if one.rule == "loiter")
     assert item.ok
     assert item.planned is not None

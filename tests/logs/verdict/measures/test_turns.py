@@ -10,7 +10,7 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track, join_tracks
 from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.measures.track_alignment import align_track
-from logs.verdict.measures.turns import NEXT_LEG_FRACTION, CornerPass, TurnMeasure, corner_passes, measure_turn
+from logs.verdict.measures.turns import NEXT_LEG_FRACTION, TurnMeasure, WaypointPass, measure_passes, measure_turn
 from tests.soak import some
 from tests.synthetic import bank_radius, bump, copied, edited, fly_path, make_setup, waypoint_stations
 
@@ -155,7 +155,7 @@ Place = tuple[float, float]
 ROUTE: tuple[Place, ...] = ((0.0, 0.0), (0.0, 2000.0), (1000.0, 2000.0), (1000.0, 4000.0))
 
 
-def passes(flown: Sequence[Place], route: Sequence[Place] = ROUTE) -> tuple[CornerPass, ...]:
+def passes(flown: Sequence[Place], route: Sequence[Place] = ROUTE) -> tuple[WaypointPass, ...]:
     """Of a flight along straight lines from place to place."""
     setup = make_setup([(east, north, 300.0) for east, north in route])
     track = fly_path(setup)
@@ -167,7 +167,7 @@ def passes(flown: Sequence[Place], route: Sequence[Place] = ROUTE) -> tuple[Corn
     requirements = route_requirements(setup)
     aligned = align_track(requirements, edited(track, position=position))
     assert aligned is not None
-    return corner_passes(requirements, aligned)
+    return measure_passes(requirements, aligned)
 
 
 def test_a_flight_over_the_corners_overshoots_none() -> None:

@@ -9,7 +9,7 @@ import pytest
 from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from logs.verdict.measures.route_requirements import route_requirements
-from logs.verdict.returns.return_starts import planned_end, planned_positions, planned_starts
+from logs.verdict.returns.return_starts import planned_positions, planned_starts, return_start_at_path_end
 from tests.synthetic import make_setup
 
 
@@ -26,6 +26,6 @@ def test_an_equivalent_airspeed_is_flown_as_the_true_one(tailwind: float) -> Non
         assert times[-1] == pytest.approx(4000.0 / speed, abs=0.6)
         np.testing.assert_allclose(positions[:, 1], speed * times, rtol=1e-3)
         np.testing.assert_allclose(planned_starts(one, 10.0).rows["velocity_north"], speed, rtol=1e-3)
-        end = planned_end(route_requirements(one))
+        end = return_start_at_path_end(route_requirements(one))
         assert end.rows["velocity_north"][0] == pytest.approx(speed, rel=1e-3)
         assert end.time[0] == pytest.approx(times[-1], abs=0.6)

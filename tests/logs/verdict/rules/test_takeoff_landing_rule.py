@@ -98,7 +98,7 @@ def test_a_climb_over_home_is_not_judged_and_the_first_line_says_so() -> None:
 def test_a_landing_without_a_place_or_a_height_is_not_judged() -> None:
     here = judge_geometry(setup_of(wp(0, 0), wp(0, 2000), "3 21 0 0 0 0 0 0 0", home=HOME))
     assert of(here, "landing").ok is None
-    assert here.headline.startswith("not judged in full: item 3: NAV_LAND without a position: not flown")
+    assert here.headline.startswith("not judged in full: item 3: NAV_LAND without a position is not flown")
     above_terrain = wp(0, 3000, 0, command=21, frame=10)
     unknown = judge_geometry(setup_of(wp(0, 0, frame=0), wp(0, 2000, frame=0), above_terrain, terrain={"kind": "none"}))
     assert of(unknown, "landing").reason == "the altitude of the terrain there is unknown"

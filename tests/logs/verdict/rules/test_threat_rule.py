@@ -41,7 +41,7 @@ def test_time_and_exposure_inside_a_threat_are_exact(rate: float) -> None:
     assert item.planned == pytest.approx(800.0 / 25.0, abs=1e-6)
     h, s = 300.0, 400.0
     exposure = 2 * (s / (2 * h**2 * (h**2 + s**2)) + math.atan(s / h) / (2 * h**3)) * 200.0**4 / 25.0
-    assert f"exposure {exposure:.3g} s" in item.reason
+    assert f"weighted by distance: {exposure:.3g} s" in item.reason
     seen = of(verdict, "threat", radar("Alfa"))
     assert seen.ok is True
     assert seen.limit is None
@@ -100,7 +100,7 @@ def test_a_narrow_miss_is_warned_of_whether_the_plan_enters_the_sphere_or_not(pl
     verdict = judge(setup, fly_path(setup, across=lambda along: np.full_like(along, planned - away)))
     assert verdict.flyable
     assert "passes 0.5 m outside a missile's range, less than the navigation error" in verdict.headline
-    found = [item.nearest for item in verdict.findings if item.rule == "threat" and item.place.kind != "radar"]
+    found = [item.nearest_distance for item in verdict.findings if item.rule == "threat" and item.place.kind != "radar"]
     # The sphere itself has a finding if the plan enters it.
     assert found == pytest.approx([away] * (1 if planned > 0.0 else 2), abs=1e-3)
 
@@ -108,7 +108,7 @@ def test_a_narrow_miss_is_warned_of_whether_the_plan_enters_the_sphere_or_not(pl
 def test_a_plan_inside_a_sphere_that_was_not_flown_is_not_judged() -> None:
     setup = make_setup([[0, 0, 300], [0, 2000, 300]], threats=[MISSILE])
     items = [item for item in threat_findings(route_requirements(setup), None) if item.place.kind != "radar"]
-    assert [(bare(item.place), item.ok, item.nearest) for item in items] == [(missile("Alfa"), None, None)]
+    assert [(bare(item.place), item.ok, item.nearest_distance) for item in items] == [(missile("Alfa"), None, None)]
 
 
 @pytest.mark.parametrize(("aside", "ok"), [(499.9, False), (500.1, True)])
