@@ -547,8 +547,12 @@ def _match_sink(sheet: DataSheet, aero: AeroCoefficients, sink: float) -> tuple[
             sheet.cruise * (limit + aero.drag_lift * lift**2) * area_times_pressure / _weight(sheet)
             for limit in (lowest_drag_min, highest_drag_min)
         )
-        allowed = f"allowed {min_sink:.2f}..{max_sink:.2f} m/s for this wing at {sheet.cruise:g} m/s"
-        raise FlightError.at("TECS_SINK_MIN", "", sink, allowed, shown=f"{sink:g} m/s")
+        allowed = (
+            f"allowed {min_sink:.2f}..{max_sink:.2f} m/s for this wing at {sheet.cruise:g} m/s; without this line of"
+            " the parameter file, the drag is estimated"
+        )
+        message = f"TECS_SINK_MIN {sink:g} m/s: {allowed}"
+        raise FlightError(message, field="TECS_SINK_MIN", value=sink, allowed=allowed)
     new_aero = replace(aero, drag_min=drag_min)
     return new_aero, _drag_function(sheet, new_aero)
 

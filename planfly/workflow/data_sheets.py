@@ -89,6 +89,8 @@ _SHEET_FIELDS = {
     "TECS_CLMB_MAX": "climb",
     "ROLL_LIMIT_DEG": "bank",
 }
+# Ratios of parameters to the values of the sheet, if not 1.
+_SHEET_RATIOS = {"AIRSPEED_MIN": _MIN_AIRSPEED_STALL_RATIO}
 _SETTINGS = ("AIRSPEED_CRUISE", "ROLL_LIMIT_DEG")
 
 
@@ -154,7 +156,7 @@ def _px4_value(entries: Mapping[str, Entry], name: str) -> tuple[float, float, s
 
 
 def overridden_texts(numbers: Mapping[str, float | None], parameters: AircraftParameters) -> list[str]:
-    """Describe the parameters of a file that are not used because the data sheet states their values.
+    """Describe the parameters of a file that are not used because the data sheet states other values.
 
     numbers: numbers of the data sheet by keyword, in the units of the options; None or 0 if not stated.
 
@@ -164,7 +166,9 @@ def overridden_texts(numbers: Mapping[str, float | None], parameters: AircraftPa
     return [
         f"{parameters.texts[name]} ({field} {numbers[field]:g} {RANGES[field][1]})"
         for name, field in _SHEET_FIELDS.items()
-        if name in parameters.values and numbers.get(field)
+        if name in parameters.values
+        and (number := numbers.get(field))
+        and (field == "climb" or not math.isclose(number, parameters.values[name] / _SHEET_RATIOS.get(name, 1.0)))
     ]
 
 
@@ -528,7 +532,10 @@ def make_data_sheet_folder(
                 min_value, max_value, unit = RANGES[name][2], RANGES[name][3], RANGES[name][1]
                 allowed = f"missing; a data sheet needs it ({min_value:g}..{max_value:g} {unit})"
                 raise FlightError.of_argument(name, None, allowed, shown="")
-        sized = size_aircraft(check_sheet(sheet))
+        try:
+            sized = size_aircraft(check_sheet(sheet))
+        except FlightError as error:
+            raise FlightError.from_error(error, parameters or "") if error.field == "TECS_SINK_MIN" else error from None
     with temporary_folder("planfly-sheet-") as draft_folder:
         climb_names = " and ".join(_climb_names(parameter_values))
         files = _file_texts(sized, target.name, draft_folder, file_parameters, readme_lines, climb_names)

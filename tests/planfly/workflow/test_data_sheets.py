@@ -19,9 +19,11 @@ from flight.dynamics.fdm import Fdm, Variation
 from flight.dynamics.trim import fastest_level_flight, full_throttle_climb, slowest_level_flight, steady_flight
 from flight.simulation.simulate import Flight, fly_to_end
 from planfly.workflow.data_sheets import (
+    AircraftParameters,
     climb_deviation,
     factor_effect,
     make_data_sheet_folder,
+    overridden_texts,
     read_aircraft_parameters,
     with_parameters,
 )
@@ -217,6 +219,23 @@ def test_what_the_sheet_states_applies_instead_of_the_file(tmp_path: Path) -> No
     assert "From the parameter file: ROLL_LIMIT_DEG 50.\n" in readme
     assert "because the data sheet states these values: AIRSPEED_CRUISE 19 (cruise 18 m/s), AIRSPEED_MIN 13" in readme
     assert ", AIRSPEED_MIN 13 (stall 10 m/s).\n" in readme
+
+
+def test_a_value_that_the_sheet_states_too_is_not_overridden() -> None:
+    """AIRSPEED_MIN 12 is 1.2 times a stall speed of 10 m/s."""
+    values = {"AIRSPEED_CRUISE": 16.0, "AIRSPEED_MIN": 12.0, "ROLL_LIMIT_DEG": 40.0}
+    parameters = AircraftParameters(values, {name: f"{name} {value:g}" for name, value in values.items()})
+    assert overridden_texts({"cruise": 16.0, "stall": 10.0, "bank": 40.0}, parameters) == []
+    others = overridden_texts({"cruise": 17.0, "stall": 10.5, "bank": 41.0}, parameters)
+    assert [text.split(" (")[1] for text in others] == ["cruise 17 m/s)", "stall 10.5 m/s)", "bank 41 degrees)"]
+
+
+def test_a_sink_rate_out_of_range_says_that_its_line_may_be_left_out(tmp_path: Path) -> None:
+    file = tmp_path / "mine.parm"
+    file.write_text("TECS_SINK_MIN 4.5\n")
+    told = r"^\S+mine\.parm: TECS_SINK_MIN 4\.5 m/s: allowed [\d.]+\.\.[\d.]+ m/s for .*; without this line of the parameter file, the"
+    with pytest.raises(FlightError, match=told):
+        make_data_sheet_folder(tmp_path / "mine", FOAM, file)
 
 
 def test_the_climb_of_a_parameter_file_is_that_at_its_throttle_limit(tmp_path: Path) -> None:
