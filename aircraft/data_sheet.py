@@ -38,7 +38,7 @@ class DataSheet:
     cruise, stall, top: airspeeds in level flight, m/s.
     bank: bank limit in turns.
     climb: maximum climb angle at cruise, at `climb_throttle`.
-    sink: sink rate at cruise without power, m/s.
+    sink: sink rate at cruise without power, with the idle propeller, m/s.
     trim_throttle: throttle in level flight at cruise, 0..1.
     volts: battery voltage.
     energy: energy of the battery, or heat of the fuel, J.
@@ -251,6 +251,9 @@ _MIN_DIAMETER_M = 0.06
 _MAX_DIAMETER_RATIO = 0.6
 # Largest diameter of an engine's propeller if none is stated, as a ratio to the span.
 _ENGINE_DIAMETER_RATIO = 0.18
+# Number of steps in which the drags of the wing and of the idle propeller are matched to a sink rate; each step reduces
+# the error to about a tenth.
+_SINK_STEP_COUNT = 8
 # Ratio of an engine's shaft work to the fuel's heat. Small engines reach 0.2 at full throttle; the Penguin B's 0.231 kg
 # of fuel per hour (`examples/real/aircraft.csv`) leaves 0.11 for cruise.
 _ENGINE_EFFICIENCY = 0.15
@@ -382,16 +385,23 @@ def size_aircraft(
     (0.269, ('area', 'top', 'bank', 'climb', 'volts', 'energy'))
     """
     aircraft_class = CLASSES[sheet.layout] if aircraft_class is None else aircraft_class
-    full_sheet, guessed_fields = _fill_sheet(sheet)
-    aero = _estimate_coefficients(full_sheet, aircraft_class, prior)
-    drag = _drag_function(full_sheet, aero)
+    filled_sheet, guessed_fields = _fill_sheet(sheet)
+    estimated_aero = aero = _estimate_coefficients(filled_sheet, aircraft_class, prior)
+    drag = _drag_function(filled_sheet, aero)
     if sheet.sink:
-        aero, drag = _match_sink(full_sheet, aero, sheet.sink)
+        aero, drag = _match_sink(filled_sheet, estimated_aero, sheet.sink)
     # The performance of motor or engine and propeller is the climb and the top speed in the sheet.
     try:
-        propulsion, full_sheet = _size_any_motor(sheet, full_sheet, drag)
+        propulsion, full_sheet = _size_any_motor(sheet, filled_sheet, drag)
     except _NoPropellerError:
-        raise _no_propeller_error(sheet, full_sheet, drag) from None
+        raise _no_propeller_error(sheet, filled_sheet, drag) from None
+    for _ in range(_SINK_STEP_COUNT if sheet.sink else 0):
+        # A pilot measures the sink rate with the idle propeller, whose drag follows from the motor.
+        with contextlib.suppress(_NoPropellerError):
+            idle_drag = -propulsion.thrust(0.0, sheet.cruise, SHEET_DENSITY)
+            matched_aero, drag = _match_sink(filled_sheet, estimated_aero, sheet.sink, idle_drag)
+            propulsion, full_sheet = _size_any_motor(sheet, filled_sheet, drag)
+            aero = matched_aero
     if isinstance(propulsion, ElectricMotor):
         propulsion = _with_calibrated_power(propulsion, full_sheet, drag, prior)
     chord = full_sheet.area / full_sheet.span
@@ -530,12 +540,16 @@ def _drag_function(sheet: DataSheet, aero: AeroCoefficients) -> Drag:
     return drag
 
 
-def _match_sink(sheet: DataSheet, aero: AeroCoefficients, sink: float) -> tuple[AeroCoefficients, Drag]:
+def _match_sink(
+    sheet: DataSheet, aero: AeroCoefficients, sink: float, idle_drag: float = 0.0
+) -> tuple[AeroCoefficients, Drag]:
     """Return the coefficients whose minimum drag matches a sink rate, and their drag function.
 
-    sink: sink rate at cruise with the power off and the propeller folded, m/s.
+    sink: sink rate at cruise with the power off, m/s.
+    idle_drag: drag of the idle propeller, N; 0 for a folded propeller. If the drag that remains for the wing is too
+        small, the wing has its smallest drag, and the aircraft sinks faster.
 
-    Raises FlightError if the sink rate is out of range for the wing.
+    Raises FlightError if the sink rate with a folded propeller is out of range for the wing.
     """
     angle = math.asin(min(0.5, sink / sheet.cruise))
     area_times_pressure = 0.5 * SHEET_DENSITY * sheet.cruise**2 * sheet.area
@@ -553,7 +567,7 @@ def _match_sink(sheet: DataSheet, aero: AeroCoefficients, sink: float) -> tuple[
         )
         message = f"TECS_SINK_MIN {sink:g} m/s: {allowed}"
         raise FlightError(message, field="TECS_SINK_MIN", value=sink, allowed=allowed)
-    new_aero = replace(aero, drag_min=drag_min)
+    new_aero = replace(aero, drag_min=max(lowest_drag_min, drag_min - idle_drag / area_times_pressure))
     return new_aero, _drag_function(sheet, new_aero)
 
 

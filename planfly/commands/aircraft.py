@@ -197,7 +197,7 @@ def _make_folder(args: argparse.Namespace) -> int:
     if has_sheet:
         _print_data_sheet_performance(new_aircraft)
     if args.params is not None:
-        _print_parameters(args)
+        _print_parameters(args, new_aircraft)
     write_json_if_requested(args, lambda: _json_answer([new_aircraft]))
     print(
         f"next      `planfly aircraft {shlex.quote(str(folder_text))}` shows it; `planfly fly MISSION --aircraft"
@@ -206,15 +206,24 @@ def _make_folder(args: argparse.Namespace) -> int:
     return FLYABLE
 
 
-def _print_parameters(args: argparse.Namespace) -> None:
-    """Print the values that were used from a parameter file, and those that the data sheet overrides."""
-    from planfly.workflow.data_sheets import overridden_texts, read_aircraft_parameters
+def _print_parameters(args: argparse.Namespace, aircraft: "Aircraft") -> None:
+    """Print the values of a parameter file, those that the data sheet overrides, and those that the model misses."""
+    from flight.dynamics.fdm import Fdm
+    from planfly.workflow.data_sheets import (
+        measure_performance,
+        missed_value_lines,
+        overridden_texts,
+        read_aircraft_parameters,
+    )
 
     stated = read_aircraft_parameters(Path(args.params))
     values_text = ", ".join(stated.texts.values()) or "no value differs from its default"
     print(f"  params   {args.params}: {values_text}")
     if overridden := overridden_texts(vars(args), stated):
         print(f"  params   the data sheet overrides {', '.join(overridden)}")
+    performance = measure_performance(Fdm(aircraft, is_tested=True), aircraft)
+    for line in missed_value_lines(stated.values, aircraft.airspeed, performance):
+        print(f"  params   {line}")
 
 
 def _identify(args: argparse.Namespace) -> int:

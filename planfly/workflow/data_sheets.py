@@ -615,7 +615,7 @@ def _file_texts(
             performance,
             uncertainty,
             readme_lines,
-            _trim_throttle_lines(file_parameters, performance),
+            missed_value_lines(file_parameters, sheet.cruise, performance),
             climb_names,
         ),
     }
@@ -817,19 +817,24 @@ _README_ROWS = (
 )
 
 
-def _trim_throttle_lines(file_parameters: Mapping[str, float], performance: Performance) -> list[str]:
-    """Return a line of ``README.md`` if the file's TRIM_THROTTLE differs from the model's throttle.
+# Error of the model's sink rate, as a ratio, from which it is reported.
+_RATE_TOLERANCE_RATIO = 0.05
 
-    Both are the throttle in level flight.
+
+def missed_value_lines(file_parameters: Mapping[str, float], cruise: float, performance: Performance) -> list[str]:
+    """Return lines of ``README.md`` on the values of a parameter file that the model does not meet.
+
+    cruise: m/s.
     """
     throttle = 100.0 * performance.level.throttle
-    trim_throttle = file_parameters.get("TRIM_THROTTLE")
-    if trim_throttle is None or round(throttle) == round(trim_throttle):
-        return []
-    return [
-        f"`ardupilot.parm` keeps the file's TRIM_THROTTLE {trim_throttle:g}, although the model needs {throttle:.0f} %"
-        " in level flight."
-    ]
+    sink = -cruise * math.sin(performance.idle.climb)
+    trim_throttle, stated_sink = file_parameters.get("TRIM_THROTTLE"), file_parameters.get("TECS_SINK_MIN")
+    texts = []
+    if trim_throttle is not None and round(throttle) != round(trim_throttle):
+        texts.append(f"TRIM_THROTTLE {trim_throttle:g}, although the model needs {throttle:.0f} % in level flight")
+    if stated_sink is not None and abs(sink / stated_sink - 1.0) > _RATE_TOLERANCE_RATIO:
+        texts.append(f"TECS_SINK_MIN {stated_sink:g} m/s, although the model sinks {sink:.2f} m/s without power")
+    return [f"`ardupilot.parm` keeps the file's {text}." for text in texts]
 
 
 def _climb_names(stated: AircraftParameters) -> list[str]:
@@ -887,13 +892,13 @@ def _readme_text(
     performance: Performance,
     uncertainty: Uncertainty,
     parameter_lines: Sequence[str],
-    throttle_lines: Sequence[str],
+    missed_lines: Sequence[str],
     climb_names: str,
 ) -> str:
     """Return the text of ``README.md``: stated and guessed values, performance, uncertainties and files.
 
     parameter_lines: lines on the values of the parameter file.
-    throttle_lines: lines on the parameter file's throttle in level flight.
+    missed_lines: lines on the values of the parameter file that the model does not meet.
     climb_names: parameters from which the climb is derived.
     """
     sheet, name = sized.sheet, aircraft.name
@@ -914,7 +919,7 @@ def _readme_text(
         *parameter_lines,
         "",
         *_performance_lines(aircraft, performance),
-        *throttle_lines,
+        *missed_lines,
         "",
         "## Uncertainties",
         "",

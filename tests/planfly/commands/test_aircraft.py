@@ -282,6 +282,27 @@ def test_a_data_sheet_makes_a_folder_that_is_described(
     assert (made.mass, made.wing_span, made.airspeed) == (2.1, 1.6, 15.0)
 
 
+@pytest.mark.parametrize("sink", [1.2, 0.72])
+def test_values_of_a_parameter_file_that_the_model_misses_are_told(
+    sink: float, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Two fifths of the usual drag, and an idle propeller, sink faster than 0.72 m/s, and slower than 1.2 m/s."""
+    Path("own.parm").write_text(f"TECS_SINK_MIN {sink:g}\nTECS_CLMB_MAX 3.75\nTRIM_THROTTLE 5\n")
+    assert main(["aircraft", "--new", "./foam", *SIX, "--params", "own.parm"]) == 0
+    text, readme = capsys.readouterr().out, Path("foam/README.md").read_text()
+    for words in (text, readme):
+        assert re.search(
+            r"keeps the file's TRIM_THROTTLE 5, although the model needs \d\d % in level flight\.\n", words
+        )
+        missed = re.search(r"keeps the file's TECS_SINK_MIN 0\.72 m/s, although the model sinks ([0-9.]+) m/s", words)
+        assert (missed is None) is (sink == 1.2)
+        assert missed is None or 0.75 < float(missed[1]) < 1.2
+    degrees = re.search(r"sinks ([0-9.]+) degrees without", readme)
+    assert degrees is not None
+    # 1.2 m/s at 15 m/s.
+    assert sink == 0.72 or float(degrees[1]) == pytest.approx(math.degrees(math.asin(1.2 / 15.0)), abs=0.1)
+
+
 @pytest.mark.parametrize(
     ("argv", "told"),
     [

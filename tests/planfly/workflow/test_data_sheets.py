@@ -233,7 +233,7 @@ def test_a_value_that_the_sheet_states_too_is_not_overridden() -> None:
 def test_a_sink_rate_out_of_range_says_that_its_line_may_be_left_out(tmp_path: Path) -> None:
     file = tmp_path / "mine.parm"
     file.write_text("TECS_SINK_MIN 4.5\n")
-    told = r"^\S+mine\.parm: TECS_SINK_MIN 4\.5 m/s: allowed [\d.]+\.\.[\d.]+ m/s for .*; without this line of the parameter file, the"
+    told = r"^\S+mine\.parm: TECS_SINK_MIN 4\.5 m/s: allowed [\d.]+\.\.[\d.]+ m/s for .*; without this line of the"
     with pytest.raises(FlightError, match=told):
         make_data_sheet_folder(tmp_path / "mine", FOAM, file)
 
