@@ -251,9 +251,11 @@ _MIN_DIAMETER_M = 0.06
 _MAX_DIAMETER_RATIO = 0.6
 # Largest diameter of an engine's propeller if none is stated, as a ratio to the span.
 _ENGINE_DIAMETER_RATIO = 0.18
+# Error of the climb at a stated throttle from which it is reported, rad.
+_CLIMB_TOLERANCE_RAD = math.radians(0.1)
 # Number of steps in which the drags of the wing and of the idle propeller are matched to a sink rate; each step reduces
 # the error to about a tenth.
-_SINK_STEP_COUNT = 8
+_SINK_STEP_COUNT = 5
 # Ratio of an engine's shaft work to the fuel's heat. Small engines reach 0.2 at full throttle; the Penguin B's 0.231 kg
 # of fuel per hour (`examples/real/aircraft.csv`) leaves 0.11 for cruise.
 _ENGINE_EFFICIENCY = 0.15
@@ -360,12 +362,14 @@ class SizedAircraft:
     guessed: fields that were filled in.
     partial_climb: stated climb at less than full throttle, rad; NaN if none was stated. `sheet.climb` is the climb at
         full throttle.
+    climb_shortfall: difference of the stated climb and the model's at the same throttle, rad; 0 if the model has it.
     """
 
     numbers: ModelNumbers
     sheet: DataSheet
     guessed: tuple[str, ...]
     partial_climb: float = math.nan
+    climb_shortfall: float = 0.0
 
 
 def size_aircraft(
@@ -424,7 +428,10 @@ def size_aircraft(
         factors=(*FACTORS, *(name for name in POWER_FACTORS if name != "avionics-power" or not sheet.burns_fuel)),
     )
     partial_climb = sheet.climb if sheet.climb and sheet.climb_throttle < 1.0 else math.nan
-    return SizedAircraft(numbers, full_sheet, guessed_fields, partial_climb)
+    excess_thrust = propulsion.thrust(sheet.climb_throttle, sheet.cruise, SHEET_DENSITY) - drag(sheet.cruise)
+    shortfall = sheet.climb - math.asin(max(-1.0, min(1.0, excess_thrust / _weight(sheet))))
+    shortfall = shortfall if math.isfinite(partial_climb) and shortfall > _CLIMB_TOLERANCE_RAD else 0.0
+    return SizedAircraft(numbers, full_sheet, guessed_fields, partial_climb, shortfall)
 
 
 # Words for each layout.
@@ -589,13 +596,20 @@ def _size_any_motor(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> tu
     Returns the motor or engine, and the sheet with its performance. Raises _NoPropellerError if no propeller meets the
     sheet.
 
-    A climb at reduced throttle may imply a climb at full throttle beyond `MAX_CLIMB`; the climb at full throttle is
-    then this limit.
+    A climb at reduced throttle may imply a climb at full throttle beyond `MAX_CLIMB`. A higher top speed, if it is only
+    guessed, then keeps the stated climb; otherwise the climb at full throttle is this limit.
     """
     size_function = _size_engine if sheet.burns_fuel else _size_motor
     propulsion, result = size_function(stated_sheet, sheet, drag)
     if not stated_sheet.climb or result.climb <= MAX_CLIMB * (1.0 + _EDGE_ROUNDING):
         return propulsion, result
+    has_stated_pitch = stated_sheet.propeller[0] and (stated_sheet.motor or sheet.burns_fuel)
+    for ratio in () if stated_sheet.top or has_stated_pitch else sorted(_TOP_GUESSES):
+        faster_stated, faster = (replace(given, top=ratio * sheet.cruise) for given in (stated_sheet, sheet))
+        with contextlib.suppress(_NoPropellerError):
+            propulsion, result = size_function(faster_stated, faster, drag)
+            if result.climb <= MAX_CLIMB:
+                return propulsion, result
     stated_sheet, sheet = (replace(given, climb=MAX_CLIMB, climb_throttle=1.0) for given in (stated_sheet, sheet))
     return size_function(stated_sheet, sheet, drag)
 

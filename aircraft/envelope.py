@@ -39,6 +39,7 @@ class Envelope:
     power_sd: standard deviation of the logarithm of power.
     battery_guessed, climb_guessed, bank_guessed: True if the battery's energy, the steepest climb or the bank limit was
         not stated.
+    climb_shortfall: climb stated at the throttle limit minus the model's, rad; 0 if the model has it.
     """
 
     aircraft: str
@@ -63,6 +64,7 @@ class Envelope:
     battery_guessed: bool = False
     climb_guessed: bool = False
     bank_guessed: bool = False
+    climb_shortfall: float = 0.0
 
     def __post_init__(self) -> None:
         """Make the tables read-only."""

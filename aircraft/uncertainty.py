@@ -37,7 +37,16 @@ _PREFIX = "ident/"
 _REQUIRED_KEYS = frozenset({"climb_sd_deg", "descent_sd_deg"})
 # Optional keys.
 _OPTIONAL_KEYS = frozenset(
-    {"source", "quantity", "battery_guessed", "climb_guessed", "bank_guessed", "fastest_sd_mps", "power_sd"}
+    {
+        "source",
+        "quantity",
+        "battery_guessed",
+        "climb_guessed",
+        "bank_guessed",
+        "fastest_sd_mps",
+        "power_sd",
+        "climb_shortfall_deg",
+    }
 )
 # Further keys of `posterior.toml`, about the logs.
 _LOG_KEYS = frozenset(
@@ -85,6 +94,7 @@ class Uncertainty:
     battery_guessed: True if the battery's energy was not stated.
     climb_guessed: True if the steepest climb was not stated.
     bank_guessed: True if the bank limit was not stated.
+    climb_shortfall: climb stated at the throttle limit minus the model's, rad; 0 if the model has it.
     """
 
     source: str
@@ -96,6 +106,7 @@ class Uncertainty:
     max_speed_sd: float = 0.0
     climb_guessed: bool = False
     bank_guessed: bool = False
+    climb_shortfall: float = 0.0
 
 
 def read_uncertainty(folder: Path) -> Uncertainty | None:
@@ -145,7 +156,17 @@ def read_uncertainty(folder: Path) -> Uncertainty | None:
         power_sd = _read_number(table, "power_sd", file, 0.0, 1.0)
     # Older folders have no fastest_sd_mps.
     max_speed_sd = _read_number(table, "fastest_sd_mps", file, 0.0, 100.0) if "fastest_sd_mps" in table else 0.0
-    return Uncertainty(source, climb_sd, descent_sd, quantities, power_sd, max_speed_sd=max_speed_sd, **guesses)
+    shortfall = _read_number(table, "climb_shortfall_deg", file, 0.0, 125.0) if "climb_shortfall_deg" in table else 0.0
+    return Uncertainty(
+        source,
+        climb_sd,
+        descent_sd,
+        quantities,
+        power_sd,
+        max_speed_sd=max_speed_sd,
+        climb_shortfall=math.radians(shortfall),
+        **guesses,
+    )
 
 
 def _read_number(table: dict[str, Any], key: str, file: Path, min_value: float, max_value: float) -> float:
@@ -187,6 +208,11 @@ def uncertainty_text(uncertainty: Uncertainty) -> str:
         f"fastest_sd_mps = {uncertainty.max_speed_sd:.2f}  # of the fastest level flight",
         f"power_sd = {uncertainty.power_sd:.3g}  # of the logarithm of the power in flight",
     ]
+    if uncertainty.climb_shortfall:
+        shortfall = math.degrees(uncertainty.climb_shortfall)
+        lines.append(
+            f"climb_shortfall_deg = {shortfall:.2f}  # the climb stated at the throttle limit is steeper by this"
+        )
     if uncertainty.climb_guessed:
         lines.append("climb_guessed = true  # state the true value with --climb")
     if uncertainty.bank_guessed:

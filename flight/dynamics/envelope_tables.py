@@ -83,6 +83,7 @@ def load_envelope(aircraft: Aircraft, *, motor_braking: bool = False) -> Envelop
         battery_guessed=uncertainty is not None and uncertainty.battery_guessed,
         climb_guessed=uncertainty is not None and uncertainty.climb_guessed,
         bank_guessed=uncertainty is not None and uncertainty.bank_guessed,
+        climb_shortfall=0.0 if uncertainty is None else uncertainty.climb_shortfall,
         aircraft=aircraft.name,
         model_hash=model_hash(aircraft),
         motor_braking=motor_braking,

@@ -233,6 +233,7 @@ class EnvelopeTable(SetupModel):
     battery_guessed: bool = False
     climb_guessed: bool = False
     bank_guessed: bool = False
+    climb_shortfall: Annotated[Finite, Field(alias="climb_shortfall_rad", ge=0.0)] = 0.0
 
     def envelope(self, file: str) -> Envelope:
         """Return the envelope of the table.

@@ -338,7 +338,9 @@ def vary_flight(base: CampaignBase, draw: Draw, wind: GivenWind | None = None) -
     draws = base.dispersions.draws
     uav_limits = base.uav.limits
     # The performance of a drawn aircraft is known exactly: its standard deviations are 0.
-    exact_envelope = replace(uav_limits.envelope, climb_sd=0.0, descent_sd=0.0, fastest_sd=0.0, power_sd=0.0)
+    exact_envelope = replace(
+        uav_limits.envelope, climb_sd=0.0, descent_sd=0.0, fastest_sd=0.0, power_sd=0.0, climb_shortfall=0.0
+    )
     envelope = exact_envelope if draws is not None else uav_limits.envelope
     max_bank = max_turn_bank(scenario, base.uav.autopilot)
     limits = make_limits(scenario, envelope, uav_limits.airspeed, max_bank, base.uav.autopilot)

@@ -208,6 +208,7 @@ def _make_folder(args: argparse.Namespace) -> int:
 
 def _print_parameters(args: argparse.Namespace, aircraft: "Aircraft") -> None:
     """Print the values of a parameter file, those that the data sheet overrides, and those that the model misses."""
+    from aircraft.uncertainty import read_uncertainty
     from flight.dynamics.fdm import Fdm
     from planfly.workflow.data_sheets import (
         measure_performance,
@@ -222,7 +223,9 @@ def _print_parameters(args: argparse.Namespace, aircraft: "Aircraft") -> None:
     if overridden := overridden_texts(vars(args), stated):
         print(f"  params   the data sheet overrides {', '.join(overridden)}")
     performance = measure_performance(Fdm(aircraft, is_tested=True), aircraft)
-    for line in missed_value_lines(stated.values, aircraft.airspeed, performance):
+    uncertainty = read_uncertainty(aircraft.folder)
+    climb_shortfall = 0.0 if uncertainty is None else uncertainty.climb_shortfall
+    for line in missed_value_lines(stated.values, aircraft.airspeed, performance, climb_shortfall):
         print(f"  params   {line}")
 
 

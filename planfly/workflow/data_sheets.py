@@ -369,6 +369,7 @@ def _make_uncertainty(sized: SizedAircraft, aircraft: Aircraft) -> tuple[Uncerta
         max_speed_sd=top_speed_sd,
         climb_guessed="climb" in sized.guessed,
         bank_guessed="bank" in sized.guessed,
+        climb_shortfall=sized.climb_shortfall,
     )
     return uncertainty, _draw_with_balanced_thrust(uncertainty, balance, climb_sd / thrust_slopes[0])
 
@@ -615,7 +616,7 @@ def _file_texts(
             performance,
             uncertainty,
             readme_lines,
-            missed_value_lines(file_parameters, sheet.cruise, performance),
+            missed_value_lines(file_parameters, sheet.cruise, performance, sized.climb_shortfall),
             climb_names,
         ),
     }
@@ -821,10 +822,13 @@ _README_ROWS = (
 _RATE_TOLERANCE_RATIO = 0.05
 
 
-def missed_value_lines(file_parameters: Mapping[str, float], cruise: float, performance: Performance) -> list[str]:
+def missed_value_lines(
+    file_parameters: Mapping[str, float], cruise: float, performance: Performance, climb_shortfall: float
+) -> list[str]:
     """Return lines of ``README.md`` on the values of a parameter file that the model does not meet.
 
     cruise: m/s.
+    climb_shortfall: as in `SizedAircraft`.
     """
     throttle = 100.0 * performance.level.throttle
     sink = -cruise * math.sin(performance.idle.climb)
@@ -834,6 +838,11 @@ def missed_value_lines(file_parameters: Mapping[str, float], cruise: float, perf
         texts.append(f"TRIM_THROTTLE {trim_throttle:g}, although the model needs {throttle:.0f} % in level flight")
     if stated_sink is not None and abs(sink / stated_sink - 1.0) > _RATE_TOLERANCE_RATIO:
         texts.append(f"TECS_SINK_MIN {stated_sink:g} m/s, although the model sinks {sink:.2f} m/s without power")
+    if climb_shortfall:
+        climb = file_parameters["TECS_CLMB_MAX"]
+        model_climb = cruise * math.sin(math.asin(climb / cruise) - climb_shortfall)
+        limit_text = f"THR_MAX {file_parameters['THR_MAX']:g}"
+        texts.append(f"TECS_CLMB_MAX {climb:g} m/s, although the model climbs {model_climb:.1f} m/s at {limit_text}")
     return [f"`ardupilot.parm` keeps the file's {text}." for text in texts]
 
 

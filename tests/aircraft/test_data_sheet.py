@@ -98,6 +98,21 @@ def test_a_throttle_at_cruise_is_met() -> None:
     assert motor.thrust(0.65, 15.0, 1.1673) == pytest.approx(drag, rel=1e-6)
 
 
+@pytest.mark.parametrize("top", [0.0, 26.4])
+def test_a_climb_at_less_throttle_is_kept_if_the_top_speed_is_free(top: float) -> None:
+    """4 m/s at 16 m/s: a quarter of the weight and the drag, at three quarters of the throttle."""
+    stated = DataSheet(1.45, 1.3, 16.0, 10.5, layout="wing", climb=math.asin(0.25), climb_throttle=0.75, top=top)
+    made = size_aircraft(stated)
+    motor, aero = made.numbers.propulsion, made.numbers.aero
+    assert isinstance(motor, ElectricMotor)
+    pressure = 0.5 * 1.1673 * 256.0 * made.numbers.area
+    drag = pressure * (aero.drag_min + aero.drag_lift * (1.45 * G / pressure) ** 2)
+    excess = (motor.thrust(0.75, 16.0, 1.1673) - drag) / (1.45 * G)
+    assert made.sheet.climb <= math.radians(35.0) * 1.001
+    assert made.climb_shortfall == pytest.approx(math.asin(0.25) - math.asin(excess), abs=1e-6)
+    assert (made.climb_shortfall == 0.0) is (top == 0.0)
+
+
 def test_a_sink_sets_the_drag_of_the_wing_and_its_idle_propeller() -> None:
     """1.5 m/s at 15 m/s: a tenth of the weight, which the idle propeller shares."""
     made = size_aircraft(replace(FOAM, sink=1.5))

@@ -33,6 +33,7 @@ def test_it_is_read_as_written(tmp_path: Path) -> None:
         max_speed_sd=1.25,
         climb_guessed=True,
         bank_guessed=True,
+        climb_shortfall=0.05,
     )
     (tmp_path / "uncertainty.toml").write_text(uncertainty_text(known), encoding="utf-8")
     found = read_uncertainty(tmp_path)
@@ -43,6 +44,7 @@ def test_it_is_read_as_written(tmp_path: Path) -> None:
     assert found.battery_guessed
     assert found.climb_guessed
     assert found.bank_guessed
+    assert found.climb_shortfall == pytest.approx(0.05, abs=1e-4)
     assert (found.power_sd, found.max_speed_sd) == (0.3, 1.25)
     assert read_uncertainty(tmp_path.parent) is None
 

@@ -96,6 +96,7 @@ def _leg_finding(
     # Faults of the arc come last, because the arc at a steep leg's end is steep, too.
     faults = faults + arc_faults
     uncertainty = "" if ground else _ability_text(requirements, leg, limit, source, has_failed=bool(faults))
+    uncertainty = uncertainty if faults else uncertainty or _shortfall_text(requirements, leg, measure)
     check = UNKNOWN_AIRCRAFT if uncertainty and not faults else ""
     ok = None if check else not faults
     facts = [uncertainty, *facts] if uncertainty else facts
@@ -520,12 +521,44 @@ def _throttle_limit(planned_slope: float) -> str:
     return "full" if planned_slope >= 0.0 else "idle"
 
 
+def _missing_ability(requirements: RouteRequirements, leg: int, measure: SlopeMeasure) -> float:
+    """Return the slope by which the aircraft climbed or sank too little at the throttle limit, rad; 0 if it did not."""
+    ability, planned_slope = measure.ability, abs(float(requirements.slopes[leg]))
+    if ability is None or planned_slope <= LEVEL_SLOPE_RAD:
+        return 0.0
+    return max(0.0, planned_slope - ability.slope - ABILITY_TOLERANCE_RAD - ABILITY_SIGMAS * ability.error)
+
+
+def _climb_shortfall(requirements: RouteRequirements, leg: int) -> float:
+    """Return the slope by which the model climbs less at the throttle limit than was stated, rad; 0 for a descent."""
+    setup = requirements.setup
+    is_limited = bool(setup.autopilot.speeds.max_throttle_name) and float(requirements.slopes[leg]) > 0.0
+    return setup.envelope.climb_shortfall if is_limited else 0.0
+
+
+def _shortfall_text(requirements: RouteRequirements, leg: int, measure: SlopeMeasure | None) -> str:
+    """Explain that a leg is undecided because the model misses the climb that was stated; "" if it is not."""
+    if measure is None or measure.ability is None or not _missing_ability(requirements, leg, measure):
+        return ""
+    setup = requirements.setup
+    stated, shown, needed = (
+        math.degrees(angle)
+        for angle in (
+            _climb_shortfall(requirements, leg) + measure.ability.slope,
+            measure.ability.slope,
+            float(requirements.slopes[leg]),
+        )
+    )
+    return (
+        f"climbs at {needed:.1f}°; the model climbs {shown:.1f}° at {setup.autopilot.speeds.max_throttle_name}, but"
+        f" up to {stated:.1f}° was stated for it"
+    )
+
+
 def _performance_faults(requirements: RouteRequirements, leg: int, measure: SlopeMeasure) -> list[Message]:
     """Return a fault if the aircraft climbed or sank less at the throttle limit than the leg needs."""
     ability, planned_slope = measure.ability, float(requirements.slopes[leg])
-    if ability is None or abs(planned_slope) <= LEVEL_SLOPE_RAD:
-        return []
-    if ability.slope - abs(planned_slope) >= -ABILITY_TOLERANCE_RAD - ABILITY_SIGMAS * ability.error:
+    if ability is None or _missing_ability(requirements, leg, measure) <= _climb_shortfall(requirements, leg):
         return []
     verb = "climb" if planned_slope >= 0.0 else "sink"
     limit_name = requirements.setup.autopilot.speeds.max_throttle_name if planned_slope >= 0.0 else ""

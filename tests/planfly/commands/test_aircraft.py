@@ -282,6 +282,14 @@ def test_a_data_sheet_makes_a_folder_that_is_described(
     assert (made.mass, made.wing_span, made.airspeed) == (2.1, 1.6, 15.0)
 
 
+def test_a_climb_at_the_throttle_limit_that_the_model_cannot_have_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("own.parm").write_text("TECS_CLMB_MAX 4\nTHR_MAX 75\n")
+    assert main(["aircraft", "--new", "./foam", *SIX, "--top", "25", "--params", "own.parm"]) == 0
+    told = "keeps the file's TECS_CLMB_MAX 4 m/s, although the model climbs "
+    for words in (capsys.readouterr().out, Path("foam/README.md").read_text()):
+        assert re.search(told + r"-?[0-3]\.\d m/s at THR_MAX 75\.\n", words)
+
+
 @pytest.mark.parametrize("sink", [1.2, 0.72])
 def test_values_of_a_parameter_file_that_the_model_misses_are_told(
     sink: float, capsys: pytest.CaptureFixture[str]

@@ -131,6 +131,23 @@ def test_an_ability_too_small_is_told_with_its_direction(
         assert text in item.reason
 
 
+@pytest.mark.parametrize(("shortfall", "limit", "ok"), [(2.0, 75.0, None), (1.5, 75.0, False), (2.0, 100.0, False)])
+def test_a_climb_that_only_the_models_shortfall_lacks_is_undecided(
+    shortfall: float, limit: float, ok: bool | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """6 degrees less the 4 that are shown are 2, of which the tolerance of the rule covers less than half."""
+    shown = Ability(math.radians(4.0), math.radians(0.05), 20.0)
+    monkeypatch.setattr(slope_rule, "measure_slope", lambda *_: SlopeMeasure(ability=shown, is_finished=True))
+    setup = make_setup(hill(6.0))
+    autopilot = ArduPlane(ArduPilotParameters.defaults()).with_parameters(THR_MAX=limit)
+    envelope = replace(setup.envelope, source="a data sheet", climb_shortfall=math.radians(shortfall))
+    setup = replace(setup, autopilot=autopilot, limits=replace(setup.limits, envelope=envelope))
+    requirements = route_requirements(setup, envelope=True)
+    item = slope_findings(requirements, align_track(requirements, fly_path(setup, rate=5.0)))[1]
+    assert (item.ok, item.check) == (ok, "unknown aircraft" if ok is None else "")
+    assert ("climbs 4.0° at THR_MAX 75 %, but up to 6.0° was stated for it" in item.reason) is (ok is None)
+
+
 def test_what_the_leg_needs_is_said_once_after_all_that_is_too_little(monkeypatch: pytest.MonkeyPatch) -> None:
     shown = Ability(math.radians(4.0), math.radians(0.05), 20.0)
     measure = SlopeMeasure(ability=shown, height_error=-20.0, is_finished=True)
