@@ -95,8 +95,7 @@ def _leg_finding(
         method = _fit_text(slope_fit) if slope_fit is not None else "not flown" if ground is None else "route"
     # Faults of the arc come last, because the arc at a steep leg's end is steep, too.
     faults = faults + arc_faults
-    uncertainty = "" if ground else _ability_text(requirements, leg, limit, source, has_failed=bool(faults))
-    uncertainty = uncertainty if faults else uncertainty or _shortfall_text(requirements, leg, measure)
+    uncertainty = "" if ground else _ability_text(requirements, leg, limit, source, measure, has_failed=bool(faults))
     check = UNKNOWN_AIRCRAFT if uncertainty and not faults else ""
     ok = None if check else not faults
     facts = [uncertainty, *facts] if uncertainty else facts
@@ -288,7 +287,15 @@ def _limit_deviation(requirements: RouteRequirements, leg: int, limit: float, ce
     return (limit - certain_limit) / UNDECIDED_FRACTION
 
 
-def _ability_text(requirements: RouteRequirements, leg: int, limit: float, source: str, *, has_failed: bool) -> str:
+def _ability_text(
+    requirements: RouteRequirements,
+    leg: int,
+    limit: float,
+    source: str,
+    measure: SlopeMeasure | None,
+    *,
+    has_failed: bool,
+) -> str:
     """Explain what an uncertain aircraft model does: it leaves a slope undecided or limits suggestions.
 
     Return "" for an aircraft without uncertainty.  Return "" also for a planned slope above the limit, because its own
@@ -297,7 +304,7 @@ def _ability_text(requirements: RouteRequirements, leg: int, limit: float, sourc
     has_failed: True if the leg fails.
     """
     if not has_failed:
-        return _uncertainty_text(requirements, leg)
+        return _uncertainty_text(requirements, leg) or _shortfall_text(requirements, leg, measure)
     is_planned_steep = abs(float(requirements.slopes[leg])) > limit
     return "" if is_planned_steep else _certain_limit_text(requirements, leg, limit, source)
 
