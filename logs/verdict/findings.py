@@ -22,6 +22,8 @@ GROUND_FOLLOWING_ERROR = "error of the height above ground"
 LOWEST_POINT_ERROR = "height error at the lowest point"
 # Fact of a slope finding: time with the pitch at the autopilot's limit.
 PITCH_LIMIT_TIME = "pitch at its limit"
+# Fact of a slope finding: time with the throttle at its upper limit.
+FULL_THROTTLE_TIME = "throttle at full"
 # Fact of a slope finding: steepest slope that the aircraft can fly, if the leg or its arc exceeds it.
 AIRCRAFT_SLOPE = "steepest slope of the aircraft"
 

@@ -11,7 +11,13 @@ from flight.autopilots.autopilot import Autopilot
 from flight.autopilots.parts import Candidate
 from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from flight.simulation.setup import FlightSetup
-from logs.verdict.findings import GROUND_FOLLOWING_ERROR, LOWEST_POINT_ERROR, PITCH_LIMIT_TIME, Finding
+from logs.verdict.findings import (
+    FULL_THROTTLE_TIME,
+    GROUND_FOLLOWING_ERROR,
+    LOWEST_POINT_ERROR,
+    PITCH_LIMIT_TIME,
+    Finding,
+)
 from logs.verdict.judge_flight import with_reference
 from logs.verdict.measures.route_requirements import RouteRequirements, true_airspeed_route
 from logs.verdict.places import FLIGHT, AirframeAnswer, Change, DecidingParameter, ReferenceFlights
@@ -43,7 +49,11 @@ PassesWithAutopilot = Callable[[Autopilot], bool]
 
 
 def find_passing_parameter(
-    autopilot: Autopilot, findings: tuple[Finding, ...], passes: PassesWithAutopilot
+    autopilot: Autopilot,
+    findings: tuple[Finding, ...],
+    passes: PassesWithAutopilot,
+    *,
+    only_reached_limits: bool = False,
 ) -> DecidingParameter | None:
     """Find an autopilot parameter with which a failed flight passes, and its nearest value that passes.
 
@@ -51,6 +61,7 @@ def find_passing_parameter(
 
     findings: findings of the flight that failed.
     passes: function that flies with the given autopilot and returns True if the flight passes; called about 20 times.
+    only_reached_limits: True to try only the limits of pitch and throttle that the flight reached.
 
     Candidates for the kind of the failure, vertical or lateral, are tried first.  Pitch limits are tried before the
     other vertical candidates, and only if the flight reached them.  The farthest value of each candidate is flown
@@ -72,15 +83,7 @@ def find_passing_parameter(
         # No flight parameter changes the rejection of a mission.
         return None
     values = {parameter.name: parameter.value for parameter in autopilot.parameters.values}
-    deviations = autopilot.deviations
-    vertical_candidates, lateral_candidates = deviations.altitude_candidates, deviations.track_candidates
-    if any(fact.what == PITCH_LIMIT_TIME for finding in findings for fact in finding.facts):
-        vertical_candidates = (*deviations.pitch_candidates, *vertical_candidates)
-    for candidate in (
-        (*vertical_candidates, *lateral_candidates)
-        if failed_finding.rule in _VERTICAL_RULES
-        else (*lateral_candidates, *vertical_candidates)
-    ):
+    for candidate in _candidates_to_try(autopilot, failed_finding.rule, findings, only_reached_limits):
         current = values[candidate.name]
 
         def passes_with_value(value: float, candidate: Candidate = candidate) -> bool:
@@ -102,6 +105,24 @@ def find_passing_parameter(
                 deviation,
             )
     return None
+
+
+def _candidates_to_try(
+    autopilot: Autopilot, rule: str, findings: tuple[Finding, ...], only_reached_limits: bool
+) -> tuple[Candidate, ...]:
+    """Return the parameters to try for a failure of a rule, in order; see `find_passing_parameter`."""
+    deviations = autopilot.deviations
+    vertical_candidates, lateral_candidates = deviations.altitude_candidates, deviations.track_candidates
+    measured = {fact.what for finding in findings for fact in finding.facts}
+    if only_reached_limits:
+        throttle_parameter = autopilot.speeds.max_throttle_name.split(" ")[0] if FULL_THROTTLE_TIME in measured else ""
+        vertical_candidates = tuple(one for one in vertical_candidates if one.name == throttle_parameter)
+        lateral_candidates = ()
+    if PITCH_LIMIT_TIME in measured:
+        vertical_candidates = (*deviations.pitch_candidates, *vertical_candidates)
+    if rule in _VERTICAL_RULES:
+        return (*vertical_candidates, *lateral_candidates)
+    return (*lateral_candidates, *vertical_candidates)
 
 
 def _nearest_passing_value(
@@ -182,8 +203,9 @@ def find_deciding_parameter(
     verdict: verdict on the flight with the setup's own parameters.
     should_abort: called throughout the flights; once it returns True, they are aborted with TrialAborted.
 
-    This takes up to about twenty flights with the simulated autopilot.  For the flight of an autopilot program, the
-    result is None unless the simulated autopilot fails, too.
+    This takes up to about twenty flights with the simulated autopilot.  If the flight is too long for so many, only the
+    limits of pitch and throttle that it reached are tried, with about five flights each.  For the flight of an
+    autopilot program, the result is None unless the simulated autopilot fails, too.
     """
     if setup.autopilot.parameters is None or verdict.flies:
         return None
@@ -195,7 +217,8 @@ def find_deciding_parameter(
         if simulated_verdict.flies:
             return None
         findings = simulated_verdict.findings
-    # A tried acceptance radius would also change the width of the corridor: keep the width of the failed flight.
+    # A tried acceptance radius would also change the width of the corridor: keep the width of the failed flight.  A
+    # stated width replaces that of all legs, also of legs that are wider because of a loiter: it is stated only then.
     scenario = setup.scenario
     limits = scenario.limits.model_copy(update={"corridor_m": setup.corridor})
     spec = scenario.spec.model_copy(update={"limits": limits})
@@ -203,10 +226,14 @@ def find_deciding_parameter(
 
     def passes(autopilot: Autopilot) -> bool:
         """Return True if the flight passes, with margin, with the parameters of an autopilot."""
-        trial_verdict = Trial(replace(same_setup, autopilot=autopilot), aircraft, should_abort).flight_verdict
+        trial_setup = replace(setup, autopilot=autopilot)
+        if trial_setup.corridor != setup.corridor:
+            trial_setup = replace(same_setup, autopilot=autopilot)
+        trial_verdict = Trial(trial_setup, aircraft, should_abort).flight_verdict
         return trial_verdict.flies and passes_with_margin(trial_verdict.findings, findings)
 
-    return find_passing_parameter(setup.autopilot, findings, passes)
+    is_long = max_explaining_flights(setup) < _MAX_PARAMETER_FLIGHTS
+    return find_passing_parameter(setup.autopilot, findings, passes, only_reached_limits=is_long)
 
 
 # Cross-track error of the simulated autopilot compared with the real one, as a fraction of the distance from the legs.
@@ -290,8 +317,7 @@ def explain_verdict(
                 MissionContext.from_setup(setup), judged_mission, should_abort
             ).find_passing()
             reference = replace(reference, tried=tried_suggestions(passed_trials))
-        is_affordable = max_explaining_flights(setup) >= _MAX_PARAMETER_FLIGHTS
-        if reference.airframe is not None and reference.airframe.flyable and is_affordable:
+        if reference.airframe is not None and reference.airframe.flyable:
             deciding = _suggested_parameter(verdict, passed_trials)
             deciding = deciding or find_deciding_parameter(setup, aircraft, verdict, should_abort)
             reference = replace(reference, deciding=deciding)

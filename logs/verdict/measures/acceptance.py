@@ -23,6 +23,7 @@ from logs.verdict.tolerances import (
     KINK_FRACTION,
     KINK_WAYPOINT_COUNT,
     LOITER_SWING_RADII,
+    MIN_LEG_LENGTH_M,
     NAVIGATION_SIGMAS,
     NEGLIGIBLE_STEP_M,
     PLAN_TOLERANCE_RAD,
@@ -275,3 +276,29 @@ def step_height(requirements: RouteRequirements, leg: int) -> float | None:
             if math.atan2(height_change, distance) > limit + PLAN_TOLERANCE_RAD:
                 max_step = max(max_step, height_change)
     return max_step if max_step <= NEGLIGIBLE_STEP_M else None
+
+
+def descent_on_next_leg(requirements: RouteRequirements, leg: int) -> float | None:
+    """Return the slope of a vertical descent and the next leg together, rad, if the descent is flown on that leg.
+
+    Return None if the leg is judged as drawn.  The slope is positive for a descent.
+
+    Where an item repeats the position of the item before it, ArduPlane passes both at once, whatever its altitude
+    (`verify_nav_wp`).  The aircraft is then only higher than the next leg.  PX4 passes the second item only within its
+    altitude tolerance, and otherwise circles.  A climb is judged as drawn, because the aircraft is lower than the next
+    leg; so are the first leg, a loiter, and a descent that is too steep for the next leg, too.
+    """
+    autopilot, points, next_leg = requirements.setup.autopilot, requirements.points, leg + 1
+    if (
+        not 0 < leg < requirements.legs - 1
+        or requirements.runs[leg] >= MIN_LEG_LENGTH_M
+        or requirements.runs[next_leg] < MIN_LEG_LENGTH_M
+        or requirements.setup.route.arc_radii[leg : leg + 2].any()
+        or autopilot.turns.follows_path
+    ):
+        return None
+    descent = float(points[leg, 2] - points[next_leg, 2])
+    if descent <= 0.0 or (autopilot.deviations.altitude_parameter and descent > autopilot.loiters.altitude_tolerance):
+        return None
+    slope = math.atan2(float(points[leg, 2] - points[next_leg + 1, 2]), float(requirements.runs[next_leg]))
+    return slope if slope <= slope_limit(requirements, next_leg, is_climb=False)[0] + PLAN_TOLERANCE_RAD else None

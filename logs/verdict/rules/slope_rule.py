@@ -19,7 +19,7 @@ from logs.verdict.findings import (
     make_finding,
     message,
 )
-from logs.verdict.measures.acceptance import step_height
+from logs.verdict.measures.acceptance import descent_on_next_leg, step_height
 from logs.verdict.measures.ground_following import follows_ground, mean_ground_slope, steepest_ground
 from logs.verdict.measures.route_requirements import RouteRequirements, SteepArc, slope_limit, steep_arc
 from logs.verdict.measures.slopes import LegFit, SlopeMeasure, measure_slope
@@ -54,12 +54,43 @@ def slope_findings(
     for leg in range(requirements.legs):
         if leg in turnaround_legs:
             continue
+        slope = descent_on_next_leg(requirements, leg)
+        if slope is not None and (geometric or (aligned is not None and aligned.passed[leg + 1])):
+            findings.append(_unflown_descent_finding(requirements, leg, slope))
+            continue
         measure = None if geometric else SlopeMeasure()
         if aligned is not None:
             measure = measure_slope(requirements, aligned, leg)
         is_complete = aligned is not None and bool(aligned.passed[-1])
         findings.append(_leg_finding(requirements, leg, measure, is_complete=is_complete))
     return findings
+
+
+def _unflown_descent_finding(requirements: RouteRequirements, leg: int, slope: float) -> Finding:
+    """Judge a vertical descent that is flown on the next leg.
+
+    slope: slope of the descent and the next leg together, rad, positive for a descent.
+    """
+    limit, source = slope_limit(requirements, leg + 1, is_climb=False)
+    certain_limit = float(requirements.certain_dive[leg + 1])
+    check = UNKNOWN_AIRCRAFT if max(LEVEL_SLOPE_RAD, certain_limit) < slope and certain_limit < limit < math.inf else ""
+    height = float(requirements.points[leg, 2] - requirements.points[leg + 1, 2])
+    return make_finding(
+        "slope",
+        requirements.leg(leg),
+        ok=None if check else True,
+        reason=f"{place_text(requirements.waypoint(leg + 1))} is passed at once; the {height:.0f} m down to it are"
+        f" flown on the next leg, which then needs {-math.degrees(slope):+.2f}°",
+        planned=-math.degrees(slope),
+        limit=-math.degrees(limit),
+        at_least=True,
+        source=source,
+        tolerance=math.degrees(PLAN_TOLERANCE_RAD),
+        margin=math.degrees(limit - slope),
+        unit="deg",
+        method="route",
+        check=check,
+    )
 
 
 def _leg_finding(

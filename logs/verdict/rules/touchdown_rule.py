@@ -98,7 +98,11 @@ def touchdown_findings(
             is_low = heights <= heights[-1] + CONTACT_HEIGHT_M
             touchdown_row = int(np.argmax(is_low)) if is_low.any() else None
     if touchdown_row is None:
-        fault = message("the aircraft did not touch down", f" at {_landing_point_text(approach)}")
+        end_text = ""
+        if len(track):
+            distance = math.hypot(*(position[-1, :2] - approach.point[:2]).tolist())
+            end_text = f": the flight ended {distance:.0f} m from it"
+        fault = message("the aircraft did not touch down", f" at {_landing_point_text(approach)}{end_text}")
         return [make_finding("touchdown", place, ok=False, reason=fault.text, faults=[fault], unit="m")]
     landing = _measure_landing(requirements, track, terrain, approach, touchdown_row)._replace(
         point_height=point_height

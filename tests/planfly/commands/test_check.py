@@ -19,7 +19,7 @@ MISSION = """QGC WPL 110
 """
 
 
-@pytest.mark.parametrize(("up", "verb"), [(350, "climbs"), (80, "descends"), (1434, "climbs"), (210.5, "climbs")])
+@pytest.mark.parametrize(("up", "verb"), [(350, "climbs"), (1434, "climbs"), (210.5, "climbs")])
 def test_a_climb_on_the_spot_is_judged_and_not_flyable(
     up: float, verb: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -36,6 +36,7 @@ from planfly.workflow.reference_flights import (
     passes_with_margin,
 )
 from planfly.workflow.suggestion_trials import PassedTrial, SuggestionTrials
+from planfly.workflow.trial_flight import Trial
 from tests.setups import setup_maker
 
 LEG = Place("leg", 4)
@@ -121,6 +122,66 @@ def test_a_throttle_limit_that_is_too_low_is_named(
     found = find_passing_parameter(law, (LOW, HEIGHTS), lambda other: other.speeds.max_throttle > 0.81)
     assert found is not None
     assert (found.name, found.current, found.passing, found.unit) == (name, *values, unit)
+
+
+FULL = make_finding("slope", LEG, ok=False, reason="", facts=[Fact("throttle at full", 54.0, "s")])
+
+
+@pytest.mark.parametrize(("findings", "passing"), [((LOW, FULL), 85.0), ((FULL,), 85.0), ((LOW, HEIGHTS), None)])
+def test_a_long_flight_is_flown_with_more_throttle_if_it_reached_its_limit(
+    findings: tuple[Finding, ...], passing: float | None
+) -> None:
+    """100 % passes, then of 80, 85, 90 and 95 % those above 81."""
+    law = ArduPlane(ArduPilotParameters.defaults()).with_parameters(THR_MAX=75.0)
+    flown: list[float] = []
+
+    def passes(other: Autopilot) -> bool:
+        flown.append(100.0 * other.speeds.max_throttle)
+        return other.speeds.max_throttle > 0.81
+
+    found = find_passing_parameter(law, findings, passes, only_reached_limits=True)
+    assert (None if found is None else (found.name, found.passing)) == (passing and ("THR_MAX", passing))
+    # No other parameter is tried: each flight has another throttle.
+    assert 75.0 not in [round(value) for value in flown]
+
+
+@pytest.mark.parametrize(("affordable", "is_long"), [(19, True), (20, False)])
+def test_a_flight_that_is_too_long_for_all_parameters_has_its_limits_tried(
+    affordable: int, is_long: bool, flown: tuple[FlownMission, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    judged, _ = flown
+    asked: list[bool] = []
+    monkeypatch.setattr(reference_flights, "max_explaining_flights", lambda _: affordable)
+    monkeypatch.setattr(
+        reference_flights, "find_passing_parameter", lambda *_, only_reached_limits: asked.append(only_reached_limits)
+    )
+    explain_verdict(route_requirements(judged.setup), AIRCRAFT, unexplained(judged))
+    assert asked == [is_long]
+
+
+def test_only_a_tried_acceptance_radius_keeps_the_corridor_as_a_stated_one(
+    flown: tuple[FlownMission, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A stated corridor is that of a loiter's legs, too; without one it is twice WP_RADIUS."""
+    judged, _ = flown
+    stated: list[float | None] = []
+
+    class SeenTrial(Trial):
+        @property
+        def flight_verdict(self) -> Verdict:  # type: ignore[override]
+            stated.append(self.setup.scenario.limits.corridor_m)
+            return judged.verdict
+
+    def try_two(autopilot: Autopilot, _: object, passes: Callable[[Autopilot], bool], **_limits: bool) -> None:
+        for name, value in (("THR_MAX", 80.0), ("WP_RADIUS", 40.0)):
+            passes(autopilot.with_parameters(**{name: value}))
+
+    monkeypatch.setattr(reference_flights, "Trial", SeenTrial)
+    monkeypatch.setattr(reference_flights, "find_passing_parameter", try_two)
+    find_deciding_parameter(judged.setup, AIRCRAFT, judged.verdict)
+    autopilot = judged.setup.autopilot
+    assert isinstance(autopilot, ArduPlane)
+    assert stated == [None, 2.0 * autopilot.parameters.wp_radius]
 
 
 PITCHED = make_finding("slope", LEG, ok=True, reason="", facts=[Fact(PITCH_LIMIT_TIME, 20.0, "s")])

@@ -8,6 +8,12 @@ import numpy as np
 import pytest
 
 from aircraft.envelope import Envelope
+from flight.autopilots.arduplane.autopilot import ArduPlane
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
+from flight.autopilots.autopilot import Autopilot
+from flight.autopilots.planfly.autopilot import PlanflyGuidance
+from flight.autopilots.px4.autopilot import Px4
+from flight.autopilots.px4.parameters import Px4Parameters
 from flight.simulation.setup import FlightSetup
 from logs.verdict.judge_flight import judge_geometry
 from logs.verdict.measures.route_requirements import route_requirements
@@ -211,6 +217,32 @@ def test_a_step_is_flown_within_its_own_height(rise: float, ok: bool) -> None:
     assert abs(item.planned) > 25.0
     assert (f"a step of {abs(rise):.1f} m" in item.reason) is ok
     assert of(judge(setup, fly_path(setup)), "slope", leg(1)).ok is ok
+
+
+@pytest.mark.parametrize(
+    ("autopilot", "rise", "run", "slope"),
+    [
+        # 40 m down on the spot and 10 m down on a leg of 1 km: 50 m on 1 km.
+        (ArduPlane(ArduPilotParameters.defaults()), -40.0, 1000.0, math.degrees(math.atan2(-50.0, 1000.0))),
+        # 50 m on 350 m are 8.1 degrees, and 7.8 can be flown.
+        (ArduPlane(ArduPilotParameters.defaults()), -40.0, 350.0, None),
+        (ArduPlane(ArduPilotParameters.defaults()), 40.0, 1000.0, None),
+        # PX4 holds there outside NAV_FW_ALT_RAD.
+        (Px4(Px4Parameters.defaults()).with_parameters(NAV_FW_ALT_RAD=39.0), -40.0, 1000.0, None),
+        (Px4(Px4Parameters.defaults()).with_parameters(NAV_FW_ALT_RAD=41.0), -40.0, 1000.0, -2.8624),
+        (PlanflyGuidance(), -40.0, 1000.0, None),
+    ],
+)
+def test_a_descent_on_the_spot_is_flown_on_the_next_leg(
+    autopilot: Autopilot, rise: float, run: float, slope: float | None
+) -> None:
+    up = 300.0 + rise
+    points = [[0, 0, 300], [0, 1000, 300], [0, 1000.1, up], [0, 1000.1 + run, up - 10.0], [0, 3000 + run, up - 10.0]]
+    setup = replace(make_setup(points), autopilot=autopilot)
+    for verdict in (judge_geometry(setup), judge(setup, fly_path(setup))):
+        item = of(verdict, "slope", leg(1))
+        assert item.ok is (slope is not None)
+        assert item.planned == pytest.approx(math.copysign(89.86, rise) if slope is None else slope, abs=0.01)
 
 
 def test_a_staircase_is_as_high_as_its_stairs_together() -> None:

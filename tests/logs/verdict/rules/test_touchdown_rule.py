@@ -49,6 +49,9 @@ def test_a_flight_that_ends_before_it_is_down_did_not_touch_down() -> None:
     one = found(flown.setup, cut, "touchdown", "ground contact")
     assert one.ok is False
     assert one.brief == "the aircraft did not touch down"
+    # The landing point is at 500 m east, 600 m north.
+    distance = math.hypot(cut.position[-1, 0] - 500.0, cut.position[-1, 1] - 600.0)
+    assert one.reason.endswith(f": the flight ended {distance:.0f} m from it")
 
 
 def test_a_strip_without_a_take_off_is_landed_on_from_the_air() -> None:
