@@ -94,7 +94,8 @@ class SurveyResult:
     @property
     def usable(self) -> bool:
         """True if enough of every line is usable and the photos overlap as required."""
-        return not self.lost and not self.unknown_lines
+        is_overlap_unknown = any(overlap is not None and overlap.is_side_unknown for overlap in self.overlaps)
+        return not (self.lost or self.unknown_lines or is_overlap_unknown)
 
     @property
     def unknown_lines(self) -> int:

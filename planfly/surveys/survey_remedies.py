@@ -197,10 +197,10 @@ def _success_key(verdict: Verdict) -> tuple[int, float, int, float]:
 
 
 def _all_lines_usable(verdict: Verdict) -> bool:
-    """Return True if all photo lines are usable, no finding on a survey fails, and there is a photo line."""
+    """Return True if all photo lines are usable, all findings on a survey pass, and there is a photo line."""
     usable, lines = _count_usable(verdict)
     return 0 < lines == usable and not any(
-        finding.rule == "survey" and finding.ok is False for finding in verdict.findings
+        finding.rule == "survey" and finding.ok is not True for finding in verdict.findings
     )
 
 

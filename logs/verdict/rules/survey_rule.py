@@ -11,6 +11,7 @@ import numpy as np
 from flight.mission.surveys import LineAxis, PhotoLine, Survey
 from logs.verdict.findings import (
     GROUND_PATH,
+    UNKNOWN_OVERLAP,
     UNKNOWN_PATH,
     Fact,
     Finding,
@@ -78,7 +79,9 @@ def survey_findings(
 def _overlap_findings(requirements: RouteRequirements, aligned: AlignedTrack | None, survey: Survey) -> list[Finding]:
     """Judge the smallest front and side overlap of a survey's photos against the required overlaps.
 
-    An overlap that is not measured or not required has no finding.  Return [] if the survey's camera is unknown.
+    An overlap that is not measured or not required has no finding.  The side overlap is not judged if it is large
+    enough, but the crab angle reduces the common area of the photos below the limit.  Return [] if the survey's camera
+    is unknown.
     """
     measure = measure_overlap(requirements, aligned, survey)
     if measure is None:
@@ -92,9 +95,10 @@ def _overlap_findings(requirements: RouteRequirements, aligned: AlignedTrack | N
         if overlap is None or required is None:
             continue
         limit = required - PHOTO_OVERLAP_TOLERANCE
-        ok = overlap >= limit
         text = overlap_text(measure, check)
-        faults = [] if ok else [message(text)]
+        is_unknown = check == SIDE_OVERLAP and measure.is_side_unknown
+        ok = None if is_unknown else overlap >= limit
+        faults = [] if ok else [message(crab_text(measure), f"; {text}") if is_unknown else message(text)]
         findings.append(
             make_finding(
                 "survey",
@@ -107,10 +111,10 @@ def _overlap_findings(requirements: RouteRequirements, aligned: AlignedTrack | N
                 limit=100.0 * limit,
                 at_least=True,
                 source="mission",
-                margin=100.0 * (overlap - limit),
+                margin=None if is_unknown else 100.0 * (overlap - limit),
                 unit="%",
                 method="photos of level ground, taken straight down",
-                check=check,
+                check=UNKNOWN_OVERLAP if is_unknown else check,
             )
         )
     return findings
@@ -142,6 +146,17 @@ def overlap_text(measure: OverlapMeasure, check: str) -> str:
     gap_text = f", with a gap of {gap:.0f} m between the photos" if gap >= _MIN_STATED_GAP_M else ""
     text = f"lowest {check} {100.0 * overlap:.0f} %{gap_text} ({lines_text})"
     return text if required is None else f"{text}; {100.0 * required:.0f} % is required"
+
+
+def crab_text(measure: OverlapMeasure) -> str:
+    """Describe the crab angle of a survey's photos, and the common area of photos side by side."""
+    judged_text = (
+        "the side overlap is therefore not judged" if measure.is_side_unknown else "the overlap does not include this"
+    )
+    return (
+        f"crab angle up to {math.degrees(measure.max_crab):.0f}°: neighbouring photos have"
+        f" {100.0 * measure.side_area:.0f} % of their area in common; {judged_text}"
+    )
 
 
 def _unflyable_turnaround_findings(requirements: RouteRequirements, survey: Survey) -> list[Finding]:
