@@ -154,9 +154,9 @@ class SurveyResult:
                 " be judged; an elevation file of the whole survey is needed (--terrain)",
             )
         texts = [
-            "no remedy was found: no other distance between photos, turn-around, gates, order, course, parameter or"
-            " airspeed alone makes all lines usable, nor do longer turn-arounds with gates, a parameter or a lower"
-            " airspeed"
+            "no remedy was found: no other distance between photos, height, turn-around, gates, order, course,"
+            " parameter or airspeed that was tried is enough alone, nor are longer turn-arounds with gates, a parameter"
+            " or a lower airspeed; other distances between the lines were not tried"
         ]
         texts += [usable_segments_text(*pair) for pair in zip(self.surveys, self.lines, strict=True)]
         if self.kept:

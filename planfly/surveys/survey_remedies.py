@@ -333,11 +333,18 @@ class _Trials:
     def try_height(self) -> SurveyRemedy | None:
         """Try the lines higher, by the fewest whole metres that give the flown photos the required overlaps.
 
-        Returns None if no overlap fails, or if the flight does not pass.
+        If that does not pass, try the fewest whole metres with which the overlaps would be judged as large enough.
+        Returns None if no overlap fails, or if neither flight passes.
         """
-        climb = max((math.ceil(missing_height(measure)) for measure in self._overlaps), default=0)
-        if climb <= 0:
-            return None
+        climbs = (
+            max((math.ceil(missing_height(measure, tolerance)) for measure in self._overlaps), default=0)
+            for tolerance in (0.0, PHOTO_OVERLAP_TOLERANCE)
+        )
+        remedies = (self._try_climb(climb) for climb in climbs if climb > 0)
+        return next((remedy for remedy in remedies if remedy is not None), None)
+
+    def _try_climb(self, climb: int) -> SurveyRemedy | None:
+        """Try the lines higher by whole metres; return None if the flight does not pass."""
         mission = self._setup.mission
         survey_items = {
             int(self._setup.route.items[i]) for survey in self._surveys for i in range(survey.first, survey.last + 1)
@@ -665,8 +672,8 @@ class _Trials:
                 yield speed
 
 
-def missing_height(measure: OverlapMeasure) -> float:
-    """Return the climb with which the lowest photos have the required overlaps, m.
+def missing_height(measure: OverlapMeasure, tolerance: float = 0.0) -> float:
+    """Return the climb with which the lowest photos have the required overlaps, or less by a tolerance, m.
 
     The distances between photos and between lines stay as flown.  Returns 0 if the overlaps are large enough.
     """
@@ -676,7 +683,7 @@ def missing_height(measure: OverlapMeasure) -> float:
         (measure.side, camera.side, measure.line_spacing, camera.across, measure.side_height),
     ):
         if overlap is not None and required is not None and overlap < required - PHOTO_OVERLAP_TOLERANCE:
-            missing = max(missing, distance / (width * (1.0 - required)) - height)
+            missing = max(missing, distance / (width * (1.0 - required + tolerance)) - height)
     return missing
 
 
