@@ -108,7 +108,10 @@ def overlap_lines(measure: OverlapMeasure | None, *, is_flown: bool = True) -> t
     faults = overlap_faults(measure)
     needs = (("photos", measure.needed_photo_spacing), ("lines", measure.needed_line_spacing))
     for number, (check, (name, spacing)) in enumerate(zip((FRONT_OVERLAP, SIDE_OVERLAP), needs, strict=True)):
-        if check in faults and spacing is not None and spacing >= 1.0:
+        is_slow = check == FRONT_OVERLAP and measure.is_camera_limited
+        if check in faults and is_slow:
+            texts[number] += f". T{slow_camera_text(measure)[1:]}"
+        elif check in faults and spacing is not None and spacing >= 1.0:
             texts[number] += (
                 f". The {name} must be at most {math.floor(spacing)} m apart, because the lowest photos are taken"
                 f" {measure.min_height:.0f} m above ground"

@@ -181,6 +181,9 @@ def test_what_an_overlap_needs_and_what_a_pixel_shows_are_stated() -> None:
     assert "lines must be at most 41 m apart, because the lowest photos are taken 80 m" in overlap_lines(elsewhere)[1]
     lost = OverlapMeasure(CAMERA, **photos, **sides, unusable_fraction=0.042)  # type: ignore[arg-type]
     assert overlap_lines(lost)[2] == "overlap not judged on 4 % of the lines' length, where no photo can be used"
+    # A camera that takes one photo per second takes none closer together, whatever the distance in the items.
+    slow = overlap_lines(OverlapMeasure(CAMERA, **photos, is_camera_limited=True))[0]  # type: ignore[arg-type]
+    assert slow.endswith("is required. The camera is too slow for the distance between photos: one every 1 s, or 75 m")
     unknown = Camera(CAMERA.across, CAMERA.along, 0.3, 0.2)
     assert not any("sampling" in text for text in overlap_lines(OverlapMeasure(unknown, **photos)))  # type: ignore[arg-type]
 
