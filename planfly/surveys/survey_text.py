@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from flight.mission.surveys import Survey
 from logs.verdict.measures.photo_lines import LineMeasure, OverlapMeasure
 from logs.verdict.rule_words import FRONT_OVERLAP, SIDE_OVERLAP
-from logs.verdict.rules.survey_rule import crab_text, overlap_text, unusable_parts_text
+from logs.verdict.rules.survey_rule import crab_text, overlap_text, unusable_parts_text, usable_text
 from logs.verdict.tolerances import PHOTO_OVERLAP_TOLERANCE
 from planfly.surveys.survey_remedies import NearMiss, SurveyRemedy, ordinal_text
 from world.wording import count_text
@@ -62,7 +62,7 @@ def lines_headline(measures: list[LineMeasure | None]) -> str:
     measure = measures[worst_index]
     return (
         f"{summary}; line {worst_index + 1} is the worst:"
-        f" {'not flown' if measure is None else f'{100.0 * measure.usable:.0f} % usable'}"
+        f" {'not flown' if measure is None else f'{usable_text(measure.usable)} usable'}"
     )
 
 

@@ -46,6 +46,7 @@ from logs.verdict.tolerances import (
     PLAN_TOLERANCE_RAD,
     TURN_AROUND_RADII,
 )
+from logs.verdict.wording import compared_texts
 from world.wording import count_text
 
 # Limit of a slope if neither the aircraft nor the scenario has one.
@@ -288,7 +289,7 @@ def _planned_finding(
             cause, usable_state = ("the camera, which is switched off before its end, leaves", "with photos")
         faults.append(
             message(
-                f"{name}: {cause} only {100.0 * straight_fraction:.0f} % of its {length:.0f} m {usable_state}",
+                f"{name}: {cause} only {usable_text(straight_fraction)} of its {length:.0f} m {usable_state}",
                 f" ({cut_in:.0f} m are lost at the start and {cut_out:.0f} m at the end)",
             )
         )
@@ -355,13 +356,25 @@ def _flown_finding(
         if max(measure.lost_at_start, measure.lost_at_end) < 1.0:
             ends_text = ""
         fault = message(
-            f"{name}: {100.0 * measure.usable:.0f} % of its {measure.length:.0f} m can be used",
+            f"{name}: {usable_text(measure.usable)} of its {measure.length:.0f} m can be used",
             f": {unusable_parts_text(measure)}{ends_text}",
         )
         faults, facts = [fault], []
     if measure.missed_photos:
         facts.append(f"{measure.missed_photos} of {count_text(measure.photos, 'photo')} missed")
     return _line_finding(requirements, line, ok, faults, facts, measure.usable, geometric=False, measure=measure)
+
+
+def usable_text(fraction: float) -> str:
+    """Return the usable fraction of a photo line in %, with enough digits to show that it is below its limit.
+
+    >>> usable_text(0.9494), usable_text(0.949), usable_text(0.665), usable_text(0.95)
+    ('94.9 %', '94.9 %', '66 %', '95 %')
+    """
+    percent, limit = 100.0 * fraction, 100.0 * PHOTO_COVERAGE_FRACTION
+    if round(limit) - 0.5 <= percent < limit:
+        return compared_texts(percent, limit, "%")[0]
+    return f"{percent:.0f} %"
 
 
 def unusable_parts_text(measure: LineMeasure) -> str:
