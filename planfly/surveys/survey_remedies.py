@@ -39,6 +39,8 @@ AIRSPEED_FACTORS = (0.95, 0.9, 0.85, 0.8, 0.7)
 _MIN_AIRSPEED_RATIO = 1.1
 # Step of the airspeeds that are tried, m/s.
 _AIRSPEED_STEP_MPS = 0.1
+# Largest difference of the altitudes of a line and of the turn onto it, with which both are raised, m.
+_SAME_ALTITUDE_M = 1.0
 # Ratio of the intended to the highest allowed ground speed; the difference is a reserve for gusts.
 _GROUND_SPEED_RATIO = 0.98
 
@@ -346,9 +348,14 @@ class _Trials:
     def _try_climb(self, climb: int) -> SurveyRemedy | None:
         """Try the lines higher by whole metres; return None if the flight does not pass."""
         mission = self._setup.mission
-        survey_items = {
-            int(self._setup.route.items[i]) for survey in self._surveys for i in range(survey.first, survey.last + 1)
-        }
+        route = self._setup.route
+        altitudes, survey_items = route.positions[:, 2], set[int]()
+        for survey in self._surveys:
+            first, last = survey.first, survey.last
+            # The waypoints of the turns onto the first line and off the last line are as high as the line.
+            first -= int(first > 0 and abs(altitudes[first - 1] - altitudes[first]) < _SAME_ALTITUDE_M)
+            last += int(last + 1 < len(altitudes) and abs(altitudes[last + 1] - altitudes[last]) < _SAME_ALTITUDE_M)
+            survey_items |= {int(route.items[i]) for i in range(first, last + 1)}
         indices = [index for index in movable_indices(mission) if mission.items[index].seq in survey_items]
         flight = self._fly_trial(raise_items(mission, indices, float(climb)), self._uav, f"lines {climb} m higher")
         return SurveyRemedy("height", "", 0.0, float(climb), "m", *flight) if self._is_remedy(flight) else None

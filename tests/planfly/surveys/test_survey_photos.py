@@ -152,6 +152,8 @@ def test_lines_that_cannot_be_as_high_as_required_are_tried_at_the_tolerance(
 
     def fly(flown: FlightSetup, *_: Any) -> Any:
         [survey] = judged_surveys(flown)
+        # All twelve waypoints have the same height, those of the turns onto the first line and off the last too.
+        assert np.ptp(flown.route.positions[-12:, 2]) == 0.0
         climbs.append(flown.route.positions[survey.first, 2] - setup.route.positions[survey.first, 2])
         ok = 0.0 < climbs[-1] < 20.0
         lines = [make_finding("survey", Place("leg", line.first), ok=ok, reason="") for line in survey.lines]
