@@ -38,11 +38,13 @@ GROUND_PATH = "ground way"
 NOT_FLOWN = "not flown"
 # Returns or glides that a scenario requires are not known well enough.
 UNKNOWN_RETURN = "unknown return"
+# The crab angle reduces the common area of photos side by side below the required overlap.
+UNKNOWN_OVERLAP = "unknown overlap"
 # Without a home, the destination of the return after the last item is unknown.  The verdict may still be "flyable", as
 # without elevation data.
 NO_HOME = "no home"
 # Checks that a flight cannot decide.  A flight may pass although they are undecided.
-APART_FROM_FLIGHT = (GROUND_PATH, UNKNOWN_RETURN)
+APART_FROM_FLIGHT = (GROUND_PATH, UNKNOWN_RETURN, UNKNOWN_OVERLAP)
 _UNDECIDED = (UNKNOWN_AIRCRAFT, UNKNOWN_PATH, NOT_FLOWN, *APART_FROM_FLIGHT)
 
 
@@ -77,8 +79,8 @@ class Finding:
     brief: the reason in a few words, for a headline.
     placed: True if the reason begins with the place.
     check: name of the check, for a rule with several checks; `UNKNOWN_AIRCRAFT`, `UNKNOWN_PATH`, `NOT_FLOWN`,
-        `GROUND_PATH` or `UNKNOWN_RETURN` if the finding is undecided for that reason; `NO_HOME` if it is not judged for
-        that reason; "" otherwise.
+        `GROUND_PATH`, `UNKNOWN_RETURN` or `UNKNOWN_OVERLAP` if the finding is undecided for that reason; `NO_HOME` if
+        it is not judged for that reason; "" otherwise.
     facts: other measured numbers, which are not judged.
     at_least: True if values of at least the limit pass, False if values of at most the limit pass.
     """

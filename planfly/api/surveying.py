@@ -94,7 +94,8 @@ class SurveyResult:
     @property
     def usable(self) -> bool:
         """True if enough of every line is usable and the photos overlap as required."""
-        return not self.lost and not self.unknown_lines
+        is_overlap_unknown = any(overlap is not None and overlap.is_side_unknown for overlap in self.overlaps)
+        return not (self.lost or self.unknown_lines or is_overlap_unknown)
 
     @property
     def unknown_lines(self) -> int:
@@ -153,9 +154,9 @@ class SurveyResult:
                 " be judged; an elevation file of the whole survey is needed (--terrain)",
             )
         texts = [
-            "no remedy was found: no other distance between photos, turn-around, gates, order, course, parameter or"
-            " airspeed alone makes all lines usable, nor do longer turn-arounds with gates, a parameter or a lower"
-            " airspeed"
+            "no remedy was found: no other distance between photos, height, turn-around, gates, order, course,"
+            " parameter or airspeed that was tried is enough alone, nor are longer turn-arounds with gates, a parameter"
+            " or a lower airspeed; other distances between the lines were not tried"
         ]
         texts += [usable_segments_text(*pair) for pair in zip(self.surveys, self.lines, strict=True)]
         if self.kept:

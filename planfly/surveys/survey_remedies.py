@@ -39,6 +39,8 @@ AIRSPEED_FACTORS = (0.95, 0.9, 0.85, 0.8, 0.7)
 _MIN_AIRSPEED_RATIO = 1.1
 # Step of the airspeeds that are tried, m/s.
 _AIRSPEED_STEP_MPS = 0.1
+# Largest difference of the altitudes of a line and of the turn onto it, with which both are raised, m.
+_SAME_ALTITUDE_M = 1.0
 # Ratio of the intended to the highest allowed ground speed; the difference is a reserve for gusts.
 _GROUND_SPEED_RATIO = 0.98
 
@@ -197,10 +199,10 @@ def _success_key(verdict: Verdict) -> tuple[int, float, int, float]:
 
 
 def _all_lines_usable(verdict: Verdict) -> bool:
-    """Return True if all photo lines are usable, no finding on a survey fails, and there is a photo line."""
+    """Return True if all photo lines are usable, all findings on a survey pass, and there is a photo line."""
     usable, lines = _count_usable(verdict)
     return 0 < lines == usable and not any(
-        finding.rule == "survey" and finding.ok is False for finding in verdict.findings
+        finding.rule == "survey" and finding.ok is not True for finding in verdict.findings
     )
 
 
@@ -333,15 +335,27 @@ class _Trials:
     def try_height(self) -> SurveyRemedy | None:
         """Try the lines higher, by the fewest whole metres that give the flown photos the required overlaps.
 
-        Returns None if no overlap fails, or if the flight does not pass.
+        If that does not pass, try the fewest whole metres with which the overlaps would be judged as large enough.
+        Returns None if no overlap fails, or if neither flight passes.
         """
-        climb = max((math.ceil(missing_height(measure)) for measure in self._overlaps), default=0)
-        if climb <= 0:
-            return None
+        climbs = (
+            max((math.ceil(missing_height(measure, tolerance)) for measure in self._overlaps), default=0)
+            for tolerance in (0.0, PHOTO_OVERLAP_TOLERANCE)
+        )
+        remedies = (self._try_climb(climb) for climb in climbs if climb > 0)
+        return next((remedy for remedy in remedies if remedy is not None), None)
+
+    def _try_climb(self, climb: int) -> SurveyRemedy | None:
+        """Try the lines higher by whole metres; return None if the flight does not pass."""
         mission = self._setup.mission
-        survey_items = {
-            int(self._setup.route.items[i]) for survey in self._surveys for i in range(survey.first, survey.last + 1)
-        }
+        route = self._setup.route
+        altitudes, survey_items = route.positions[:, 2], set[int]()
+        for survey in self._surveys:
+            first, last = survey.first, survey.last
+            # The waypoints of the turns onto the first line and off the last line are as high as the line.
+            first -= int(first > 0 and abs(altitudes[first - 1] - altitudes[first]) < _SAME_ALTITUDE_M)
+            last += int(last + 1 < len(altitudes) and abs(altitudes[last + 1] - altitudes[last]) < _SAME_ALTITUDE_M)
+            survey_items |= {int(route.items[i]) for i in range(first, last + 1)}
         indices = [index for index in movable_indices(mission) if mission.items[index].seq in survey_items]
         flight = self._fly_trial(raise_items(mission, indices, float(climb)), self._uav, f"lines {climb} m higher")
         return SurveyRemedy("height", "", 0.0, float(climb), "m", *flight) if self._is_remedy(flight) else None
@@ -665,8 +679,8 @@ class _Trials:
                 yield speed
 
 
-def missing_height(measure: OverlapMeasure) -> float:
-    """Return the climb with which the lowest photos have the required overlaps, m.
+def missing_height(measure: OverlapMeasure, tolerance: float = 0.0) -> float:
+    """Return the climb with which the lowest photos have the required overlaps, or less by a tolerance, m.
 
     The distances between photos and between lines stay as flown.  Returns 0 if the overlaps are large enough.
     """
@@ -676,7 +690,7 @@ def missing_height(measure: OverlapMeasure) -> float:
         (measure.side, camera.side, measure.line_spacing, camera.across, measure.side_height),
     ):
         if overlap is not None and required is not None and overlap < required - PHOTO_OVERLAP_TOLERANCE:
-            missing = max(missing, distance / (width * (1.0 - required)) - height)
+            missing = max(missing, distance / (width * (1.0 - required + tolerance)) - height)
     return missing
 
 

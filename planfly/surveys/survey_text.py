@@ -6,13 +6,15 @@ from collections.abc import Sequence
 from flight.mission.surveys import Survey
 from logs.verdict.measures.photo_lines import LineMeasure, OverlapMeasure
 from logs.verdict.rule_words import FRONT_OVERLAP, SIDE_OVERLAP
-from logs.verdict.rules.survey_rule import overlap_text, unusable_parts_text
+from logs.verdict.rules.survey_rule import crab_text, overlap_text, unusable_parts_text, usable_text
 from logs.verdict.tolerances import PHOTO_OVERLAP_TOLERANCE
 from planfly.surveys.survey_remedies import NearMiss, SurveyRemedy, ordinal_text
 from world.wording import count_text
 
 # Smallest fraction of the lines' length without usable photos that is stated; it is printed as 1 %.
 MIN_STATED_FRACTION = 0.005
+# Smallest loss of common area by the crab angle that is stated, as a fraction of a photo.
+MIN_STATED_AREA_LOSS = 0.01
 
 
 def is_line_usable(measure: LineMeasure | None) -> bool:
@@ -60,7 +62,7 @@ def lines_headline(measures: list[LineMeasure | None]) -> str:
     measure = measures[worst_index]
     return (
         f"{summary}; line {worst_index + 1} is the worst:"
-        f" {'not flown' if measure is None else f'{100.0 * measure.usable:.0f} % usable'}"
+        f" {'not flown' if measure is None else f'{usable_text(measure.usable)} usable'}"
     )
 
 
@@ -106,11 +108,16 @@ def overlap_lines(measure: OverlapMeasure | None, *, is_flown: bool = True) -> t
     faults = overlap_faults(measure)
     needs = (("photos", measure.needed_photo_spacing), ("lines", measure.needed_line_spacing))
     for number, (check, (name, spacing)) in enumerate(zip((FRONT_OVERLAP, SIDE_OVERLAP), needs, strict=True)):
-        if check in faults and spacing is not None and spacing >= 1.0:
+        is_slow = check == FRONT_OVERLAP and measure.is_camera_limited
+        if check in faults and is_slow:
+            texts[number] += f". T{slow_camera_text(measure)[1:]}"
+        elif check in faults and spacing is not None and spacing >= 1.0:
             texts[number] += (
                 f". The {name} must be at most {math.floor(spacing)} m apart, because the lowest photos are taken"
                 f" {measure.min_height:.0f} m above ground"
             )
+    if measure.side is not None and measure.side_area < measure.side - MIN_STATED_AREA_LOSS:
+        texts.append(crab_text(measure))
     if measure.unusable_fraction > MIN_STATED_FRACTION:
         unusable_text = f"{100.0 * measure.unusable_fraction:.0f} % of the lines' length, where no photo can be used"
         texts.append(f"overlap not judged on {unusable_text}")

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from flight.mission.items import Camera, Command, Mission
 from flight.mission.surveys import LineAxis, PhotoLine, Survey, camera_spacing, survey_plan
-from flight.simulation.track import ROLL
+from flight.simulation.track import ROLL, YAW
 from logs.verdict.measures.acceptance import acceptance_condition, position_error
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
@@ -22,6 +22,7 @@ from logs.verdict.tolerances import (
     PHOTO_COVERAGE_FRACTION,
     PHOTO_HEIGHT_FRACTION,
     PHOTO_OFFSET_FRACTION,
+    PHOTO_OVERLAP_TOLERANCE,
     PHOTO_STEP_M,
 )
 from world.arrays import Flags, Floats
@@ -98,6 +99,7 @@ class _LineRows:
     track_rows: range of the n rows in the track.
     position: m, (n, 3).
     along, across: distance along the line and to its side, m, (n,).
+    crab: angle from the line to the nose, rad, clockwise positive, (n,).
     is_ahead: True for each row that flies along the line, (n,).
     height_error, height_tolerance: error from the planned height above ground, and its tolerance, m, (n,).
     conditions: for each cause of loss, a mask (n,) that is True for the rows without this cause.
@@ -108,6 +110,7 @@ class _LineRows:
     position: Floats
     along: Floats
     across: Floats
+    crab: Floats
     is_ahead: Flags
     height_error: Floats
     height_tolerance: Floats
@@ -127,6 +130,7 @@ def _line_rows(
     position = aligned.track.position[window]
     along, across, course = axis.project(position)
     course_error = np.abs(np.angle(np.exp(1j * (aligned.course[window] - course))))
+    crab = np.angle(np.exp(1j * (aligned.track.attitude[window, YAW] - course)))
     is_ahead = course_error <= MAX_PHOTO_COURSE_ERROR_RAD
     # Error from the planned height above ground, and its tolerance, m.
     planned_height = heights_over_ground(requirements, axis.points_at(along))
@@ -140,7 +144,7 @@ def _line_rows(
         "camera_off": _camera_on_rows(requirements, aligned, line, axis, window, is_ahead),
         "unknown": np.isfinite(height_error),
     }
-    return _LineRows(axis, window, position, along, across, is_ahead, height_error, height_tolerance, conditions)
+    return _LineRows(axis, window, position, along, across, crab, is_ahead, height_error, height_tolerance, conditions)
 
 
 def measure_line(
@@ -389,6 +393,11 @@ def _photo_rows(requirements: RouteRequirements, aligned: AlignedTrack, legs: ra
 # the aircraft's tilt is ignored.
 
 
+# Number of steps along each side of a photo, by which the common area of two photos is summed, and the resulting error.
+_AREA_STEPS = 400
+_AREA_ERROR = 0.003
+
+
 @dataclass(frozen=True, slots=True)
 class OverlapMeasure:
     """Minimum overlap of a survey's usable photos, as fractions of a photo; 0 for a gap between them.
@@ -402,6 +411,8 @@ class OverlapMeasure:
         is lost is compared only if no two others are neighbours. None if no two usable lines are next to each other.
     line_pair, line_spacing, side_height: for the minimum side overlap: numbers of both lines, distance between them, m,
         and height above ground, m.
+    side_crabs: crab angles of both lines there, rad.
+    max_crab: largest crab angle at the usable photos, from the line to the nose, rad; 0 for a planned path.
     min_height, max_height: heights above ground of the usable photos, m; NaN if none is usable.
     unusable_fraction, unknown_fraction: fractions of the length of all lines where no overlap is judged, because no
         photo is usable, or because the terrain data do not cover the ground.
@@ -417,6 +428,8 @@ class OverlapMeasure:
     line_pair: tuple[int, int] = (-1, -1)
     line_spacing: float = math.nan
     side_height: float = math.nan
+    side_crabs: tuple[float, float] = (0.0, 0.0)
+    max_crab: float = 0.0
     min_height: float = math.nan
     max_height: float = math.nan
     unusable_fraction: float = 0.0
@@ -435,6 +448,22 @@ class OverlapMeasure:
         if self.side is None or self.camera.side is None:
             return None
         return (1.0 - self.camera.side) * self.camera.across * self.min_height
+
+    @property
+    def side_area(self) -> float:
+        """Common area of two photos, turned by the crab angles, at the minimum side overlap, as a fraction of a photo.
+
+        It is 0 if the side overlap is unknown.
+        """
+        return _common_area(self.camera, self.line_spacing, self.side_height, self.side_crabs)
+
+    @property
+    def is_side_unknown(self) -> bool:
+        """True if the side overlap is large enough, but the common area of the turned photos is not."""
+        if self.side is None or self.camera.side is None:
+            return False
+        limit = self.camera.side - PHOTO_OVERLAP_TOLERANCE
+        return self.side_area < limit - _AREA_ERROR and self.side >= limit
 
     @property
     def front_gap(self) -> float:
@@ -467,6 +496,7 @@ class _Strip(NamedTuple):
     positions: m, (n, 3).
     heights: heights above ground, m, (n,).
     speeds: ground speeds, m/s, (n,).
+    crabs: crab angles, rad, (n,).
     is_usable: True for usable points, (n,).
     usable_fraction, unknown_fraction: fractions of the line's length with usable points, and over unknown ground.
     """
@@ -474,6 +504,7 @@ class _Strip(NamedTuple):
     positions: Floats
     heights: Floats
     speeds: Floats
+    crabs: Floats
     is_usable: Flags
     usable_fraction: float = 1.0
     unknown_fraction: float = 0.0
@@ -506,7 +537,8 @@ def measure_overlap(
         unknown_fraction=float(np.average(unknown_fractions, weights=lengths)),
     )
     if heights.size:
-        measure = replace(measure, min_height=float(heights.min()), max_height=float(heights.max()))
+        max_crab = max(float(np.abs(strip.crabs[strip.is_usable]).max(initial=0.0)) for strip in strips if strip)
+        measure = replace(measure, min_height=float(heights.min()), max_height=float(heights.max()), max_crab=max_crab)
     measure = _with_side_overlap(measure, requirements, survey, kept_strips)
     if measure.side is None:
         # No two sufficiently usable lines are neighbours: use the usable parts of all lines.
@@ -530,7 +562,7 @@ def _line_strip(
         heights = heights_over_ground(requirements, positions)
         is_known = np.isfinite(heights)
         known_fraction = float(is_known.mean())
-        return _Strip(positions, heights, speeds, is_known, known_fraction, 1.0 - known_fraction)
+        return _Strip(positions, heights, speeds, np.zeros(len(along)), is_known, known_fraction, 1.0 - known_fraction)
     rows = _line_rows(requirements, aligned, survey, line)
     if rows is None:
         return None
@@ -546,7 +578,7 @@ def _line_strip(
     speeds = np.hypot(*aligned.track.velocity[rows.track_rows, :2].T)
     heights = heights_over_ground(requirements, rows.position)
     unknown_fraction = possible_fraction - usable_fraction
-    return _Strip(rows.position, heights, speeds, is_usable, usable_fraction, unknown_fraction)
+    return _Strip(rows.position, heights, speeds, rows.crab, is_usable, usable_fraction, unknown_fraction)
 
 
 def _with_front_overlap(measure: OverlapMeasure, survey: Survey, strips: Sequence[_Strip | None]) -> OverlapMeasure:
@@ -603,13 +635,13 @@ def _with_side_overlap(
     length = max(float(along.max()) for along in end_distances) - min_along
     count = max(1, math.ceil(length / PHOTO_STEP_M))
     step_middles = (np.arange(count) + 0.5) * length / count
-    # The line that was last seen at each step: offset (m), height above ground (m) and number.
-    previous_line, lowest_overlap = np.full((3, count), np.nan), math.inf
+    # The line that was last seen at each step: offset (m), height above ground (m), crab angle (rad) and number.
+    previous_line, lowest_overlap = np.full((4, count), np.nan), math.inf
     for number in np.argsort(survey.offsets).tolist():
         strip, along = strips[number], end_distances[number] - min_along
         on_line = (step_middles >= along.min()) & (step_middles <= along.max())
-        this_line = np.full((3, count), np.nan)
-        this_line[2, on_line] = number
+        this_line = np.full((4, count), np.nan)
+        this_line[3, on_line] = number
         if strip is not None and strip.is_usable.any():
             point_along, across, _ = axis.project(strip.positions)
             is_forward = along[-1] >= along[0]
@@ -618,14 +650,14 @@ def _with_side_overlap(
             )
             is_used = on_line & (is_flown_usably if is_forward else is_flown_usably[::-1])
             order = np.argsort(point_along[strip.is_usable])
-            for row, values in enumerate((across, strip.heights)):
+            for row, values in enumerate((across, strip.heights, strip.crabs)):
                 line_values = np.interp(
                     step_middles, (point_along[strip.is_usable] - min_along)[order], values[strip.is_usable][order]
                 )
                 this_line[row] = np.where(is_used, line_values, np.nan)
         gaps = np.abs(this_line[0] - previous_line[0])
         heights = 0.5 * (this_line[1] + previous_line[1])
-        previous_numbers = np.nan_to_num(previous_line[2], nan=number).astype(int)
+        previous_numbers = np.nan_to_num(previous_line[3], nan=number).astype(int)
         is_neighbor = (ranks[number] - ranks[previous_numbers] == 1) & (
             np.abs(offsets[number] - offsets[previous_numbers]) <= _MAX_NEIGHBOR_SPACINGS * survey.spacing
         )
@@ -634,16 +666,37 @@ def _with_side_overlap(
             lowest_index = int(np.nanargmin(overlaps))
             if overlaps[lowest_index] < lowest_overlap:
                 lowest_overlap = float(overlaps[lowest_index])
-                pair = (int(previous_line[2, lowest_index]), number)
                 measure = replace(
                     measure,
                     side=max(0.0, lowest_overlap),
-                    line_pair=pair,
+                    line_pair=(int(previous_line[3, lowest_index]), number),
                     line_spacing=float(gaps[lowest_index]),
                     side_height=max(0.0, float(heights[lowest_index])),
+                    side_crabs=(float(this_line[2, lowest_index]), float(previous_line[2, lowest_index])),
                 )
         previous_line[:, on_line] = this_line[:, on_line]
     return measure
+
+
+def _common_area(camera: Camera, distance: float, height: float, crabs: tuple[float, float]) -> float:
+    """Return the common area of two turned photos side by side, as a fraction of a photo, to `_AREA_ERROR`.
+
+    distance: distance between the photos, across the lines, m.
+    height: height above ground of both, m.
+    crabs: angle of each photo to the lines, rad.  Photos of lines in opposite directions may be compared, because a
+        photo covers the same ground if it is turned by 180 degrees.
+
+    >>> camera = Camera(across=5.0, along=2.0)
+    >>> [round(_common_area(camera, 200.0, 100.0, crabs), 2) for crabs in ((0.0, 0.0), (0.5236, 0.5236))]
+    [0.6, 0.33]
+    """
+    steps = (np.arange(_AREA_STEPS) + 0.5) / _AREA_STEPS - 0.5
+    across, along = np.meshgrid(steps * camera.across * height, steps * camera.along * height)
+    turn = crabs[1] - crabs[0]
+    # From the axes of the first photo to those of the second, whose center is at `distance` across the lines.
+    x = across * math.cos(turn) - along * math.sin(turn) - distance * math.cos(crabs[1])
+    y = across * math.sin(turn) + along * math.cos(turn) - distance * math.sin(crabs[1])
+    return float(((2.0 * np.abs(x) <= camera.across * height) & (2.0 * np.abs(y) <= camera.along * height)).mean())
 
 
 def _lateral_ranks(survey: Survey) -> NDArray[np.int64]:

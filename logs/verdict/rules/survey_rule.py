@@ -11,6 +11,7 @@ import numpy as np
 from flight.mission.surveys import LineAxis, PhotoLine, Survey
 from logs.verdict.findings import (
     GROUND_PATH,
+    UNKNOWN_OVERLAP,
     UNKNOWN_PATH,
     Fact,
     Finding,
@@ -45,6 +46,7 @@ from logs.verdict.tolerances import (
     PLAN_TOLERANCE_RAD,
     TURN_AROUND_RADII,
 )
+from logs.verdict.wording import compared_texts
 from world.wording import count_text
 
 # Limit of a slope if neither the aircraft nor the scenario has one.
@@ -78,7 +80,9 @@ def survey_findings(
 def _overlap_findings(requirements: RouteRequirements, aligned: AlignedTrack | None, survey: Survey) -> list[Finding]:
     """Judge the smallest front and side overlap of a survey's photos against the required overlaps.
 
-    An overlap that is not measured or not required has no finding.  Return [] if the survey's camera is unknown.
+    An overlap that is not measured or not required has no finding.  The side overlap is not judged if it is large
+    enough, but the crab angle reduces the common area of the photos below the limit.  Return [] if the survey's camera
+    is unknown.
     """
     measure = measure_overlap(requirements, aligned, survey)
     if measure is None:
@@ -92,9 +96,10 @@ def _overlap_findings(requirements: RouteRequirements, aligned: AlignedTrack | N
         if overlap is None or required is None:
             continue
         limit = required - PHOTO_OVERLAP_TOLERANCE
-        ok = overlap >= limit
         text = overlap_text(measure, check)
-        faults = [] if ok else [message(text)]
+        is_unknown = check == SIDE_OVERLAP and measure.is_side_unknown
+        ok = None if is_unknown else overlap >= limit
+        faults = [] if ok else [message(crab_text(measure), f"; {text}") if is_unknown else message(text)]
         findings.append(
             make_finding(
                 "survey",
@@ -107,10 +112,10 @@ def _overlap_findings(requirements: RouteRequirements, aligned: AlignedTrack | N
                 limit=100.0 * limit,
                 at_least=True,
                 source="mission",
-                margin=100.0 * (overlap - limit),
+                margin=None if is_unknown else 100.0 * (overlap - limit),
                 unit="%",
                 method="photos of level ground, taken straight down",
-                check=check,
+                check=UNKNOWN_OVERLAP if is_unknown else check,
             )
         )
     return findings
@@ -142,6 +147,17 @@ def overlap_text(measure: OverlapMeasure, check: str) -> str:
     gap_text = f", with a gap of {gap:.0f} m between the photos" if gap >= _MIN_STATED_GAP_M else ""
     text = f"lowest {check} {100.0 * overlap:.0f} %{gap_text} ({lines_text})"
     return text if required is None else f"{text}; {100.0 * required:.0f} % is required"
+
+
+def crab_text(measure: OverlapMeasure) -> str:
+    """Describe the crab angle of a survey's photos, and the common area of photos side by side."""
+    judged_text = (
+        "the side overlap is therefore not judged" if measure.is_side_unknown else "the overlap does not include this"
+    )
+    return (
+        f"crab angle up to {math.degrees(measure.max_crab):.0f}°: neighbouring photos have"
+        f" {100.0 * measure.side_area:.0f} % of their area in common; {judged_text}"
+    )
 
 
 def _unflyable_turnaround_findings(requirements: RouteRequirements, survey: Survey) -> list[Finding]:
@@ -273,7 +289,7 @@ def _planned_finding(
             cause, usable_state = ("the camera, which is switched off before its end, leaves", "with photos")
         faults.append(
             message(
-                f"{name}: {cause} only {100.0 * straight_fraction:.0f} % of its {length:.0f} m {usable_state}",
+                f"{name}: {cause} only {usable_text(straight_fraction)} of its {length:.0f} m {usable_state}",
                 f" ({cut_in:.0f} m are lost at the start and {cut_out:.0f} m at the end)",
             )
         )
@@ -340,13 +356,25 @@ def _flown_finding(
         if max(measure.lost_at_start, measure.lost_at_end) < 1.0:
             ends_text = ""
         fault = message(
-            f"{name}: {100.0 * measure.usable:.0f} % of its {measure.length:.0f} m can be used",
+            f"{name}: {usable_text(measure.usable)} of its {measure.length:.0f} m can be used",
             f": {unusable_parts_text(measure)}{ends_text}",
         )
         faults, facts = [fault], []
     if measure.missed_photos:
         facts.append(f"{measure.missed_photos} of {count_text(measure.photos, 'photo')} missed")
     return _line_finding(requirements, line, ok, faults, facts, measure.usable, geometric=False, measure=measure)
+
+
+def usable_text(fraction: float) -> str:
+    """Return the usable fraction of a photo line in %, with enough digits to show that it is below its limit.
+
+    >>> usable_text(0.9494), usable_text(0.949), usable_text(0.665), usable_text(0.95)
+    ('94.9 %', '94.9 %', '66 %', '95 %')
+    """
+    percent, limit = 100.0 * fraction, 100.0 * PHOTO_COVERAGE_FRACTION
+    if round(limit) - 0.5 <= percent < limit:
+        return compared_texts(percent, limit, "%")[0]
+    return f"{percent:.0f} %"
 
 
 def unusable_parts_text(measure: LineMeasure) -> str:

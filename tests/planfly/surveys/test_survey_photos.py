@@ -143,6 +143,31 @@ def test_higher_lines_are_tried_and_a_slow_camera_is_in_the_first_line(
     assert slow_camera_text(slow).endswith("one every 1 s, or 39 m")
 
 
+def test_lines_that_cannot_be_as_high_as_required_are_tried_at_the_tolerance(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """39 m between photos of 15.6 / 16 of the height need 160 m for 75 %, and 114.3 m for 65 %: 60 m and 15 m more."""
+    setup, climbs = setup_with(tmp_path, survey_of(20.0)), []
+    low = replace(OverlapMeasure(CAMERA), front=0.6, line=0, photo_spacing=39.0, height=100.0)
+
+    def fly(flown: FlightSetup, *_: Any) -> Any:
+        [survey] = judged_surveys(flown)
+        # All twelve waypoints have the same height, those of the turns onto the first line and off the last too.
+        assert np.ptp(flown.route.positions[-12:, 2]) == 0.0
+        climbs.append(flown.route.positions[survey.first, 2] - setup.route.positions[survey.first, 2])
+        ok = 0.0 < climbs[-1] < 20.0
+        lines = [make_finding("survey", Place("leg", line.first), ok=ok, reason="") for line in survey.lines]
+        return SimpleNamespace(
+            setup=flown, flight_verdict=Verdict((*lines,), flyable=ok, complete=True, lines=("",), level="flown")
+        )
+
+    monkeypatch.setattr(remedies, "Trial", fly)
+    verdict = fly(setup).flight_verdict
+    found = remedies.find_survey_remedies(setup, uav_of_setup(setup), verdict, overlaps=[low]).remedies
+    assert [(remedy.kind, remedy.value) for remedy in found] == [("height", 15.0)]
+    assert sorted({round(climb, 3) for climb in climbs if climb}) == [15.0, 60.0]
+
+
 def test_what_an_overlap_needs_and_what_a_pixel_shows_are_stated() -> None:
     """A quarter of 120 m x 15.6 / 16 is 29.25 m, 35 % of 120 m x 23.5 / 16 are 61.7 m, and of its pixels one 2.9 cm."""
     photos = {"front": 0.35, "photo_spacing": 75.0, "height": 120.0, "min_height": 120.0, "max_height": 160.0}
@@ -158,6 +183,9 @@ def test_what_an_overlap_needs_and_what_a_pixel_shows_are_stated() -> None:
     assert "lines must be at most 41 m apart, because the lowest photos are taken 80 m" in overlap_lines(elsewhere)[1]
     lost = OverlapMeasure(CAMERA, **photos, **sides, unusable_fraction=0.042)  # type: ignore[arg-type]
     assert overlap_lines(lost)[2] == "overlap not judged on 4 % of the lines' length, where no photo can be used"
+    # A camera that takes one photo per second takes none closer together, whatever the distance in the items.
+    slow = overlap_lines(OverlapMeasure(CAMERA, **photos, is_camera_limited=True))[0]  # type: ignore[arg-type]
+    assert slow.endswith("is required. The camera is too slow for the distance between photos: one every 1 s, or 75 m")
     unknown = Camera(CAMERA.across, CAMERA.along, 0.3, 0.2)
     assert not any("sampling" in text for text in overlap_lines(OverlapMeasure(unknown, **photos)))  # type: ignore[arg-type]
 
