@@ -203,7 +203,8 @@ class ReturnsAnswer:
     starts_too_low: int
     """Number of returns that begin where the flight itself is below the required height; they are not safe."""
     no_return: str
-    """Point of no return by energy: never, at once or later (no_return_s); if unknown, battery, used or arrives."""
+    """Point of no return by energy: never, at once or later (no_return_s); if unknown, battery, used, power, arrives or
+    not flown."""
     no_return_s: float | None
     engine_out: GlidesEntry
     suggestions: list[ReturnSuggestion]
