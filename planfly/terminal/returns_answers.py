@@ -136,7 +136,7 @@ class GlideEntry:
     """Outcome of the autopilot's own return without thrust: arrives, low, ground, threat, unknown or not flown."""
     own_target: str
     own_over_m: float | None
-    """Height above ground of the autopilot's return at its target, m; null if it does not arrive."""
+    """Height above ground of the autopilot's return over its target, m; null if it does not get there."""
     own_short_m: float | None
     """Distance of the touchdown of the autopilot's return from its target, m; null if it does not come down."""
     text: str
@@ -173,7 +173,7 @@ class GlidesEntry:
     nothing: int
     unknown: int
     own_arrives: int
-    """Number of places from which the autopilot's return without thrust arrives."""
+    """Number of places from which the autopilot's return without thrust arrives over its target, 30 m high or higher."""
     ranges: list[GlideEntry]
 
 
