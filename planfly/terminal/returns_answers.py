@@ -173,7 +173,7 @@ class GlidesEntry:
     nothing: int
     unknown: int
     own_arrives: int
-    """Number of places from which the autopilot's return without thrust arrives over its target, 30 m high or higher."""
+    """Number of places from which the autopilot's own return arrives over its target, at margin_m or higher."""
     ranges: list[GlideEntry]
 
 
