@@ -245,13 +245,16 @@ def choose_target(
     if 0.0 < rules.rally_limit < distance:
         reason = (
             f"{name}, the nearest, is {_distance_text(distance)} away,"
-            f" beyond RALLY_LIMIT_KM {rules.rally_limit / 1000.0:g}"
+            f" {_distance_text(distance - rules.rally_limit)} beyond RALLY_LIMIT_KM {rules.rally_limit / 1000.0:g}"
         )
         return home_target._replace(reason=reason)
     if rules.includes_home and home_target.distance <= distance:
         parameter_text = "" if rules.holds_height else " (RALLY_INCL_HOME 1)"
+        # Distances that round to the same text differ in the reason.
+        nearer_by = distance - home_target.distance
+        nearer_text = f"{_distance_text(nearer_by)} nearer than" if nearer_by >= 0.5 else "as near as"
         return home_target._replace(
-            reason=f"nearer than {name}, which is {_distance_text(distance)} away{parameter_text}"
+            reason=f"{nearer_text} {name}, which is {_distance_text(distance)} away{parameter_text}"
         )
     rally_text = f"of {len(rally)} rally points" if len(rally) > 1 else "rally point"
     return rally_target(rules, start, rally[index])._replace(name=name, reason=f"the nearest {rally_text}")

@@ -136,7 +136,7 @@ class GlideEntry:
     """Outcome of the autopilot's own return without thrust: arrives, low, ground, threat, unknown or not flown."""
     own_target: str
     own_over_m: float | None
-    """Height above ground of the autopilot's return at its target, m; null if it does not arrive."""
+    """Height above ground of the autopilot's return over its target, m; null if it does not get there."""
     own_short_m: float | None
     """Distance of the touchdown of the autopilot's return from its target, m; null if it does not come down."""
     text: str
@@ -173,7 +173,7 @@ class GlidesEntry:
     nothing: int
     unknown: int
     own_arrives: int
-    """Number of places from which the autopilot's return without thrust arrives."""
+    """Number of places from which the autopilot's own return arrives over its target, at margin_m or higher."""
     ranges: list[GlideEntry]
 
 
@@ -203,7 +203,8 @@ class ReturnsAnswer:
     starts_too_low: int
     """Number of returns that begin where the flight itself is below the required height; they are not safe."""
     no_return: str
-    """Point of no return by energy: never, at once or later (no_return_s); if unknown, battery, used or arrives."""
+    """Point of no return by energy: never, at once or later (no_return_s); if unknown, battery, used, power, arrives or
+    not flown."""
     no_return_s: float | None
     engine_out: GlidesEntry
     suggestions: list[ReturnSuggestion]

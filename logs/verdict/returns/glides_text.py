@@ -56,7 +56,10 @@ def glides_headline(glides: Glides) -> str:
         follows_text = ", which would follow the terrain," if glides.follows_terrain else " without the engine"
         own_text = f"{glides.autopilot}'s own return{follows_text} is not simulated"
     else:
-        own_text = f"{glides.autopilot}'s own return arrives from {glides.arrivals}"
+        own_text = f"{glides.autopilot}'s own return arrives over its target from {glides.arrivals}"
+        if glides.unexpected_arrivals:
+            search_text = "where the search, which is pessimistic, does not reach its target"
+            own_text += f" ({glides.unexpected_arrivals} of them {search_text})"
     return f"{reach_text}; {own_text}"
 
 
@@ -121,9 +124,12 @@ def _own_return_text(glide: Glide, glides: Glides) -> str:
             return f"{own_text} arrives over {name}"
         case "low":
             min_height = min(glide.own_return.arrival_height, glide.own_return.clearance)
-            return f"{own_text} descends to {min_height:.0f} m above ground, below the required {MARGIN:.0f} m"
+            height_text = f"{min_height:.0f} m above ground on its way to {name}"
+            return f"{own_text} descends to {height_text}, below the required {MARGIN:.0f} m"
         case "ground":
-            return f"{own_text} comes down {glide.own_return.shortfall / 1000.0:.1f} km from {name}"
+            shortfall = glide.own_return.shortfall
+            distance_text = f"{shortfall / 1000.0:.1f} km" if shortfall >= 1000.0 else f"{shortfall:.0f} m"
+            return f"{own_text} comes down {distance_text} from {name}"
         case "threat":
             return f"{own_text} enters a missile's sphere"
         case "unknown":
@@ -142,6 +148,13 @@ def glide_notes(glides: Glides) -> list[str]:
         "missiles' spheres, but may cross zones",
         "flat ground is found in the elevation file, which contains no trees, houses or water",
     ]
+    if glides.unexpected_arrivals:
+        notes.append(
+            f"the best glide is searched on a map of {glides.cell:.0f} m cells, each as high as its highest ground, and"
+            f" without the height that excess airspeed gives; {glides.autopilot}'s own return is simulated over the"
+            " ground itself and with this height, so it also arrives from some positions from which the search does not"
+            " reach its target"
+        )
     if glides.fuel:
         notes.append("glides are flown with the throttle closed, because the drag of a stopped engine is unknown")
     return notes

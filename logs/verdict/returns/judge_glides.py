@@ -23,9 +23,11 @@ from logs.verdict.returns.glide_footprint import GlideFootprint
 from logs.verdict.returns.glide_map import (
     Cells,
     GlideMap,
+    GlideSlopes,
     PossibleWinds,
     exclude_zones,
     glide_slopes,
+    glide_steps,
     landable_cells,
     make_glide_map,
     search_glide_altitudes,
@@ -45,6 +47,9 @@ _MAX_GLIDE_TIME_S = 600.0
 # Number of samples of a forecast's wind to the east, to the north and in time, around the flight and its destinations.
 _WIND_SAMPLES = (9, 9, 5)
 
+# Glide slope that stands for no progress against the wind, m/m.
+_STEEPEST_SLOPE = 1e3
+
 _NO_POSITION = (math.nan, math.nan, math.nan)
 
 SiteKind = Literal["home", "rally", "landing"]
@@ -52,9 +57,9 @@ SiteKind = Literal["home", "rally", "landing"]
 # ground; nothing; or unknown, because the aircraft is beyond the elevation data.
 Reach = Literal["home", "site", "flat", "nothing", "unknown"]
 REACHES: tuple[Reach, ...] = ("home", "site", "flat", "nothing", "unknown")
-# Outcome of the autopilot's own return without thrust: at its target; at its target, but lower above ground than
-# `MARGIN`; ground impact; in a kill sphere; off the elevation data; or not simulated, because it would follow the
-# terrain, or because the autopilot's return without thrust is not known.
+# Outcome of the autopilot's own return without thrust: over its target; over its target, but lower above ground than
+# `MARGIN` there or before; ground impact short of its target; in a kill sphere; off the elevation data; or not
+# simulated, because it would follow the terrain, or because the autopilot's return without thrust is not known.
 EngineOutEnd = Literal["arrives", "low", "ground", "threat", "unknown", "not flown"]
 # Reason why no glide is judged: there is no elevation file; the model has no trim with the throttle closed; or the
 # mission is too large for a map.
@@ -77,6 +82,8 @@ class GlideSite(NamedTuple):
 @dataclass(frozen=True, slots=True)
 class EngineOutReturn:
     """The autopilot's return to launch without thrust.
+
+    It is simulated up to its arrival radius, and continues from there with a straight glide to its target.
 
     target: destination of the return.
     end: outcome.
@@ -174,6 +181,11 @@ class Glides:
         return sum(glide.own_return.end == "arrives" for glide in self.each)
 
     @property
+    def unexpected_arrivals(self) -> int:
+        """Number of the autopilot's own returns that arrive although the search reaches only flat ground or nothing."""
+        return sum(glide.own_return.end == "arrives" and glide.reach in ("flat", "nothing") for glide in self.each)
+
+    @property
     def always_reaches_ground(self) -> bool | None:
         """True if a glide from every start reaches ground on which a landing is possible; None if unknown."""
         if self.count("nothing"):
@@ -243,7 +255,6 @@ def judge_glides(world: ReturnWorld, starts: ReturnStarts) -> Glides:
     grid = make_glide_map(terrain, positions, MARGIN, environment.spheres, environment.radii)
     if grid is None:
         return replace(no_glides, not_judged="far")
-    engine_out_returns = _simulate_engine_out_returns(world, starts)
     bank, max_altitude = float(world.autopilot.turns.max_bank), float(rows["up"].max())
     min_ground_altitude = float(np.nanmin(grid.ground)) if np.isfinite(grid.ground).any() else 0.0
     top_altitude = max(max_altitude, min_ground_altitude + 1.0)
@@ -256,6 +267,7 @@ def judge_glides(world: ReturnWorld, starts: ReturnStarts) -> Glides:
         lefts, reached_cells = remaining_glide_altitudes(rows, altitudes, aircraft, environment, airspeed, bank)
         return lefts, reached_cells, altitudes.min_altitude
 
+    engine_out_returns = _simulate_engine_out_returns(world, starts, slopes)
     # One search for home, and one for all other sites, which finds the best of them for each start.
     site_cells = np.array([grid.cell_at(site.east, site.north) for site in sites])
     home_altitudes_left, _, home_min_altitudes = search_glides_to(site_cells[:1])
@@ -328,7 +340,9 @@ def _flat_ground(world: ReturnWorld, grid: GlideMap) -> Flags:
 # The autopilot's own return.
 
 
-def _simulate_engine_out_returns(world: ReturnWorld, starts: ReturnStarts) -> list[EngineOutReturn]:
+def _simulate_engine_out_returns(
+    world: ReturnWorld, starts: ReturnStarts, slopes: GlideSlopes
+) -> list[EngineOutReturn]:
     """Simulate the autopilot's own return without thrust from each start.
 
     Nothing is simulated if returns follow the terrain, or if the autopilot's return without thrust is not known: each
@@ -338,8 +352,11 @@ def _simulate_engine_out_returns(world: ReturnWorld, starts: ReturnStarts) -> li
     if not world.is_simulated or not world.autopilot.returns.flies_without_engine:
         return [EngineOutReturn(target, "not flown", math.nan, math.nan, _NO_POSITION, math.nan) for target in targets]
     # A return that continues with a landing is simulated only up to its loiter.
-    outcomes = world.fly(starts.rows, targets, engine_out=True).results
-    return [_engine_out_return(world, target, row) for target, row in zip(targets, outcomes, strict=True)]
+    flown = world.fly(starts.rows, targets, store_positions=True, engine_out=True)
+    return [
+        _engine_out_return(world, target, row, track[-1], slopes)
+        for target, row, track in zip(targets, flown.results, flown.tracks, strict=True)
+    ]
 
 
 def _possible_winds(scenario: Scenario, positions: Floats, times: Floats) -> PossibleWinds:
@@ -361,23 +378,49 @@ def _possible_winds(scenario: Scenario, positions: Floats, times: Floats) -> Pos
     return winds_at
 
 
-def _engine_out_return(world: ReturnWorld, target: ReturnTarget, result: Record) -> EngineOutReturn:
-    """Convert a result of a return without thrust (dtype `RETURN_RESULT`) to an `EngineOutReturn`."""
-    clearance = float(result["clearance_before_arrival"])
-    arrival_height, shortfall, impact = math.nan, math.nan, _NO_POSITION
-    if result["outcome"] == RETURN_ARRIVED and world.scenario.terrain is not None:
-        arrival_height = float(result["arrival_altitude"] - world.scenario.terrain.height(*target.position[:2]))
+def _engine_out_return(
+    world: ReturnWorld, target: ReturnTarget, result: Record, last_position: Floats, slopes: GlideSlopes
+) -> EngineOutReturn:
+    """Convert a result of a return without thrust (dtype `RETURN_RESULT`) to an `EngineOutReturn`.
+
+    last_position: last stored position of the simulation, m, (3,); from there an arriving return glides to its target.
+    """
+    clearance, sphere_distance = float(result["clearance_before_arrival"]), float(result["sphere_distance"])
+    arrival_height, impact = math.nan, _NO_POSITION
     if result["outcome"] == RETURN_GROUND_IMPACT:
         impact = (float(result["clearance_east"]), float(result["clearance_north"]), float(result["clearance_up"]))
-        shortfall = math.dist(impact[:2], target.position[:2])
-    if result["outcome"] == RETURN_GROUND_IMPACT:
-        end: EngineOutEnd = "ground"
-    elif result["sphere_distance"] <= 0.0:
-        end = "threat"
+    elif result["outcome"] == RETURN_ARRIVED and world.scenario.terrain is not None:
+        path = _glide_straight(last_position, target, slopes)
+        heights = path[:, 2] - world.scenario.terrain.height(path[:, 0], path[:, 1])
+        clearance, arrival_height = min(clearance, float(heights.min())), float(heights[-1])
+        for sphere, radius in zip(world.environment.spheres, world.environment.radii, strict=True):
+            if radius > 0.0:
+                sphere_distance = min(sphere_distance, float(np.linalg.norm(path - sphere, axis=1).min() - radius))
+        if heights.min() <= 0.0:
+            east, north, up = path[int(np.argmax(heights <= 0.0))]
+            impact, arrival_height = (float(east), float(north), float(up)), math.nan
+    shortfall = math.dist(impact[:2], target.position[:2])
+    if sphere_distance <= 0.0 and result["outcome"] != RETURN_GROUND_IMPACT:
+        end: EngineOutEnd = "threat"
+    elif not math.isnan(shortfall):
+        end = "ground"
     else:
         end = (
             "unknown"
-            if result["outcome"] != RETURN_ARRIVED
+            if result["outcome"] != RETURN_ARRIVED or math.isnan(arrival_height)
             else ("arrives" if min(clearance, arrival_height) >= MARGIN else "low")
         )
     return EngineOutReturn(target, end, arrival_height, clearance, impact, shortfall)
+
+
+def _glide_straight(position: Floats, target: ReturnTarget, slopes: GlideSlopes) -> Floats:
+    """Return a straight glide from a position, m, (3,), to a return's target: one position about each meter, (n, 3)."""
+    offset = np.array(target.position[:2]) - position[:2]
+    courses = np.array(glide_steps()[0]["course"])
+    course = int(np.argmax(np.cos(courses - math.atan2(offset[0], offset[1]))))
+    row = round((float(position[2]) - slopes.first_altitude) / slopes.altitude_step)
+    # Without progress against the wind, the aircraft sinks where it is.
+    slope = min(float(slopes.table[course, min(max(row, 0), slopes.table.shape[1] - 1)]), _STEEPEST_SLOPE)
+    distance = float(np.hypot(*offset))
+    fractions = np.linspace(0.0, 1.0, math.ceil(distance) + 1)
+    return np.asarray(position + fractions[:, np.newaxis] * np.array([*offset, -slope * distance]))

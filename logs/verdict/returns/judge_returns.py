@@ -157,8 +157,8 @@ class ReturnRange:
 
 # Kind of the point of no return by energy: none ("never"); after some start ("later"); before the first start ("at
 # once"); or unknown, because the battery is unknown, because the energy used is unknown, because the aircraft's power
-# is too uncertain, or because no return arrives.
-NoReturnKind = Literal["never", "later", "at once", "battery", "used", "power", "arrives"]
+# is too uncertain, because no return arrives, or because no return was simulated ("not flown").
+NoReturnKind = Literal["never", "later", "at once", "battery", "used", "power", "arrives", "not flown"]
 
 
 class PointOfNoReturn(NamedTuple):
@@ -253,7 +253,9 @@ class Returns:
     def point_of_no_return(self) -> PointOfNoReturn:
         """Point of no return by energy, for RTL; returns that do not arrive are ignored."""
         last_time, min_energy_left, skipped_count = math.nan, math.inf, 0
-        if not self.each or all(math.isnan(ret.energy_left) for ret in self.each):
+        if not self.each:
+            return PointOfNoReturn("not flown")
+        if all(math.isnan(ret.energy_left) for ret in self.each):
             return PointOfNoReturn("used" if any(ret.kind == "used" for ret in self.each) else "battery")
         if any(ret.kind == "power" for ret in self.each) and not any(ret.kind == "energy" for ret in self.each):
             return PointOfNoReturn("power")

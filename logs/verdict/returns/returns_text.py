@@ -224,7 +224,7 @@ def point_of_no_return_text(returns: Returns) -> str:
     """Describe the point of no return: after it, a return no longer leaves the battery's reserve.
 
     >>> point_of_no_return_text(Returns((), 1.0, (), 60.0, None, 0.0, True))
-    'point of no return by energy: not judged, because the battery energy is unknown'
+    'point of no return by energy: not judged, because no return was simulated'
     """
     point, name = returns.point_of_no_return, "point of no return by energy"
     reserve = f"the reserve of {quantity_text(returns.reserve, 'Wh')}"
@@ -237,6 +237,8 @@ def point_of_no_return_text(returns: Returns) -> str:
             return f"{name}: not judged, because the power of the aircraft is uncertain"
         case "arrives":
             return f"{name}: not judged, because no return arrives"
+        case "not flown":
+            return f"{name}: not judged, because no return was simulated"
         case "at once":
             text = f"{name}: before the start, because no return leaves {reserve}"
         case "later":

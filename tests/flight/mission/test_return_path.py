@@ -72,14 +72,13 @@ def test_the_height_of_a_rally_point_may_be_counted_from_the_sea_for_the_slope()
 def test_why_it_goes_there_is_said() -> None:
     far = choose_target(ReturnRules(rally_limit=1900.0), (0.0, 6000.0, 900.0), HOME, RALLY)
     assert rtl_note(far, ReturnRules(), 900.0) == (
-        "NAV_RETURN_TO_LAUNCH returns to home, 6.0 km away (rally point 1, the nearest, is 2.0 km away, beyond"
-        " RALLY_LIMIT_KM"
-        " 1.9), descending 500 m on a straight slope to 400 m AMSL; the simulated flight ends after 60 s"
-        " of the loiter there"
+        "NAV_RETURN_TO_LAUNCH returns to home, 6.0 km away (rally point 1, the nearest, is 2.0 km away, 100 m"
+        " beyond RALLY_LIMIT_KM 1.9), descending 500 m on a straight slope to 400 m AMSL;"
+        " the simulated flight ends after 60 s of the loiter there"
     )
     climb = choose_target(ReturnRules(includes_home=True), (0.0, 1500.0, 380.0), HOME, RALLY)
     told = rtl_note(climb, ReturnRules(initial_climb=50.0), 380.0)
-    assert "nearer than rally point 1, which is 2.5 km away (RALLY_INCL_HOME 1)" in told
+    assert "1.0 km nearer than rally point 1, which is 2.5 km away (RALLY_INCL_HOME 1)" in told
     first = "banks no more than 5 degrees before it has climbed 50 m, even above that height;"
     assert f"climbing 20 m at once to 400 m AMSL; {first}" in told
     assert f"descending 500 m on a straight slope to 400 m AMSL; {first}" in rtl_note(
@@ -91,6 +90,19 @@ def test_why_it_goes_there_is_said() -> None:
     for up in (399.6, 400.0, 400.4):
         level = rtl_note(climb, ReturnRules(initial_climb=math.inf), up)
         assert "at 400 m AMSL; banks no more than 5 degrees until it is above that height;" in level
+
+
+@pytest.mark.parametrize(
+    ("north", "text"),
+    [
+        # Between home and rally point 1, 4 km from home: the distances differ by 2 * 17 m = 34 m, and by 0.4 m.
+        (1983.0, "home, 2.0 km away (34 m nearer than rally point 1, which is 2.0 km away"),
+        (1999.8, "home, 2.0 km away (as near as rally point 1, which is 2.0 km away"),
+    ],
+)
+def test_distances_that_round_to_the_same_text_are_told_apart(north: float, text: str) -> None:
+    rules = ReturnRules(includes_home=True)
+    assert text in rtl_note(choose_target(rules, (0.0, north, 900.0), HOME, RALLY), rules, 900.0)
 
 
 # ----------------------------------------------------------------------

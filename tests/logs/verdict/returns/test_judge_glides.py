@@ -106,6 +106,29 @@ def test_arduplanes_own_return_ends_where_its_law_says(tmp_path: Path) -> None:
     assert all(one.home_altitude_left > -25.0 for one in found.each if one.own_return.end == "arrives")
 
 
+def test_a_return_that_comes_down_short_of_home_is_no_arrival(tmp_path: Path) -> None:
+    """At 150 m, flying away: 8 m and 60 m are lost as above, and (25^2 - 18^2) / 2 g = 15 m are gained by slowing."""
+    found = judged(hill_setup(tmp_path, mission=mission_text(0.0, 2000.0, amsl=150.0)), 1.0)
+    away = [one for one in found.each if one.start[0] > 300.0]
+    short = [one for one in away if one.own_return.end == "ground"]
+    assert short[0].start[0] == pytest.approx((150.0 - 8.0 - 60.0 + 15.0) * RATIO - 78.0, abs=150.0)
+    # A start is 25.1 m farther each second, at 25 m/s of equivalent airspeed, and so is the place where it comes down.
+    shortfalls = [one.own_return.shortfall for one in short[:12]]
+    assert shortfalls[0] < 25.1 + 10.0
+    assert np.diff(shortfalls) == pytest.approx(25.1, abs=10.0)
+    # 30 m of height are 30 * 10.6 m of way.
+    last = max(one.start[0] for one in away if one.own_return.end == "arrives")
+    assert short[0].start[0] - last == pytest.approx(30.0 * RATIO, abs=60.0)
+    assert all(0.0 < one.own_return.arrival_height < 30.0 for one in away if last < one.start[0] < short[0].start[0])
+    # The search does not count the 15 m, and the headline and the note say so.
+    beyond = sum(one.reach == "flat" for one in found.each if one.own_return.end == "arrives")
+    assert beyond > 0
+    assert f" ({beyond} of them where the search, which is pessimistic," in glides_headline(found)
+    assert any("without the height that excess airspeed gives" in note for note in glide_notes(found))
+    texts = [glide_range_text(group, found) for group in found.ranges if group.lowest_glide.own_return.end == "ground"]
+    assert any(f"comes down {one.own_return.shortfall:.0f} m from home" in text for one in short for text in texts)
+
+
 def test_a_sphere_on_the_way_home_stops_its_own_return_and_is_flown_around(tmp_path: Path) -> None:
     threat = (
         '[[threats]]\nname = "post"\neast_m = 900\nnorth_m = 0\namsl_m = 350\nkill_radius_m = 150\nkill_scale_m = 50\n'

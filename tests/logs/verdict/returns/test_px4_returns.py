@@ -23,7 +23,7 @@ from logs.verdict.returns.judge_returns import (
     make_return_world,
 )
 from logs.verdict.returns.return_starts import ReturnStarts, planned_starts
-from logs.verdict.returns.returns_text import describe_causes, describe_landing, headline
+from logs.verdict.returns.returns_text import describe_causes, describe_landing, headline, point_of_no_return_text
 from logs.verdict.returns.suggest_returns import suggest_parameters, suggest_rally_points
 from planfly.rtl.jsbsim_returns import fly_return
 from tests.logs.verdict.returns.hill import DEGREE, HEAD, hill_setup, mission_text
@@ -223,6 +223,7 @@ def test_what_is_not_simulated_is_named_and_not_judged(
         mission = HEAD + row(1, 16, 5000.0, 200.0) + row(2, 16, 6500.0, 200.0) + row(3, 189) + row(4, 21, 700.0)
     found = judged(tmp_path, f"RTL_RETURN_ALT 450\n{stated}", mission)
     assert bool(found.each) is is_simulated
+    assert ("because no return was simulated" in point_of_no_return_text(found)) is not is_simulated
     assert not found.safe
     assert found.undecided or mission.count("\t21\t")
     assert said in headline(found)
