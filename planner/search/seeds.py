@@ -391,6 +391,9 @@ def _search_lattices(
         # If memory limits the step, a smaller step gives the same lattice again.
         if remaining_states <= 0 or search.must_end() or lattices[index] in lattices[:index]:
             break
+        # If no path along a coarse route is safe, a guided search finds a finer route with fewer states.
+        if index and not is_guided and len(search.lattice_routes[0, False][0]) and not search.meets_goal(best[1]):
+            break
         key = index, is_guided
         try:
             if key not in search.lattice_routes:

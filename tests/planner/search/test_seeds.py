@@ -162,11 +162,19 @@ def test_searches_with_other_numbers_of_waypoints_share_the_routes_over_lattices
         counts.append(search.encoding.waypoints)
         search.evaluate(search.straight_vectors())
 
+    tried_counts: list[int] = []
+
+    def record_turning_back(search: Search, best: tuple[Floats, Certificate]) -> tuple[Floats, Certificate]:
+        tried_counts.append(search.encoding.waypoints)
+        return search_turning_back(search, best)
+
     monkeypatch.setattr(seeds_module, "lattice_route", record_search)
     monkeypatch.setattr(plan_path_module, "_run_attempt", record_attempt)
+    monkeypatch.setattr(plan_path_module, "search_turning_back", record_turning_back)
     assert not plan_path(scenario, make_limits(scenario), seed=1).safe
-    # Two attempts with the default number of waypoints, one with more.
-    assert counts == [DEFAULT_WAYPOINTS, DEFAULT_WAYPOINTS, MORE_WAYPOINTS]
+    # Two attempts with the default number of waypoints; with more, only the routes over lattices are followed.
+    assert counts == [DEFAULT_WAYPOINTS, DEFAULT_WAYPOINTS]
+    assert tried_counts == [DEFAULT_WAYPOINTS, MORE_WAYPOINTS]
     assert len(searched) == len(set(searched)) == 2
 
 
