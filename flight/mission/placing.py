@@ -125,7 +125,7 @@ def place_stops(
     >>> items = [MissionItem(k, Command.NAV_WAYPOINT, Frame.GLOBAL, (0.0,) * 4, 36.5, 8.0, 700.0) for k in (1, 2)]
     >>> placed = place_stops(Mission(None, tuple(items)), GeoOrigin(36.5, 8.0), None)
     >>> len(placed.stops), placed.notes
-    (1, ('item 2: same position as item 1, merged with it',))
+    (1, ('item 2: merged with item 1, which has the same position',))
     """
     notes = Notes()
     if itinerary is None:

@@ -150,7 +150,7 @@ def test_a_number_of_flights_that_was_changed_is_said_to_be(base: CampaignBase, 
     keep(base, tmp_path, range(3))
     more = resumed_goal(Goal(None, False, 6), tmp_path)
     assert more.changed
-    assert "changed" in more.method
+    assert "changed" in more.bound_method
     assert "changed" not in Goal(None, False, 6).bound_method
     with open_store(base, more, tmp_path, resume=True):
         pass

@@ -197,7 +197,7 @@ def test_a_return_to_a_landing_stays_below_rtl_return_alt_by_nav_fw_alt_rad(tmp_
         # Behind the hill, which is 400 m high; the circles are left at other places, which moves the paths over it.
         heights = [min(one.clearance for one in found.each if one.start[0] > 4500.0) for found in (near, far)]
         assert heights[0] - heights[1] == pytest.approx(lower_m, abs=8.0)
-    assert "to the loiter of a landing sequence up to NAV_FW_ALT_RAD (40 m) lower" in describe_landing(far)[-1]
+    assert "Before a landing sequence, the climb may end up to NAV_FW_ALT_RAD (40 m) below" in describe_landing(far)[-1]
 
 
 @pytest.mark.parametrize(
