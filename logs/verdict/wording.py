@@ -1,7 +1,6 @@
 """Describe places, changes and disagreements in texts that no code of planfly parses."""
 
 import math
-import re
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -36,7 +35,20 @@ _MAX_STATEMENT_LENGTH = 80
 # Minimum length of a clause that can replace its statement, characters.
 _MIN_CLAUSE_LENGTH = 30
 # End of a clause within a statement.
-_CLAUSE_END = re.compile(r"[.;:] | \(|,? (?:but|because|so that) |, (?:so|and|which|while|where) ")
+_CLAUSE_ENDS = (
+    ". ",
+    "; ",
+    ": ",
+    " (",
+    " but ",
+    " because ",
+    " so that ",
+    ", so ",
+    ", and ",
+    ", which ",
+    ", while ",
+    ", where ",
+)
 
 
 def place_text(place: Place) -> str:
@@ -445,7 +457,7 @@ def shorten_statement(statement: str) -> str:
     """
     if len(statement) <= _MAX_STATEMENT_LENGTH:
         return statement
-    clauses = [statement[: end.start()] for end in _CLAUSE_END.finditer(statement)]
+    clauses = [statement[:k].rstrip(",") for k in range(len(statement)) if statement.startswith(_CLAUSE_ENDS, k)]
     # A short clause, such as "not started", only introduces the statement, and a bracket is not cut.
     clauses = [
         clause for clause in clauses if len(clause) >= _MIN_CLAUSE_LENGTH and clause.count("(") == clause.count(")")
