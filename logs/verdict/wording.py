@@ -34,7 +34,7 @@ FLOWN_COUNTERPARTS = {"landing": "touchdown"}
 _MAX_STATEMENT_LENGTH = 80
 # Minimum length of a clause that can replace its statement, characters.
 _MIN_CLAUSE_LENGTH = 30
-# End of a clause within a statement.
+# Beginnings of what may follow a clause within a statement.
 _CLAUSE_ENDS = (
     ". ",
     "; ",
