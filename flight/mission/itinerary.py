@@ -892,9 +892,7 @@ class _ItineraryBuilder:
         elif speed_type == 1.0:
             # The airspeed is unchanged.
             self.min_ground_speed = 0.0 if math.isnan(speed) else speed
-            notes.add(
-                f"DO_CHANGE_SPEED of the ground speed sets MIN_GROUNDSPEED to {self.min_ground_speed:g} m/s", item.seq
-            )
+            notes.add(f"DO_CHANGE_SPEED (ground speed) sets MIN_GROUNDSPEED to {self.min_ground_speed:g} m/s", item.seq)
         elif speed == -2.0:
             self.airspeed = math.nan
         elif speed > 0.0:

@@ -137,9 +137,7 @@ def new_aircraft(
         copy_aircraft_folder(Path(folder), source_aircraft, model, overwrite=overwrite)
         return find_aircraft(str(Path(folder).absolute()))
     if source is not None:
-        reason = (
-            f"cannot be combined with `{next(iter(sheet_values))}`, because a copy keeps the numbers of its aircraft"
-        )
+        reason = f"cannot be combined with `{next(iter(sheet_values))}`, because a copy keeps the original's values"
         raise PlanflyError.of_argument("source", source, reason)
     from planfly.workflow.data_sheets import make_data_sheet_folder, parse_sheet
 

@@ -683,7 +683,10 @@ def _find_finals(
         flown_slope = final_model.slope(height, length, tailwind, field_altitude)
         if flown_slope > max_slope:
             flown_deg, max_deg = math.degrees(math.atan(flown_slope)), math.degrees(math.atan(max_slope))
-            fault = f"the approach needs a glide of {flown_deg:.1f}°, but the aircraft can fly at most {max_deg:.1f}°"
+            fault = (
+                f"the approach needs a descent angle of {flown_deg:.1f}°, but the steepest that the aircraft can fly is"
+                f" {max_deg:.1f}°"
+            )
             best_rejected = max(best_rejected, (-1e6, fault))
             continue
         # Start of the line-up leg and start of the glide.

@@ -291,7 +291,7 @@ def _air_start_finding(place: Place, obstacles: _Obstacles) -> Finding:
         ok = True
     else:
         subject = f"the flight starts in the air, but a straight climb from home to {_item_text(place)}"
-        fault = obstacles.obstacle_message(subject, "from home", " even at the steepest climb")
+        fault = obstacles.obstacle_message(subject, "from home", " even at the maximum climb angle")
         return _path_finding("climbout", place, obstacles, ok=None, outcome=fault, check=GROUND_PATH)
     return _path_finding("climbout", place, obstacles, ok, message(reason), check)
 
@@ -321,7 +321,7 @@ def _launch_finding(
         return _path_finding("climbout", place, obstacles, ok=None, outcome=reason)
     is_certain, end_height = certain_slope == steepest.slope, start[2] - start[1]
     if not obstacles.is_clear:
-        fault = obstacles.obstacle_message(subject, "from home", " even at the steepest climb")
+        fault = obstacles.obstacle_message(subject, "from home", " even at the maximum climb angle")
         climb_text = _climb_text(steepest, launch, item_text, end_height)
         text = f"{fault.text}. {climb_text}. {_clear_courses_text(requirements, *start)}"
         fault = replace(fault, text=text)

@@ -33,7 +33,7 @@ def test_speeds_count_for_the_legs_after_them() -> None:
     assert np.array_equal(flown.points["min_ground_speed"], [math.nan] * 3 + [28.0] * 4, equal_nan=True)
     assert flown.notes == (
         "item 5: DO_CHANGE_SPEED's throttle is ignored",
-        "item 5: DO_CHANGE_SPEED of the ground speed sets MIN_GROUNDSPEED to 28 m/s",
+        "item 5: DO_CHANGE_SPEED (ground speed) sets MIN_GROUNDSPEED to 28 m/s",
         "item 6: DO_CHANGE_SPEED of type 2, neither airspeed nor ground speed, is ignored",
         "item 12: DO_CHANGE_SPEED to 0 m/s is ignored",
     )

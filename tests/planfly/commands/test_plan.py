@@ -85,5 +85,5 @@ def test_a_landing_that_cannot_be_flown_is_said_and_ends_with_4(
         file.write_text(FIELD.format(slope=slope), encoding="utf-8")
         assert main(["plan", str(file), "--out", str(out), "--overwrite"]) == code
         text = capsys.readouterr().out
-        assert ("failed  landing: on a course of 0°, the approach needs a glide of 12" in text) is (code == 4)
+        assert ("failed  landing: on a course of 0°, the approach needs a descent angle of 12" in text) is (code == 4)
         assert ("descent" in json.loads(out.read_text())["ground_ways"]) is (code == 0)

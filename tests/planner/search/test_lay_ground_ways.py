@@ -294,7 +294,7 @@ def test_a_stated_final_is_kept_and_one_that_is_too_steep_is_named() -> None:
     for slope, ok in ((most - 0.05, True), (most + 0.05, False)):
         tried = laid(landing=stated | {"slope_deg": slope})
         assert tried.feasible is ok, slope
-    assert "the approach needs a glide of" in tried.certificate.problems[0]
+    assert "the approach needs a descent angle of" in tried.certificate.problems[0]
 
 
 # The share of the steepest dive that a glide takes.

@@ -84,7 +84,7 @@ def test_the_way_to_the_first_waypoint_is_left_open_where_a_wall_stands_in_it() 
         verdict.headline
         == "not judged in full: the flight starts in the air, but a straight climb from home to item 1 hits the ground"
     )
-    assert into_it.reason.endswith(" even at the steepest climb: 1000 m from home it is 2 m below the surface")
+    assert into_it.reason.endswith(" even at the maximum climb angle: 1000 m from home it is 2 m below the surface")
 
 
 def test_beyond_the_climb_the_way_to_the_first_waypoint_is_level() -> None:
@@ -126,7 +126,7 @@ def test_a_take_off_into_a_wall_fails_and_one_that_only_its_steepest_climb_clear
     assert "the climb from home towards item 2 hits the ground" in verdict.headline
     assert failed.planned == pytest.approx(-30.0, abs=0.5)
     assert (
-        " even at the steepest climb: 500 m from home it is 30 m below the surface. The climb angle is 14.1°. A "
+        " even at the maximum climb angle: 500 m from home it is 30 m below the surface. The climb angle is 14.1°. A "
     ) in failed.reason
 
 
