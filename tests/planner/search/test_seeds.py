@@ -40,6 +40,9 @@ from world.scenario_tables import PlannerTable
 FLAT = {"kind": "flat", "amsl_m": 0}
 GRIDS = ((24, 2),)
 
+# Step (m), whether the search is guided, and maximum number of states of a search of a lattice.
+LatticeCall = tuple[float, bool, int]
+
 
 def search_of(scenario: Scenario, limits: Limits, algorithm: str = "umda-seeded") -> Search:
     problem = make_problem(scenario, limits)
@@ -65,14 +68,8 @@ def test_one_seed_leads_and_the_archive_holds_what_it_was_improved_to(scenario: 
     assert search.archive.scores[0, 4] <= search.score(starts)[0, 4]
 
 
-@pytest.mark.parametrize(("states", "searched"), [(None, 2), (20_000, 1)])
-def test_a_lattice_that_memory_makes_the_same_is_searched_once(
-    scenario: Scenario, limits: Limits, monkeypatch: pytest.MonkeyPatch, states: int | None, searched: int
-) -> None:
-    """Where no route turns back, a lattice of smaller steps is tried; with few states allowed it is no finer."""
-    if states is not None:
-        monkeypatch.setattr(lattice_module, "MAX_LATTICE_STATES", states)
-    steps: list[float] = []
+def lattice_without_routes(searches: list[LatticeCall], expanded: int) -> Callable[..., tuple[Floats, int]]:
+    """Return a search of a lattice that notes its calls, expands so many states and finds no route."""
 
     def find_none(
         data: ProblemArrays,
@@ -83,15 +80,25 @@ def test_a_lattice_that_memory_makes_the_same_is_searched_once(
         *,
         is_guided: bool,
     ) -> tuple[Floats, int]:
-        steps.append(step)
-        assert not is_guided
-        return np.empty((0, 3)), 0
+        searches.append((step, is_guided, max_states))
+        return np.empty((0, 3)), expanded
 
-    monkeypatch.setattr(seeds_module, "lattice_route", find_none)
+    return find_none
+
+
+@pytest.mark.parametrize(("states", "searched"), [(None, 2), (20_000, 1)])
+def test_a_lattice_that_memory_makes_the_same_is_searched_once(
+    scenario: Scenario, limits: Limits, monkeypatch: pytest.MonkeyPatch, states: int | None, searched: int
+) -> None:
+    """Where no route turns back, a lattice of smaller steps is tried; with few states allowed it is no finer."""
+    if states is not None:
+        monkeypatch.setattr(lattice_module, "MAX_LATTICE_STATES", states)
+    searches: list[LatticeCall] = []
+    monkeypatch.setattr(seeds_module, "lattice_route", lattice_without_routes(searches, 0))
     search = search_of(scenario, limits)
     search.evaluate(search.straight_vectors())
     search_turning_back(search, search.best_path())
-    assert len(steps) == searched
+    assert [is_guided for _, is_guided, _ in searches] == [False] * searched
 
 
 @pytest.mark.parametrize(
@@ -107,25 +114,12 @@ def test_a_second_lattice_expands_no_more_states_than_the_first_has_left(
     scenario: Scenario, limits: Limits, monkeypatch: pytest.MonkeyPatch, seen: int, allowed: list[tuple[bool, int]]
 ) -> None:
     """Neither finds a route, and 60,000 states are for both; if that is not enough, 20,000 for guided searches."""
-    asked: list[tuple[bool, int]] = []
-
-    def find_none(
-        data: ProblemArrays,
-        frame: RotatedFrame,
-        step: float,
-        pause: Callable[[], None],
-        max_states: int,
-        *,
-        is_guided: bool,
-    ) -> tuple[Floats, int]:
-        asked.append((is_guided, max_states))
-        return np.empty((0, 3)), seen
-
-    monkeypatch.setattr(seeds_module, "lattice_route", find_none)
+    searches: list[LatticeCall] = []
+    monkeypatch.setattr(seeds_module, "lattice_route", lattice_without_routes(searches, seen))
     search = search_of(scenario, limits)
     search.evaluate(search.straight_vectors())
     search_turning_back(search, search.best_path())
-    assert asked == allowed
+    assert [(is_guided, max_states) for _, is_guided, max_states in searches] == allowed
 
 
 def test_searches_with_other_numbers_of_waypoints_share_the_routes_over_lattices(
@@ -143,20 +137,8 @@ def test_searches_with_other_numbers_of_waypoints_share_the_routes_over_lattices
     ]
     scenario = small(terrain=FLAT, zones=zones)
     scenario = replace(scenario, planner=PlannerTable(population=scenario.planner.population))
-    searched: list[tuple[float, bool]] = []
+    searches: list[LatticeCall] = []
     counts: list[int] = []
-
-    def record_search(
-        data: ProblemArrays,
-        frame: RotatedFrame,
-        step: float,
-        pause: Callable[[], None],
-        max_states: int,
-        *,
-        is_guided: bool,
-    ) -> tuple[Floats, int]:
-        searched.append((step, is_guided))
-        return np.empty((0, 3)), 100
 
     def record_attempt(search: Search, *_: object) -> None:
         counts.append(search.encoding.waypoints)
@@ -168,14 +150,14 @@ def test_searches_with_other_numbers_of_waypoints_share_the_routes_over_lattices
         tried_counts.append(search.encoding.waypoints)
         return search_turning_back(search, best)
 
-    monkeypatch.setattr(seeds_module, "lattice_route", record_search)
+    monkeypatch.setattr(seeds_module, "lattice_route", lattice_without_routes(searches, 100))
     monkeypatch.setattr(plan_path_module, "_run_attempt", record_attempt)
     monkeypatch.setattr(plan_path_module, "search_turning_back", record_turning_back)
     assert not plan_path(scenario, make_limits(scenario), seed=1).safe
     # Two attempts with the default number of waypoints; with more, only the routes over lattices are followed.
     assert counts == [DEFAULT_WAYPOINTS, DEFAULT_WAYPOINTS]
     assert tried_counts == [DEFAULT_WAYPOINTS, MORE_WAYPOINTS]
-    assert len(searched) == len(set(searched)) == 2
+    assert len(searches) == len(set(searches)) == 2
 
 
 def straight(search: Search) -> Floats:
