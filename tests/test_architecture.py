@@ -25,34 +25,12 @@ CODE = sorted(
     file for folder in (*PACKAGES, "benchmarks", "tests", "examples") for file in (ROOT / folder).rglob("*.py")
 )
 OURS = [file for file in CODE if file.relative_to(ROOT).parts[0] in PACKAGES]
-# Lines of a function.  Its statements are counted by ruff's PLR0915, and its branches by C901.
-LONGEST = 60
-# Functions that became longer when signatures and tables lost their `# fmt: skip`, or by clearer names without a
-# statement more: to be split, and not to grow.
+# Lines of a function with its docstring: two screens.  Its statements are counted by ruff's PLR0915, its branches by C901.
+LONGEST = 80
+# Functions that became longer when signatures and tables lost their `# fmt: skip`: to be split, and not to grow.
 LONGER = {
-    "flight/autopilots/arduplane/go_around_point_mass.py:fly_go_arounds": 76,
-    "flight/autopilots/arduplane/rtl_point_mass.py:fly_returns": 72,
-    "flight/autopilots/arduplane/rtl_point_mass.py:fly_stages": 78,
-    "flight/autopilots/px4/lateral.py:guide_to_path": 66,
-    "flight/guidance/path.py:fly_by_path": 74,
-    "flight/mission/loiter_circles.py:_corners_around": 68,
-    "flight/mission/route.py:route_through_stops": 67,
     "flight/simulation/simulate.py:make_loop": 98,
-    "logs/recording/reader.py:read_log": 63,
-    "logs/verdict/returns/glide_reach.py:_fill_altitudes_left": 78,
-    "logs/verdict/rules/completion_rule.py:imported_completion_finding": 64,
-    "logs/verdict/rules/climbout_approach_rule.py:approach_findings": 77,
     "logs/views/exports/log_files.py:_make_topics": 91,
-    "logs/views/profile.py:profile_chart": 64,
-    "planfly/api/drafting.py:new_scenario": 61,
-    "planner/evaluation/terrain_clearance.py:sample_terrain": 70,
-    "planner/evaluation/threat_index.py:kill_density": 73,
-    "planner/search/plan_path.py:plan_path": 67,
-    "planner/search/replan.py:replan": 73,
-    "planner/seeding/airspace_grids.py:_relax_airspace_stage": 62,
-    "planner/seeding/pattern_search.py:_continue_search": 67,
-    "tests/instrumented_flights.py:px4_topics": 70,
-    "world/scenario.py:scenario_from_spec": 64,
 }
 KERNELS = set(DECORATORS)
 INNER = {"inner", "inlined"}
@@ -232,7 +210,7 @@ def test_package_inits_hold_a_docstring_only() -> None:
         assert "import" not in text.split('"""')[2]
 
 
-def test_no_function_is_longer_than_60_lines() -> None:
+def test_no_function_is_longer_than_80_lines() -> None:
     lengths = {
         f"{name_of(file)}:{function.name}": (function.end_lineno or 0) - function.lineno + 1
         for file in CODE
