@@ -66,7 +66,16 @@ def _turn_finding(
     faults, facts, check, judged_turn = _judge_planned_turn(requirements, waypoint, limit, source)
     # With a known aircraft, the planned turn is compared with its limits, and the flown turn is only described.
     is_judged_as_planned = measure is None or bool(requirements.envelope)
-    facts += _fly_over_notes(requirements, waypoint, planned_turn)
+    radius, route = float(requirements.radius[waypoint]), requirements.setup.route
+    acceptance_radius = float(route.points["acceptance_radius"][waypoint])
+    if route.fly_over[waypoint] and acceptance_radius and math.isfinite(radius):
+        offset = fly_by_offset(planned_turn, radius)
+        if offset > acceptance_radius:
+            lateral = radius * (1.0 - math.cos(planned_turn))
+            facts.append(
+                f"flown over, because a fly-by arc would pass {offset:.0f} m away, outside the acceptance radius of"
+                f" {acceptance_radius:.0f} m; after the waypoint the turn swings up to {lateral:.0f} m off the next leg"
+            )
     angle = None if measure is None else measure.angle
     tolerance = PLAN_TOLERANCE_RAD
     if measure is not None:
@@ -81,10 +90,18 @@ def _turn_finding(
     if measure is not None and not measure.is_complete:
         facts.append(_unflown_turn_text(requirements, waypoint, measure, aligned))
         ok = None if ok is not False else False
-    method = "route"
+    method, measured_facts = "route", []
     if measure is not None:
         fit_text = "least-squares courses of both legs" if measure.is_fitted else "course change over the turn"
         method = "not flown" if measure.angle is None else fit_text
+        quantities = (
+            ("overshoot", measure.overshoot, "m"),
+            ("settled", measure.settled_distance if measure.is_complete else None, "m"),
+            ("bank", None if measure.held_bank is None else math.degrees(measure.held_bank), "deg"),
+            ("radius", measure.radius, "m"),
+            ("nearest pass", None if measure.corner is None else measure.corner.distance, "m"),
+        )
+        measured_facts = [Fact(quantity, value, unit) for quantity, value, unit in quantities if value is not None]
     return make_finding(
         "turn",
         requirements.waypoint(waypoint),
@@ -100,7 +117,7 @@ def _turn_finding(
         unit="deg",
         method=method,
         check=check if ok is None else "",
-        facts=_measured_facts(measure),
+        facts=measured_facts,
     )
 
 
@@ -151,26 +168,6 @@ def _unflown_turn_text(
         f" {active_time:.1f} s: the leg is {leg_length:.0f} m long, and a waypoint counts as reached within"
         f" {radius:.0f} m"
     )
-
-
-def _fly_over_notes(requirements: RouteRequirements, waypoint: int, turn: float) -> list[str]:
-    """Return a note if a fly-by arc would miss the acceptance radius; otherwise [].
-
-    The waypoint is then flown over.
-    turn: course change, rad.
-    """
-    radius = float(requirements.radius[waypoint])
-    acceptance = float(requirements.setup.route.points["acceptance_radius"][waypoint])
-    if not requirements.setup.route.fly_over[waypoint] or not acceptance or not math.isfinite(radius):
-        return []
-    offset = fly_by_offset(turn, radius)
-    if offset <= acceptance:
-        return []
-    lateral = radius * (1.0 - math.cos(turn))
-    return [
-        f"flown over, because a fly-by arc would pass {offset:.0f} m away, outside the acceptance radius of"
-        f" {acceptance:.0f} m; after the waypoint the turn swings up to {lateral:.0f} m off the next leg"
-    ]
 
 
 def _sharp_turn_message(
@@ -238,21 +235,6 @@ def _flown_facts(requirements: RouteRequirements, waypoint: int, measure: TurnMe
     return facts
 
 
-def _measured_facts(measure: TurnMeasure | None) -> list[Fact]:
-    """Return the known measurements of a flown turn as facts; [] before a flight."""
-    if measure is None:
-        return []
-    bank = None if measure.held_bank is None else math.degrees(measure.held_bank)
-    numbers = (
-        ("overshoot", measure.overshoot, "m"),
-        ("settled", measure.settled_distance if measure.is_complete else None, "m"),
-        ("bank", bank, "deg"),
-        ("radius", measure.radius, "m"),
-        ("nearest pass", None if measure.corner is None else measure.corner.distance, "m"),
-    )
-    return [Fact(quantity, value, unit) for quantity, value, unit in numbers if value is not None]
-
-
 def _flown_faults(
     requirements: RouteRequirements, waypoint: int, measure: TurnMeasure, limit: float
 ) -> dict[str, Message]:
@@ -260,7 +242,7 @@ def _flown_faults(
 
     limit: largest course change, rad.
     """
-    faults = {}
+    faults, setup = {}, requirements.setup
     if measure.angle is not None and measure.tolerance is not None and measure.angle > limit + measure.tolerance:
         flown_angle, max_angle = math.degrees(measure.angle), math.degrees(limit)
         faults["course change"] = message(
@@ -272,47 +254,35 @@ def _flown_faults(
         faults["bank"] = message(
             f"bank {math.degrees(measure.held_bank):.1f}°, more than the limit of {math.degrees(max_bank):.1f}°"
         )
-    if (tight_turn := _tight_turn_fault(requirements, waypoint, measure)) is not None:
-        faults["radius"] = tight_turn
-    if measure.overshoot is not None and measure.overshoot > OVERSHOOT_TOLERANCE_M:
-        passed_text = "its arc" if measure.corner is None else "its next leg"
-        faults["overshoot"] = message(
-            f"overshoots {passed_text} by {measure.overshoot:.0f} m", f" (at most {OVERSHOOT_TOLERANCE_M:.0f} m)"
-        )
-    max_offset = SETTLED_CROSS_TRACK_M + GUST_OFFSET_M[requirements.setup.scenario.wind.turbulence]
-    if measure.settled_distance is not None and measure.is_complete and measure.settled_distance > max_offset:
-        offset_text = f"still {measure.settled_distance:.1f} m off the next leg at its end"
-        faults["settled"] = message(offset_text, f" (at most {max_offset:.1f} m)")
-    if measure.full_circles:
-        faults["circles"] = message(f"{count_text(measure.full_circles, 'full circle')} flown at the corner")
-    return faults
-
-
-def _tight_turn_fault(requirements: RouteRequirements, waypoint: int, measure: TurnMeasure) -> Message | None:
-    """Return a fault if a turn was tighter than an arc at the bank limit, otherwise None.
-
-    The arc between legs that are too short for their turn is tighter than the bank limit permits.  A flight along this
-    arc exceeded the bank limit or slowed down.
-    """
-    turn, setup = abs(float(requirements.turns[waypoint])), requirements.setup
-    min_radius = float(requirements.min_radius[waypoint])
+    # A flight along the arc between legs that are too short for their turn exceeded the bank limit or slowed down.
+    turn, min_radius = abs(float(requirements.turns[waypoint])), float(requirements.min_radius[waypoint])
     # planfly's guidance also has no arc to follow at a sharper corner with short legs.
     min_distance = fly_by_offset(turn, min_radius) if turn < SHARPEST_FLY_BY_RAD else math.inf
     # An autopilot that does not keep to the arc may pass the waypoint at any distance.
     follows_arc = (
         setup.autopilot.turns.keeps_to_arcs and setup.imported_log is None and not setup.route.fly_over[waypoint]
     )
-    if measure.min_distance is None or not math.isfinite(min_distance) or not follows_arc:
-        return None
-    tolerance = CORNER_CUT_FRACTION * min_distance + CORNER_CUT_TOLERANCE_M[setup.scenario.wind.turbulence]
-    tolerance += NAVIGATION_SIGMAS * ERRORS[setup.nav][0]
-    if measure.min_distance >= min_distance - tolerance:
-        return None
-    return message(
-        f"passes its waypoint {measure.min_distance:.1f} m away, closer than the bank limit permits",
-        f"; an arc at {math.degrees(requirements.limits.max_bank):.0f}° of bank in this wind (radius {min_radius:.0f}"
-        f" m) passes the waypoint {min_distance:.1f} m away",
-    )
+    if measure.min_distance is not None and math.isfinite(min_distance) and follows_arc:
+        tolerance = CORNER_CUT_FRACTION * min_distance + CORNER_CUT_TOLERANCE_M[setup.scenario.wind.turbulence]
+        tolerance += NAVIGATION_SIGMAS * ERRORS[setup.nav][0]
+        if measure.min_distance < min_distance - tolerance:
+            faults["radius"] = message(
+                f"passes its waypoint {measure.min_distance:.1f} m away, closer than the bank limit permits",
+                f"; an arc at {math.degrees(requirements.limits.max_bank):.0f}° of bank in this wind (radius"
+                f" {min_radius:.0f} m) passes the waypoint {min_distance:.1f} m away",
+            )
+    if measure.overshoot is not None and measure.overshoot > OVERSHOOT_TOLERANCE_M:
+        passed_text = "its arc" if measure.corner is None else "its next leg"
+        faults["overshoot"] = message(
+            f"overshoots {passed_text} by {measure.overshoot:.0f} m", f" (at most {OVERSHOOT_TOLERANCE_M:.0f} m)"
+        )
+    max_offset = SETTLED_CROSS_TRACK_M + GUST_OFFSET_M[setup.scenario.wind.turbulence]
+    if measure.settled_distance is not None and measure.is_complete and measure.settled_distance > max_offset:
+        offset_text = f"still {measure.settled_distance:.1f} m off the next leg at its end"
+        faults["settled"] = message(offset_text, f" (at most {max_offset:.1f} m)")
+    if measure.full_circles:
+        faults["circles"] = message(f"{count_text(measure.full_circles, 'full circle')} flown at the corner")
+    return faults
 
 
 RULE = Rule(
