@@ -22,7 +22,6 @@ from flight.mission.placing import HOME_ALTITUDE_TOLERANCE_M, SAME_POSITION_DIST
 from logs.verdict.findings import GROUND_PATH, Finding, Message, make_finding, message
 from logs.verdict.measures.ground_paths import (
     GroundPath,
-    Profile,
     first_hazard_on_path,
     has_ground_paths,
     landing_item,
@@ -147,7 +146,13 @@ def climbout_findings(
         reason = "the aircraft cannot climb there at this speed and in this wind"
         return [_unjudged_finding("climbout", place, reason, is_undecided=takeoff is not None)]
     if takeoff is None:
-        path = straight_path(start, course, _climb_profile(ground_altitude, float(first_point[2]), distance, max_slope))
+        # A climb from the ground, then a straight line to the first waypoint.
+        top_altitude = max(float(first_point[2]), ground_altitude + FIRST_CLIMB_HEIGHT_M)
+        climb_distance = (top_altitude - ground_altitude) / max_slope
+        profile = [(0.0, ground_altitude), (climb_distance, top_altitude), (distance, float(first_point[2]))]
+        if climb_distance >= distance:
+            profile = [(0.0, ground_altitude), (distance, ground_altitude + max_slope * distance)]
+        path = straight_path(start, course, profile)
         return [_air_start_finding(place, _find_obstacles(requirements, path))]
     takeoff_altitude = float(requirements.points[0, 2])
     if takeoff_altitude <= ground_altitude:
@@ -251,23 +256,6 @@ def _take_off_climb(
     return _Climb(slope, profile[-1][0], obstacles)
 
 
-def _climb_profile(ground_altitude: float, waypoint_altitude: float, distance: float, climb_slope: float) -> Profile:
-    """Return the profile of a climb from the ground, followed by a straight line to the first waypoint.
-
-    The profile is a list of pairs: horizontal distance from home (m) and altitude (m AMSL).
-
-    ground_altitude: altitude of the ground, m AMSL.
-    waypoint_altitude: altitude of the waypoint, m AMSL.
-    distance: horizontal distance of the waypoint, m.
-    climb_slope: m per m.
-    """
-    top_altitude = max(waypoint_altitude, ground_altitude + FIRST_CLIMB_HEIGHT_M)
-    climb_distance = (top_altitude - ground_altitude) / climb_slope
-    if climb_distance >= distance:
-        return [(0.0, ground_altitude), (distance, ground_altitude + climb_slope * distance)]
-    return [(0.0, ground_altitude), (climb_distance, top_altitude), (distance, waypoint_altitude)]
-
-
 def _find_obstacles(requirements: RouteRequirements, path: GroundPath) -> _Obstacles:
     """Return the obstacles on a path from home.
 
@@ -337,7 +325,14 @@ def _launch_finding(
     if not min_obstacles.is_clear:
         fault = min_obstacles.obstacle_message(subject, "from home")
         climb_text = _climb_text(gentlest, launch, item_text, end_height)
-        limit_text = "" if is_certain else _certain_climb_text(steepest.slope, certain_slope)
+        limit_text = (
+            ""
+            if is_certain
+            else (
+                f". The steepest climb is {_degrees_text(steepest.slope)}, but only"
+                f" {_degrees_text(max(0.0, certain_slope))} is certain for this aircraft"
+            )
+        )
         fault = replace(fault, text=f"{fault.text}. {climb_text}{limit_text}")
         return _path_finding("climbout", place, obstacles, ok=None, outcome=fault, check=GROUND_PATH)
     return _path_finding(
@@ -363,12 +358,6 @@ def _climb_text(climb: _Climb, launch: _Launch, item_text: str, end_height: floa
             f" is only {launch.leg_length:.0f} m from home"
         )
     return text
-
-
-def _certain_climb_text(max_slope: float, certain_slope: float) -> str:
-    """Return a clause that compares the nominal and the certain maximum climb slope, m per m."""
-    certain_text = _degrees_text(max(0.0, certain_slope))
-    return f". The steepest climb is {_degrees_text(max_slope)}, but only {certain_text} is certain for this aircraft"
 
 
 def _degrees_text(slope: float) -> str:
