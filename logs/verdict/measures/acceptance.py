@@ -180,7 +180,13 @@ def shortcut_distance(requirements: RouteRequirements, first: int, last: int) ->
     start, *omitted, end = requirements.points[first - 1 : last + 2, :2].tolist()
     if start == end:
         return None
-    distance = max(_distance_from_leg(point, start, end) for point in omitted)
+    # For one point, this is ten times faster than `farthest_from_legs`.
+    distance, leg_east, leg_north = 0.0, end[0] - start[0], end[1] - start[1]
+    for point in omitted:
+        east, north = point[0] - start[0], point[1] - start[1]
+        fraction = (east * leg_east + north * leg_north) / max(leg_east * leg_east + leg_north * leg_north, 1e-12)
+        fraction = min(1.0, max(0.0, fraction))
+        distance = max(distance, math.hypot(east - fraction * leg_east, north - fraction * leg_north))
     if (
         distance > KINK_FRACTION * requirements.setup.corridor
         or requirements.setup.route.arc_radii[first : last + 1].any()
@@ -188,18 +194,6 @@ def shortcut_distance(requirements: RouteRequirements, first: int, last: int) ->
     ):
         return None
     return distance
-
-
-def _distance_from_leg(point: list[float], start: list[float], end: list[float]) -> float:
-    """Return the horizontal distance of a point (east, north) from a leg, m.
-
-    For one point, this is ten times faster than `farthest_from_legs`.
-    """
-    leg_east, leg_north = end[0] - start[0], end[1] - start[1]
-    east, north = point[0] - start[0], point[1] - start[1]
-    fraction = (east * leg_east + north * leg_north) / max(leg_east * leg_east + leg_north * leg_north, 1e-12)
-    fraction = min(1.0, max(0.0, fraction))
-    return math.hypot(east - fraction * leg_east, north - fraction * leg_north)
 
 
 def _gap_has_room(requirements: RouteRequirements, first: int, last: int) -> bool:

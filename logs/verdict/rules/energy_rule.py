@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flight.autopilots.parts import BatteryFailsafe
 from flight.mission.items import Command
 from flight.mission.route import make_route
 from logs.verdict.findings import (
@@ -216,10 +215,23 @@ def _judge_battery_failsafes(requirements: RouteRequirements, energy_used: float
     if setup.imported_log is not None or math.isnan(energy_used):
         return messages
     charge_used = energy_used / volts * _MAH_PER_AH if volts else math.nan
+    # The voltage of a battery under load is not simulated.  While the reserve is left, a healthy battery has more than
+    # `EMPTY_CELL_VOLTAGE_V` in each cell.
+    cells = 0 if setup.envelope.battery_guessed else round(volts / NOMINAL_CELL_VOLTAGE_V)
     for failsafe in setup.autopilot.checks.battery_failsafes:
         name = f"{failsafe.parameter} {failsafe.threshold:g}"
         if math.isnan(failsafe.used_charge):
-            if voltage_text := _reachable_voltage_text(requirements, failsafe, energy_used):
+            voltage_text, cell_voltage = "", failsafe.threshold / cells if cells else 0.0
+            if math.isfinite(failsafe.remaining_fraction):
+                remaining_fraction = 1.0 - energy_used / setup.battery
+                if remaining_fraction < failsafe.remaining_fraction:
+                    voltage_text = f"{remaining_fraction:.0%} of the battery is left"
+            elif cell_voltage > EMPTY_CELL_VOLTAGE_V + _VOLTAGE_ROUNDING_V:
+                voltage_text = (
+                    f"{cell_voltage:.2f} V in each of {cells} cells ({volts:g} V), more than the"
+                    f" {EMPTY_CELL_VOLTAGE_V:g} V of an empty cell; the voltage is not simulated"
+                )
+            if voltage_text:
                 messages.undecided.append(message(f"the failsafe {name} may end the mission", f": {voltage_text}"))
             else:
                 unjudged.append(name)
@@ -249,27 +261,6 @@ def _judge_battery_failsafes(requirements: RouteRequirements, energy_used: float
             messages.undecided.append(message(brief, f": {reason}; {return_failsafe.remedy}"))
     clause = f"; the voltage is not simulated, so it is not judged whether {' or '.join(unjudged)} ends the mission"
     return messages._replace(unjudged_text=clause if unjudged else "")
-
-
-def _reachable_voltage_text(requirements: RouteRequirements, failsafe: BatteryFailsafe, energy_used: float) -> str:
-    """Explain why a voltage failsafe may act before the battery is at its reserve; otherwise "".
-
-    The voltage of a battery under load is not simulated.  While the reserve is left, a healthy battery has more than
-    `EMPTY_CELL_VOLTAGE_V` in each cell.  The number of cells is calculated with `NOMINAL_CELL_VOLTAGE_V`.
-    """
-    setup = requirements.setup
-    if math.isfinite(failsafe.remaining_fraction):
-        remaining_fraction = 1.0 - energy_used / setup.battery
-        return (
-            f"{remaining_fraction:.0%} of the battery is left"
-            if remaining_fraction < failsafe.remaining_fraction
-            else ""
-        )
-    cells = 0 if setup.envelope.battery_guessed else round(setup.envelope.volts / NOMINAL_CELL_VOLTAGE_V)
-    if not cells or failsafe.threshold / cells <= EMPTY_CELL_VOLTAGE_V + _VOLTAGE_ROUNDING_V:
-        return ""
-    cell_text = f"{failsafe.threshold / cells:.2f} V in each of {cells} cells ({setup.envelope.volts:g} V)"
-    return f"{cell_text}, more than the {EMPTY_CELL_VOLTAGE_V:g} V of an empty cell; the voltage is not simulated"
 
 
 def _used_text(requirements: RouteRequirements, energy_used: float, max_current: float, *, is_empty: bool) -> str:

@@ -104,10 +104,31 @@ def mission_findings(setup: FlightSetup) -> list[Finding]:
                 check=check,
             )
         )
+    refused_items = [
+        item
+        for item in mission.items
+        if command_support(item.command).arduplane == Treatment.REFUSED != command_support(item.command).px4
+    ]
+    if refused_items and dialect == "ardupilot":
+        function = "mavlink_int_to_mission_cmd"
+        more_text = f" (and {len(refused_items) - 1} more)" if len(refused_items) > 1 else ""
+        command_text = f"ArduPlane does not support {command_name(refused_items[0].command)}"
+        fault = message(command_text, f"{more_text}; PX4 accepts it")
+        findings.append(
+            make_finding(
+                "mission",
+                Place("mission", item=refused_items[0].seq),
+                ok=False,
+                reason=f"{fault.text} (see ArduPlane's function {function})",
+                faults=[fault],
+                source="ArduPlane",
+                method="mission items",
+                check=function,
+            )
+        )
     # No autopilot has a name for the last checks, which report the parts of a mission that are not judged.
     return [
         *findings,
-        *_arduplane_refusal_findings(setup),
         *([_unjoined_finding(setup)] if setup.route.unjoined_stops else []),
         *_unreached_findings(setup),
         *_unsimulated_findings(setup),
@@ -118,33 +139,6 @@ def mission_findings(setup: FlightSetup) -> list[Finding]:
 # fly; otherwise it is undecided.
 REFUSED: Literal["refused"] = "refused"
 _Remark = tuple[bool | Literal["refused"] | None, int | None, str | Message]
-
-
-def _arduplane_refusal_findings(setup: FlightSetup) -> list[Finding]:
-    """Return one finding on items that only ArduPlane refuses at upload; [] for other autopilots."""
-    refused_items = [
-        item
-        for item in setup.mission.items
-        if command_support(item.command).arduplane == Treatment.REFUSED != command_support(item.command).px4
-    ]
-    if not refused_items or setup.autopilot.checks.dialect != "ardupilot":
-        return []
-    more_text = f" (and {len(refused_items) - 1} more)" if len(refused_items) > 1 else ""
-    fault = message(
-        f"ArduPlane does not support {command_name(refused_items[0].command)}", f"{more_text}; PX4 accepts it"
-    )
-    return [
-        make_finding(
-            "mission",
-            Place("mission", item=refused_items[0].seq),
-            ok=False,
-            reason=f"{fault.text} (see ArduPlane's function mavlink_int_to_mission_cmd)",
-            faults=[fault],
-            source="ArduPlane",
-            method="mission items",
-            check="mavlink_int_to_mission_cmd",
-        )
-    ]
 
 
 def _unjoined_finding(setup: FlightSetup) -> Finding:

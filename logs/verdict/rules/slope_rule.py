@@ -105,6 +105,7 @@ def _leg_finding(
             # A level leg at a speed that the aircraft cannot fly fails by its speed, not by its slope.
             limit = max(limit, LEVEL_SLOPE_RAD)
     faults, facts = _planned_slope_messages(requirements, leg, limit, source)
+    measured_facts: list[Fact] = []
     is_plan_steep = bool(faults)
     arc_faults = _steep_arc_faults(requirements, leg, measure)
     ground = None if faults or arc_faults else _steep_ground(requirements, leg, measure)
@@ -121,7 +122,7 @@ def _leg_finding(
     slope_fit = measure.slope if measure is not None and ground is None else None
     method = "route"
     if measure is not None:
-        flown_faults, flown_facts = _flown_messages(requirements, leg, measure, limit)
+        flown_faults, flown_facts, measured_facts = _flown_messages(requirements, leg, measure, limit)
         faults, facts = faults + flown_faults, facts + flown_facts
         if slope_fit is not None:
             fit_text = "" if slope_fit.is_fitted else ", short leg,"
@@ -155,14 +156,14 @@ def _leg_finding(
         unit="deg",
         method=method,
         check=check,
-        facts=(*_measured_facts(requirements, leg, measure), *aircraft_facts),
+        facts=(*measured_facts, *aircraft_facts),
     )
 
 
 def _flown_messages(
     requirements: RouteRequirements, leg: int, measure: SlopeMeasure, limit: float
-) -> tuple[list[Message], list[str]]:
-    """Return the faults and the facts of a flown leg.
+) -> tuple[list[Message], list[str], list[Fact]]:
+    """Return the faults, the facts and the measurements of a flown leg.
 
     With the limits of a known aircraft, only exceeded limits and a lack of performance are faults.  The flown slope and
     the height error are then facts.
@@ -170,28 +171,35 @@ def _flown_messages(
     """
     performance_faults = _performance_faults(requirements, leg, measure, limit)
     flown_faults = _flown_faults(requirements, leg, measure, limit, performance_faults)
-    named_facts = []
+    named_facts: list[tuple[str, str]] = []
+    measured: list[Fact] = []
     if measure.slope is not None:
         named_facts.append(("slope", f"flown {math.degrees(measure.slope.value):+.2f}°"))
     if measure.height_error is not None:
-        line = "the leg's height above ground" if follows_ground(requirements, leg) else "the leg"
+        is_over_ground = follows_ground(requirements, leg)
+        line = "the leg's height above ground" if is_over_ground else "the leg"
         named_facts.append(("height", f"altitude within {abs(measure.height_error):.1f} m of {line}"))
-    named_facts += [
-        (name, f"{_throttle_text(requirements, name)} for {duration:.0f} s")
-        for name, duration, _, _ in _throttle_times(measure)
-        if duration >= 1.0
-    ]
+        measured.append(Fact(GROUND_FOLLOWING_ERROR if is_over_ground else "height error", measure.height_error, "m"))
+    if measure.slope is not None:
+        slope_error = math.degrees(measure.slope.value - float(requirements.slopes[leg]))
+        measured.append(Fact("slope error", slope_error, "deg"))
+    for name, duration, error, direction in _throttle_times(measure):
+        if duration >= 1.0:
+            named_facts.append((name, f"{_throttle_text(requirements, name)} for {duration:.0f} s"))
+        if duration > 0.0:
+            measured += [Fact(f"throttle at {name}", duration, "s"), Fact(f"too {direction}", error, "m/s")]
     if measure.pitch_limit_time >= SATURATED_TIME_S:
         limit_name = requirements.setup.autopilot.speeds.max_pitch_name
         named_facts.append(("pitch", f"pitch at its limit {limit_name} for {measure.pitch_limit_time:.0f} s"))
+        measured.append(Fact(PITCH_LIMIT_TIME, measure.pitch_limit_time, "s"))
     arc = steep_arc(requirements, leg)
     if arc is not None and _is_arc_within_tolerance(arc, measure):
         place = place_text(requirements.waypoint(leg + 1))
         named_facts.append(("arc", f"the arc at {place} misses its height by only {arc.missing_height:.1f} m"))
     facts = [text for name, text in named_facts if name not in flown_faults]
     if requirements.envelope:
-        return performance_faults, facts + [fault.brief for fault in flown_faults.values()]
-    return [*flown_faults.values(), *performance_faults], facts
+        return performance_faults, facts + [fault.brief for fault in flown_faults.values()], measured
+    return [*flown_faults.values(), *performance_faults], facts, measured
 
 
 def _planned_slope_messages(
@@ -461,26 +469,6 @@ def _throttle_times(measure: SlopeMeasure) -> tuple[tuple[str, float, float, str
         ("full", measure.full_throttle_time, measure.speed_loss, "slow"),
         ("idle", measure.idle_throttle_time, measure.speed_gain, "fast"),
     )
-
-
-def _measured_facts(requirements: RouteRequirements, leg: int, measure: SlopeMeasure | None) -> list[Fact]:
-    """Return the measurements of a flown leg as facts; [] for a leg that was not measured."""
-    if measure is None:
-        return []
-    error_name = GROUND_FOLLOWING_ERROR if follows_ground(requirements, leg) else "height error"
-    facts = [] if measure.height_error is None else [Fact(error_name, measure.height_error, "m")]
-    if measure.slope is not None:
-        error = math.degrees(measure.slope.value - float(requirements.slopes[leg]))
-        facts.append(Fact("slope error", error, "deg"))
-    for name, duration, error, direction in _throttle_times(measure):
-        facts += (
-            [Fact(f"throttle at {name}", duration, "s"), Fact(f"too {direction}", error, "m/s")]
-            if duration > 0.0
-            else []
-        )
-    if measure.pitch_limit_time >= SATURATED_TIME_S:
-        facts.append(Fact(PITCH_LIMIT_TIME, measure.pitch_limit_time, "s"))
-    return facts
 
 
 def _flown_faults(
