@@ -441,7 +441,14 @@ class MissionServer:
         try:
             item = from_message(message, _TITLES[kind])
         except MissionError as error:
-            return [self._reject_upload(upload, kind, _refusal_result(message), str(error))]
+            # The result names an invalid latitude, an invalid longitude, or any other fault.
+            degree_scale = 1.0 if message.get_type() == "MISSION_ITEM" else 1e7
+            result = mavlink.MAV_MISSION_INVALID
+            if abs(message.x) > 90.0 * degree_scale:
+                result = mavlink.MAV_MISSION_INVALID_PARAM5_X
+            elif abs(message.y) > 180.0 * degree_scale:
+                result = mavlink.MAV_MISSION_INVALID_PARAM6_Y
+            return [self._reject_upload(upload, kind, int(result), str(error))]
         is_allowed = (
             item.command in _ALLOWED_COMMANDS[kind]
             if kind in _ALLOWED_COMMANDS
@@ -557,16 +564,6 @@ def _item_request(
 ) -> MissionReply:
     """Return the request for an item of an upload."""
     return MissionReply(station, message_class(station.system, station.component, seq, int(kind)))
-
-
-def _refusal_result(message: Any) -> int:
-    """Return the MAV_MISSION_RESULT for an invalid item: its latitude, its longitude, or any other fault."""
-    degree_scale = 1.0 if message.get_type() == "MISSION_ITEM" else 1e7
-    if abs(message.x) > 90.0 * degree_scale:
-        return int(mavlink.MAV_MISSION_INVALID_PARAM5_X)
-    if abs(message.y) > 180.0 * degree_scale:
-        return int(mavlink.MAV_MISSION_INVALID_PARAM6_Y)
-    return int(mavlink.MAV_MISSION_INVALID)
 
 
 _ITEM_MESSAGES = ("MISSION_ITEM_INT", "MISSION_ITEM")
