@@ -338,44 +338,33 @@ class _Translator:
             _check_element(channel, attributes={"name"}, children={*_COMPONENTS, *_DECLARATIONS})
             for component in channel:
                 if component.tag == "actuator":
-                    self._translate_actuator(component)
+                    # One input, which may have a lag, a rate limit and position limits.
+                    known_tags = {"input", "lag", "rate_limit", "clipto", "description"}
+                    _check_element(component, attributes={"name"}, children=known_tags)
+                    inputs = [self._read_property(_element_text(child)) for child in component.findall("input")]
+                    if len(inputs) != 1:
+                        raise UnsupportedModel(f"<actuator> of {len(inputs)} inputs")
+                    lag_element, rate_element = component.find("lag"), component.find("rate_limit")
+                    lag = math.nan if lag_element is None else _element_number(lag_element)
+                    rate = math.inf if rate_element is None else _element_number(rate_element)
+                    lower, upper = _clip_limits(component) or (-math.inf, math.inf)
+                    # The factors depend on the time step, and the memory on the start of the flight.
+                    first_register = self._append_registers(*([math.nan] * LOWER_LIMIT), lower, upper)
+                    self.actuators.append(ActuatorBlock(first_register, inputs[0], lag, rate))
+                    output = self._property_register(_component_property(component))
+                    self._emit(Operation.ACTUATOR, [inputs[0], first_register], output)
                 elif component.tag == "fcs_function":
-                    self._translate_fcs_function(component)
-
-    def _translate_actuator(self, element: Element) -> None:
-        """Translate an actuator with one input, which may have a lag, a rate limit and position limits."""
-        _check_element(element, attributes={"name"}, children={"input", "lag", "rate_limit", "clipto", "description"})
-        inputs = [self._read_property(_element_text(child)) for child in element.findall("input")]
-        if len(inputs) != 1:
-            raise UnsupportedModel(f"<actuator> of {len(inputs)} inputs")
-        lag, rate_limit = element.find("lag"), element.find("rate_limit")
-        lower, upper = _clip_limits(element) or (-math.inf, math.inf)
-        # The factors depend on the time step, and the memory on the start of the flight.
-        first_register = self._append_registers(*([math.nan] * LOWER_LIMIT), lower, upper)
-        self.actuators.append(
-            ActuatorBlock(
-                first_register,
-                inputs[0],
-                math.nan if lag is None else _element_number(lag),
-                math.inf if rate_limit is None else _element_number(rate_limit),
-            )
-        )
-        self._emit(
-            Operation.ACTUATOR, [inputs[0], first_register], self._property_register(_component_property(element))
-        )
-
-    def _translate_fcs_function(self, element: Element) -> None:
-        """Translate a function of the flight controls, which may have limits."""
-        _check_element(element, attributes={"name"}, children={"function", "clipto", "description"})
-        functions, limits = element.findall("function"), _clip_limits(element)
-        if len(functions) != 1:
-            raise UnsupportedModel(f"<fcs_function> of {len(functions)} functions")
-        output = self._property_register(_component_property(element))
-        if limits is None:
-            self._translate_function(functions[0], may_have_name=False, target=output)
-        else:
-            value = self._translate_function(functions[0], may_have_name=False)
-            self._emit(Operation.CLIP, [value, *map(self._constant_register, limits)], output)
+                    # One function, which may have limits.
+                    _check_element(component, attributes={"name"}, children={"function", "clipto", "description"})
+                    functions, limits = component.findall("function"), _clip_limits(component)
+                    if len(functions) != 1:
+                        raise UnsupportedModel(f"<fcs_function> of {len(functions)} functions")
+                    output = self._property_register(_component_property(component))
+                    if limits is None:
+                        self._translate_function(functions[0], may_have_name=False, target=output)
+                    else:
+                        value = self._translate_function(functions[0], may_have_name=False)
+                        self._emit(Operation.CLIP, [value, *map(self._constant_register, limits)], output)
 
     # Forces.
 
