@@ -125,30 +125,26 @@ class Parameters:
                     number,
                     f"{entry.name} {value:g}: refused, because parameters are fixed during a flight; {unchanged_text}",
                 )
-            return number, self._set_autopilot_parameter(entry, value)
+            if not math.isfinite(value):
+                return number, f"{entry.name} {value:g}: expected a finite number; {unchanged_text}"
+            # MAVLink carries 0.7 as 0.699999988. The number that was typed is the shortest one with the same float32.
+            stated_values = self.stated | {entry.name: float(str(np.float32(value)))}
+            try:
+                values = self.autopilot_values(stated_values)
+            except PlanflyError as error:
+                return number, f"{error}; {unchanged_text}"
+            if values[entry.name] != stated_values[entry.name]:
+                return number, f"{entry.name} {_FIXED_REASON}: {unchanged_text}"
+            self.stated = stated_values
+            for autopilot_name, autopilot_value in values.items():
+                self.set_value(autopilot_name, autopilot_value)
+            return number, ""
         if entry.max_value is None:
             return number, f"{entry.name} {entry.fixed_reason}: {unchanged_text}"
         if not (math.isfinite(value) and entry.min_value <= value <= entry.max_value):
             return number, f"{entry.name} {value:g}: allowed {entry.min_value:g}..{entry.max_value:g}; {unchanged_text}"
         self.set_value(entry.name, value)
         return number, ""
-
-    def _set_autopilot_parameter(self, entry: Parameter, value: float) -> str:
-        """Set a parameter of the simulated autopilot, and return the reason for a refusal, or ""."""
-        if not math.isfinite(value):
-            return f"{entry.name} {value:g}: expected a finite number; the value stays {entry.value:g}"
-        # MAVLink carries 0.7 as 0.699999988. The number that was typed is the shortest one with the same float32.
-        stated_values = self.stated | {entry.name: float(str(np.float32(value)))}
-        try:
-            values = self.autopilot_values(stated_values)
-        except PlanflyError as error:
-            return f"{error}; the value stays {entry.value:g}"
-        if values[entry.name] != stated_values[entry.name]:
-            return f"{entry.name} {_FIXED_REASON}: the value stays {entry.value:g}"
-        self.stated = stated_values
-        for name, autopilot_value in values.items():
-            self.set_value(name, autopilot_value)
-        return ""
 
 
 def vehicle_parameters(

@@ -374,15 +374,13 @@ def rally_text(mission: Mission) -> str:
 
 def _file_text(items: tuple[MissionItem, ...], current: MissionItem | None = None) -> str:
     """Return the text of a WPL file of these items; ``current`` is the item at which the mission starts."""
-    return "\n".join([HEADER, *(_item_line(item, current=item is current) for item in items)]) + "\n"
-
-
-def _item_line(item: MissionItem, *, current: bool) -> str:
-    """Return the line of an item; ``current`` marks the item at which the mission starts."""
-    numbers = [_format_decimal(value, 0) for value in item.params]
-    position = [_format_decimal(item.lat_deg, 8), _format_decimal(item.lon_deg, 8), _format_decimal(item.alt, 3)]
-    integers = [str(int(value)) for value in (item.seq, current, item.frame, item.command)]
-    return "\t".join([*integers, *numbers, *position, str(int(item.autocontinue))])
+    lines = [HEADER]
+    for item in items:
+        integers = [str(int(value)) for value in (item.seq, item is current, item.frame, item.command)]
+        numbers = [_format_decimal(value, 0) for value in item.params]
+        position = [_format_decimal(item.lat_deg, 8), _format_decimal(item.lon_deg, 8), _format_decimal(item.alt, 3)]
+        lines.append("\t".join([*integers, *numbers, *position, str(int(item.autocontinue))]))
+    return "\n".join(lines) + "\n"
 
 
 def _format_decimal(value: float, places: int) -> str:
