@@ -22,7 +22,6 @@ from planfly.flight_logs import MCAP_MAGIC, is_log
 from planfly.flight_options import LogOptions, MissionOptions, apply_options, load_scenario_with_options
 from planfly.studio.edit_context import EditContext
 from planfly.studio.settings import changed_settings, settings_json
-from planfly.workflow.imported_flights import ImportedFlight
 from planfly.workflow.mission_context import JudgedMission
 from planfly.workflow.open_flight import make_setup, mission_of_plan, open_flight
 from planfly.workflow.uav import Uav, choose_seed, load_uav, uav_of_setup
@@ -102,7 +101,19 @@ def open_document(target: str, options: MissionOptions) -> Document:
         return Document(scenario.name, scenario.name, make_setup(scenario, uav, mission, seed), to_plan=True)
     path = Path(target)
     if path.is_file() and is_imported_log(path):
-        setup = _read_imported_log(path, options).setup
+        world: LogOptions = {
+            "scenario": options.get("scenario"),
+            "terrain": options.get("terrain"),
+            "fence": options.get("fence") or (),
+        }
+        try:
+            setup = read_imported(path, **world).setup
+        except LogError as error:
+            has_track = "contains no mission" in str(error)
+            if not has_track and path.suffix.lower() not in MAP_SUFFIXES:
+                raise
+            reason = f"contains {'a track' if has_track else 'a map'} but no mission: open the mission file instead"
+            raise MissionError(f"{path}: {reason}", file=path) from None
         setup = _log_mission_setup(setup.scenario, setup.mission, setup.seed)
     elif path.is_file() and is_log(path):
         setup = read_log(path).setup
@@ -175,26 +186,6 @@ def _check_plan_names_no_files(name: str, data: bytes) -> None:
         if file is not None and str(file) not in EMBEDDED:
             allowed = "a plan that names other files can only be opened by the command: planfly studio plan.json"
             raise MissionError.at(name, "scenario", str(file)[:60], allowed)
-
-
-def _read_imported_log(path: Path, options: MissionOptions) -> ImportedFlight:
-    """Read a log of another program.
-
-    Raises PlanflyError for a log that cannot be read, and MissionError for a log without a mission.
-    """
-    world: LogOptions = {
-        "scenario": options.get("scenario"),
-        "terrain": options.get("terrain"),
-        "fence": options.get("fence") or (),
-    }
-    try:
-        return read_imported(path, **world)
-    except LogError as error:
-        has_track = "contains no mission" in str(error)
-        if not has_track and path.suffix.lower() not in MAP_SUFFIXES:
-            raise
-        reason = f"contains {'a track' if has_track else 'a map'} but no mission: open the mission file instead"
-        raise MissionError(f"{path}: {reason}", file=path) from None
 
 
 def _log_mission_setup(scenario: Scenario, mission: Mission, seed: int) -> FlightSetup:

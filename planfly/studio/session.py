@@ -268,7 +268,13 @@ class Session:
                 items_text = "all items" if message.ks is None else count_text(len(indices), "item")
                 text = f"{'raise' if message.by >= 0.0 else 'lower'} {items_text} by {abs(message.by):g} m"
             case Apply():
-                changed_mission, suggestion = self._tried_change(message)
+                # The suggestion must have passed a trial on this revision.
+                tried = self.tried.get("flown" if message.flown else "geometric")
+                changes = tried.changes if tried and tried.rev == self.rev else {}
+                change = changes.get((message.finding, message.which))
+                if change is None:
+                    raise MissionError(f"{self.document.name}: that suggestion no longer exists", field="suggestion")
+                changed_mission, suggestion = change
                 values = suggested_parameters(suggestion)
                 moves = item_moves(context, mission, changed_mission)
                 findings = self.judged.verdict.findings
@@ -279,8 +285,8 @@ class Session:
                 mission = replace(changed_mission, autopilot=mission.autopilot)
         old_values = context.parameters.values
         self._set_mission(mission, self._context_with_parameters(values))
-        changes = (ParameterChange(name, old_values.get(name), value) for name, value in values.items())
-        self._add_to_history(mission, text, tuple(changes))
+        parameter_changes = (ParameterChange(name, old_values.get(name), value) for name, value in values.items())
+        self._add_to_history(mission, text, tuple(parameter_changes))
 
     def _context_with_parameters(self, values: Mapping[str, float | None]) -> EditContext:
         """Return the editing context with other values of the parameters that the autopilot has, by name.
@@ -419,17 +425,6 @@ class Session:
                 mission, index, altitude, current_altitude if np.isfinite(current_altitude) else altitude
             )
         return mission if mission is self.mission else self.context.with_updated_radii(mission, index)
-
-    def _tried_change(self, message: Apply) -> tuple[Mission, Suggestion]:
-        """Return the changed mission of a suggestion, and the suggestion.
-
-        Raises MissionError for a suggestion that has not passed a trial on this revision.
-        """
-        tried = self.tried.get("flown" if message.flown else "geometric")
-        change = tried.changes.get((message.finding, message.which)) if tried and tried.rev == self.rev else None
-        if change is None:
-            raise MissionError(f"{self.document.name}: that suggestion no longer exists", field="suggestion")
-        return change
 
     def item_position(self, index: int) -> tuple[float, float, float]:
         """Return east, north and altitude AMSL of an item, m. Raises MissionError if the item has no position."""
