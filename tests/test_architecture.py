@@ -12,8 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from planfly.cli import main
-from planfly.commands.registry import COMMANDS
+from planfly.cli import COMMANDS, main
 from tests.conftest import COMPILING
 from tests.soak import only_in_soak
 from tests.stopwatch import Stopwatch

@@ -354,14 +354,6 @@ def _boot_ms(status: Status) -> int:
     return int(status.boot * 1e3) & 0xFFFFFFFF
 
 
-def _attitude_message(status: Status) -> Any:
-    """Return ATTITUDE for a status."""
-    snapshot = status.snapshot
-    return mavlink.MAVLink_attitude_message(
-        _boot_ms(status), snapshot.roll, snapshot.pitch, snapshot.yaw, snapshot.p, snapshot.q, snapshot.r
-    )
-
-
 def _position_message(status: Status) -> Any:
     """Return GLOBAL_POSITION_INT for a status."""
     snapshot = status.snapshot
@@ -431,14 +423,6 @@ def _gps_message(status: Status) -> Any:
     )
 
 
-def _wind_message(status: Status) -> Any:
-    """Return WIND for a status."""
-    snapshot = status.snapshot
-    # Direction from which the wind blows.
-    from_direction = math.degrees(math.atan2(-snapshot.wind_east, -snapshot.wind_north))
-    return mavlink.MAVLink_wind_message(from_direction, math.hypot(snapshot.wind_east, snapshot.wind_north), 0.0)
-
-
 def _wind_cov_message(status: Status) -> Any:
     """Return WIND_COV for a status."""
     snapshot = status.snapshot
@@ -454,12 +438,6 @@ def _wind_cov_message(status: Status) -> Any:
         unknown,
         unknown,
     )
-
-
-def _extended_state_message(status: Status) -> Any:
-    """Return EXTENDED_SYS_STATE for a status."""
-    landed_state = mavlink.MAV_LANDED_STATE_IN_AIR if status.flying else mavlink.MAV_LANDED_STATE_ON_GROUND
-    return mavlink.MAVLink_extended_sys_state_message(mavlink.MAV_VTOL_STATE_UNDEFINED, landed_state)
 
 
 def _home_message(status: Status) -> Any:
@@ -492,7 +470,11 @@ def _to_degrees(angle: float) -> float:
 
 _MESSAGE_MAKERS: dict[str, Callable[[Status], Any]] = {
     "HEARTBEAT": heartbeat,
-    "ATTITUDE": _attitude_message,
+    "ATTITUDE": lambda status: mavlink.MAVLink_attitude_message(
+        _boot_ms(status),
+        *(status.snapshot.roll, status.snapshot.pitch, status.snapshot.yaw),
+        *(status.snapshot.p, status.snapshot.q, status.snapshot.r),
+    ),
     "GLOBAL_POSITION_INT": _position_message,
     "VFR_HUD": _hud_message,
     "MISSION_CURRENT": lambda status: mavlink.MAVLink_mission_current_message(
@@ -500,9 +482,17 @@ _MESSAGE_MAKERS: dict[str, Callable[[Status], Any]] = {
     ),
     "SYS_STATUS": _sys_status_message,
     "GPS_RAW_INT": _gps_message,
-    "WIND": _wind_message,
+    # The direction is that from which the wind blows.
+    "WIND": lambda status: mavlink.MAVLink_wind_message(
+        math.degrees(math.atan2(-status.snapshot.wind_east, -status.snapshot.wind_north)),
+        math.hypot(status.snapshot.wind_east, status.snapshot.wind_north),
+        0.0,
+    ),
     "WIND_COV": _wind_cov_message,
-    "EXTENDED_SYS_STATE": _extended_state_message,
+    "EXTENDED_SYS_STATE": lambda status: mavlink.MAVLink_extended_sys_state_message(
+        mavlink.MAV_VTOL_STATE_UNDEFINED,
+        mavlink.MAV_LANDED_STATE_IN_AIR if status.flying else mavlink.MAV_LANDED_STATE_ON_GROUND,
+    ),
     "HOME_POSITION": _home_message,
     "AUTOPILOT_VERSION": lambda status: mavlink.MAVLink_autopilot_version_message(
         _CAPABILITIES, _VERSION, 0, 0, 0, list(b"planfly\0"), [0] * 8, [0] * 8, 0, 0, 0x706C616E

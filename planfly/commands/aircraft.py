@@ -8,11 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from planfly.terminal.arguments import complete_aircraft, file_completer, number_parser, with_completer
-from planfly.terminal.command_parser import CommandParser, LineParser
-from planfly.terminal.exit_codes import FLYABLE
+from planfly.terminal.command_parser import FLYABLE, CommandParser, LineParser
 from planfly.terminal.options import add_result_options, call_api
-from planfly.terminal.output import write_json_if_requested
-from planfly.terminal.results import print_warnings
+from planfly.terminal.output import print_warnings, write_json_if_requested
 from world.errors import PlanflyError
 
 if TYPE_CHECKING:

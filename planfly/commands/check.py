@@ -13,8 +13,7 @@ from planfly.terminal.arguments import (
     parse_autopilots,
     with_completer,
 )
-from planfly.terminal.command_parser import CommandParser, LineParser
-from planfly.terminal.exit_codes import INCOMPLETE, verdict_code
+from planfly.terminal.command_parser import INCOMPLETE, CommandParser, LineParser, verdict_code
 from planfly.terminal.options import (
     add_aircraft_and_wind_options,
     add_autopilot_options,
@@ -23,8 +22,7 @@ from planfly.terminal.options import (
     add_world_options,
     call_api,
 )
-from planfly.terminal.output import write_json_if_requested, write_junit_if_requested
-from planfly.terminal.results import print_warnings
+from planfly.terminal.output import print_warnings, write_json_if_requested, write_junit_if_requested
 from world.errors import ArgumentError
 
 if TYPE_CHECKING:

@@ -5,11 +5,9 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from planfly.terminal.command_parser import LineParser
-from planfly.terminal.exit_codes import FLYABLE, INCOMPLETE
+from planfly.terminal.command_parser import FLYABLE, INCOMPLETE, LineParser
 from planfly.terminal.options import add_log_argument, add_result_options
-from planfly.terminal.output import write_json_if_requested
-from planfly.terminal.results import warn_about_incomplete_log
+from planfly.terminal.output import warn_about_incomplete_log, write_json_if_requested
 from planfly.workflow.output_paths import COMPARE_FILES
 from world.errors import PlanflyError
 

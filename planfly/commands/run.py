@@ -5,9 +5,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from planfly.terminal.arguments import number_parser
-from planfly.terminal.command_parser import LineParser
+from planfly.terminal.command_parser import NOT_FLYABLE, LineParser, verdict_code
 from planfly.terminal.dispersed_flights import check_flights_option, fly_dispersed
-from planfly.terminal.exit_codes import NOT_FLYABLE, verdict_code
 from planfly.terminal.options import (
     add_flight_options,
     add_flights_option,
@@ -18,7 +17,6 @@ from planfly.terminal.options import (
     call_api,
 )
 from planfly.terminal.output import write_json_if_requested, write_junit_if_requested
-from planfly.terminal.results import print_engine
 
 if TYPE_CHECKING:
     from planfly import Plan, Round, RunResult
@@ -113,7 +111,8 @@ def _print_round(finished_round: "Round") -> None:
     from planfly.terminal.verdict_lines import verdict_lines
 
     print(*verdict_lines(finished_round.verdict, finished_round.notes, returns=finished_round.return_summary), sep="\n")
-    print_engine(finished_round.engine)
+    if finished_round.engine:
+        print(f"model     {finished_round.engine}")
     files = "plan.json, mission.waypoints, mission.plan, verdict.json; nothing was flown"
     if finished_round.flown:
         flight = "flight.mcap" if finished_round.has_log else "no flight"

@@ -10,21 +10,21 @@ import os
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple, TextIO
 
 from planfly.runtime.stages import Advance, Receiver, send_progress_to
-from planfly.terminal.command_parser import CommandParser, wants_colour
+from planfly.terminal.command_parser import BAD_INPUT, CommandParser, colour_text, wants_colour
 from planfly.terminal.control_characters import escape_controls, escape_json_controls
-from planfly.terminal.exit_codes import BAD_INPUT
 from planfly.workflow.output_paths import check_output_file
 from world.errors import PlanflyError
 from world.files import read_at_most, write_atomically
 
 if TYPE_CHECKING:
+    from logs.recording.reader import FlightLog
     from logs.verdict.junit import JunitSuite
     from logs.verdict.verdict import Verdict
 
@@ -159,6 +159,19 @@ def safe_streams() -> Iterator[None]:
             yield
         finally:
             tolerant.flush()
+
+
+def print_warnings(warnings: Iterable[str]) -> None:
+    """Print warnings on standard error."""
+    for warning in warnings:
+        print(colour_text("warning:", "warning", sys.stderr) + f" {warning}", file=sys.stderr)
+
+
+def warn_about_incomplete_log(log: "FlightLog") -> None:
+    """Print a warning on standard error about the missing part of an incomplete log."""
+    from planfly.flight_logs import loss_text
+
+    print_warnings([loss_text(log)])
 
 
 # ----------------------------------------------------------------------

@@ -106,54 +106,25 @@ def fly_returns(
 
     def fly(k: int, positions: Floats, result: Record) -> None:
         """Simulate the RTL from start k, and fill its positions and its result."""
-        limits = timeouts[k], float(min_clearances[k]), float(min_distances[k])
-        transit_altitude = targets[k].transit_altitude
-        _fly_one(starts[k], routes[k], transit_altitude, record, aircraft, environment, limits, positions, result)
+        fly_rtl(
+            starts[k],
+            routes[k],
+            targets[k].transit_altitude,
+            record,
+            *aircraft.tables,
+            environment.heights,
+            environment.to_pixel,
+            environment.spheres,
+            environment.radii,
+            environment.known,
+            timeouts[k],
+            float(min_clearances[k]),
+            float(min_distances[k]),
+            positions,
+            result,
+        )
 
     return simulate_each(timeouts, fly, store_positions=store_positions)
-
-
-def _fly_one(
-    start: Record,
-    route: Records,
-    transit_altitude: float,
-    parameters: Record,
-    aircraft: PointMass,
-    environment: ReturnEnvironment,
-    limits: tuple[float, float, float],
-    positions: Floats,
-    result: Record,
-) -> None:
-    """Simulate one RTL by the compiled `fly_rtl`, to which the arrays of point mass and terrain are passed.
-
-    start: position, velocity, bank and time of the start, a `RETURN_START` record.
-    route: the start, then the loiter at the RTL's end, or the stops of a landing sequence and the landing.
-    transit_altitude: altitude to which an RTL to a landing sequence climbs first, m AMSL.
-    parameters: PX4's parameters, a `PX4_PARAMETERS` record.
-    aircraft: point mass of the aircraft in the wind.
-    environment: terrain and kill spheres from which the clearances are measured.
-    limits: timeout, s, and height above ground and distance outside spheres, m, below which the RTL is aborted.
-    positions: array (t, 3), m, to fill with one position per second until it is full.
-    result: `RETURN_RESULT` record to fill.
-    """
-    timeout, min_clearance, min_distance = limits
-    fly_rtl(
-        start,
-        route,
-        transit_altitude,
-        parameters,
-        *aircraft.tables,
-        environment.heights,
-        environment.to_pixel,
-        environment.spheres,
-        environment.radii,
-        environment.known,
-        timeout,
-        min_clearance,
-        min_distance,
-        positions,
-        result,
-    )
 
 
 def _make_route(start: Record, target: ReturnTarget, parameters: Px4Parameters) -> Records:
