@@ -135,7 +135,8 @@ class SurveyResult:
             texts += [line_text(number, line) for number, line in enumerate(lines, 1)]
         factor = self.setup.autopilot.speeds.true_airspeed_factor
         notes = camera_notes(self.setup.mission, self.setup.demanded_route, self.setup.scenario.wind, factor)
-        texts += [f"note: {note}" for note in notes]
+        gate_notes = [note for note in self.setup.demanded_route.notes if note.endswith(GATES_ARE_NO_WAYPOINTS)]
+        texts += [f"note: {note}" for note in (*notes, *gate_notes)]
         return (*texts, self.circles) if self.circles else tuple(texts)
 
     @property

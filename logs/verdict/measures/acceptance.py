@@ -272,15 +272,15 @@ def step_height(requirements: RouteRequirements, leg: int) -> float | None:
     return max_step if max_step <= NEGLIGIBLE_STEP_M else None
 
 
-def descent_on_next_leg(requirements: RouteRequirements, leg: int) -> float | None:
-    """Return the slope of a vertical descent and the next leg together, rad, if the descent is flown on that leg.
+def slope_with_next_leg(requirements: RouteRequirements, leg: int) -> float | None:
+    """Return the slope of a vertical leg and the next leg together, rad, if the autopilot flies both at once.
 
-    Return None if the leg is judged as drawn.  The slope is positive for a descent.
+    Return None if the leg is judged as drawn.  The slope is positive for a climb.
 
-    Where an item repeats the position of the item before it, ArduPlane passes both at once, whatever its altitude
-    (`verify_nav_wp`).  The aircraft is then only higher than the next leg.  PX4 passes the second item only within its
-    altitude tolerance, and otherwise circles.  A climb is judged as drawn, because the aircraft is lower than the next
-    leg; so are the first leg, a loiter, and a descent that is too steep for the next leg, too.
+    Where an item repeats the position of the item before it, ArduPlane passes both at once, whatever their altitudes
+    (`verify_nav_wp`).  The aircraft then climbs or descends along the next leg, below or above the line of that leg.
+    PX4 passes the second item only within its altitude tolerance, and otherwise circles.  The first leg, a loiter, and
+    a change of altitude that is too steep for the next leg are judged as drawn.
     """
     autopilot, points, next_leg = requirements.setup.autopilot, requirements.points, leg + 1
     if (
@@ -291,8 +291,9 @@ def descent_on_next_leg(requirements: RouteRequirements, leg: int) -> float | No
         or autopilot.turns.follows_path
     ):
         return None
-    descent = float(points[leg, 2] - points[next_leg, 2])
-    if descent <= 0.0 or (autopilot.deviations.altitude_parameter and descent > autopilot.loiters.altitude_tolerance):
+    climb = float(points[next_leg, 2] - points[leg, 2])
+    if climb == 0.0 or (autopilot.deviations.altitude_parameter and abs(climb) > autopilot.loiters.altitude_tolerance):
         return None
-    slope = math.atan2(float(points[leg, 2] - points[next_leg + 1, 2]), float(requirements.runs[next_leg]))
-    return slope if slope <= slope_limit(requirements, next_leg, is_climb=False)[0] + PLAN_TOLERANCE_RAD else None
+    slope = math.atan2(float(points[next_leg + 1, 2] - points[leg, 2]), float(requirements.runs[next_leg]))
+    limit = slope_limit(requirements, next_leg, is_climb=slope >= 0.0)[0]
+    return slope if abs(slope) <= limit + PLAN_TOLERANCE_RAD else None

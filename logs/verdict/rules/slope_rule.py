@@ -10,6 +10,7 @@ from aircraft.envelope import ground_slope
 from logs.verdict.findings import (
     AIRCRAFT_SLOPE,
     GROUND_FOLLOWING_ERROR,
+    NOT_FLOWN,
     PITCH_LIMIT_TIME,
     UNKNOWN_AIRCRAFT,
     Fact,
@@ -19,7 +20,7 @@ from logs.verdict.findings import (
     make_finding,
     message,
 )
-from logs.verdict.measures.acceptance import descent_on_next_leg, step_height
+from logs.verdict.measures.acceptance import slope_with_next_leg, step_height
 from logs.verdict.measures.ground_following import follows_ground, mean_ground_slope, steepest_ground
 from logs.verdict.measures.route_requirements import RouteRequirements, SteepArc, slope_limit, steep_arc
 from logs.verdict.measures.slopes import SlopeMeasure, measure_slope
@@ -54,38 +55,54 @@ def slope_findings(
     for leg in range(requirements.legs):
         if leg in turnaround_legs:
             continue
-        slope = descent_on_next_leg(requirements, leg)
-        if slope is None or not (geometric or (aligned is not None and aligned.passed[leg + 1])):
-            measure = None if geometric else SlopeMeasure()
-            if aligned is not None:
-                measure = measure_slope(requirements, aligned, leg)
-            is_complete = aligned is not None and bool(aligned.passed[-1])
-            findings.append(_leg_finding(requirements, leg, measure, is_complete=is_complete))
+        slope = slope_with_next_leg(requirements, leg)
+        if slope is not None and (geometric or (aligned is not None and aligned.passed[leg + 1])):
+            findings.append(_vertical_leg_finding(requirements, leg, slope, is_flown=not geometric))
             continue
-        # A vertical descent is flown on the next leg: `slope` is the slope of both together, positive for a descent.
-        limit, source = slope_limit(requirements, leg + 1, is_climb=False)
-        certain_limit = float(requirements.certain_dive[leg + 1])
-        is_uncertain = max(LEVEL_SLOPE_RAD, certain_limit) < slope and certain_limit < limit < math.inf
-        height = float(requirements.points[leg, 2] - requirements.points[leg + 1, 2])
-        findings.append(
-            make_finding(
-                "slope",
-                requirements.leg(leg),
-                ok=None if is_uncertain else True,
-                reason=f"{place_text(requirements.waypoint(leg + 1))} is passed at once; the {height:.0f} m down to it"
-                f" are flown on the next leg, which then needs {-math.degrees(slope):+.2f}°",
-                planned=-math.degrees(slope),
-                limit=-math.degrees(limit),
-                at_least=True,
-                source=source,
-                tolerance=math.degrees(PLAN_TOLERANCE_RAD),
-                margin=math.degrees(limit - slope),
-                unit="deg",
-                method="route",
-                check=UNKNOWN_AIRCRAFT if is_uncertain else "",
-            )
-        )
+        measure = None if geometric else SlopeMeasure()
+        if aligned is not None:
+            measure = measure_slope(requirements, aligned, leg)
+        is_complete = aligned is not None and bool(aligned.passed[-1])
+        findings.append(_leg_finding(requirements, leg, measure, is_complete=is_complete))
     return findings
+
+
+def _vertical_leg_finding(requirements: RouteRequirements, leg: int, slope: float, *, is_flown: bool) -> Finding:
+    """Judge a vertical leg whose change of altitude is flown on the next leg.
+
+    Without a flight a climb is not judged, because the aircraft is then below the next leg as drawn.
+
+    slope: slope of the vertical leg and the next leg together, rad, positive for a climb.
+    """
+    sign = math.copysign(1.0, slope)
+    limit, source = slope_limit(requirements, leg + 1, is_climb=sign > 0.0)
+    certain_limits = requirements.certain_climb if sign > 0.0 else requirements.certain_dive
+    is_uncertain = max(LEVEL_SLOPE_RAD, float(certain_limits[leg + 1])) < abs(slope)
+    check = UNKNOWN_AIRCRAFT if is_uncertain and float(certain_limits[leg + 1]) < limit < math.inf else ""
+    climb = float(requirements.points[leg + 1, 2] - requirements.points[leg, 2])
+    reason = (
+        f"{place_text(requirements.waypoint(leg + 1))} is passed at once; the {abs(climb):.0f} m"
+        f" {'up' if climb > 0.0 else 'down'} to it are flown on the next leg, which then needs"
+        f" {math.degrees(slope):+.2f}°"
+    )
+    if climb > 0.0 and not is_flown:
+        check = check or NOT_FLOWN
+        reason += ", and the aircraft flies below that leg as drawn, which only a flight can judge"
+    return make_finding(
+        "slope",
+        requirements.leg(leg),
+        ok=None if check else True,
+        reason=reason,
+        planned=math.degrees(slope),
+        limit=math.degrees(sign * limit),
+        at_least=sign < 0.0,
+        source=source,
+        tolerance=math.degrees(PLAN_TOLERANCE_RAD),
+        margin=math.degrees(limit - abs(slope)),
+        unit="deg",
+        method="route",
+        check=check,
+    )
 
 
 def _leg_finding(

@@ -5,7 +5,7 @@ import math
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -20,6 +20,7 @@ from logs.verdict.measures.route_requirements import judged_surveys, route_requi
 from logs.verdict.measures.track_alignment import align_track
 from logs.verdict.places import Place
 from logs.verdict.verdict import Verdict
+from planfly.api.surveying import SurveyResult
 from planfly.surveys import survey_remedies as remedies
 from planfly.surveys.survey_text import count_line_photos, overlap_lines, remedy_text, slow_camera_text
 from planfly.workflow.open_flight import open_flight
@@ -255,3 +256,17 @@ def test_lines_over_unknown_ground_are_neither_usable_nor_lost_and_nothing_is_tr
     assert text.startswith("nothing was tried: 2 photo lines outside the data of ")
     assert text.endswith(" an elevation file of the whole survey is needed (--terrain)")
     assert open_.survey_lines[-2].endswith("1000 m  not judged: 10 % over unknown ground")
+
+
+def test_a_survey_states_gates_that_no_autopilot_flies_to(tmp_path: Path) -> None:
+    """A gate 15 m beside the line switches the camera where the line passes it, not where it was drawn."""
+    items = []
+    for k in range(3):
+        north = [-300.0, 0.0, 1000.0, 1300.0][:: 1 if k % 2 == 0 else -1]
+        on = [wp(50.0 * k + 15.0, north[1], 100.0, command=4501), "2 206 25 0 1 0 0 0 0"]
+        off = [wp(50.0 * k, north[2], 100.0, command=4501), "2 206 0 0 1 0 0 0 0"]
+        items += [wp(50.0 * k, north[0], 100.0), *on, *off, wp(50.0 * k, north[3], 100.0)]
+    setup = setup_with(tmp_path, mission(*items))
+    reason = "no autopilot flies to a gate (CONDITION_GATE): a survey with gates needs turn-arounds"
+    result = SurveyResult(setup, cast(Any, None), cast(Any, None), (), ())
+    assert f"note: items 2, 8, 14: passed at more than 10 m, because {reason}" in result.survey_lines
