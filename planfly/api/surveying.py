@@ -27,6 +27,7 @@ from logs.verdict.measures.photo_lines import (
 from logs.verdict.measures.route_requirements import RouteRequirements, judged_surveys, route_requirements
 from logs.verdict.measures.track_alignment import align_track
 from logs.verdict.measures.waypoint_circles import circles_text, waypoint_circles
+from logs.verdict.rules.survey_rule import crab_text
 from logs.verdict.verdict import Verdict
 from logs.views.surveys import survey_chart
 from planfly.api.api_function import api_function
@@ -113,6 +114,7 @@ class SurveyResult:
         """Summary of all photo lines and of overlaps that are too small, in one line."""
         faults = [fault for overlap in self.overlaps for fault in overlap_faults(overlap).values()]
         faults += [slow_camera_text(overlap) for overlap in self.overlaps if overlap and overlap.is_camera_limited]
+        faults += [crab_text(overlap) for overlap in self.overlaps if overlap and overlap.is_side_unknown]
         return "; ".join([lines_headline([line for lines in self.lines for line in lines]), *dict.fromkeys(faults)])
 
     @property
