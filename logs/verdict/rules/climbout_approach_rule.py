@@ -130,8 +130,16 @@ def climbout_findings(
     if takeoff is not None:
         if takeoff.command == Command.NAV_VTOL_TAKEOFF:
             return []
-        launch = _find_launch(requirements)
-        course = launch.course
+        # The launch is on the scenario's course, or along the first leg if the scenario states no course.
+        stated_launch = requirements.setup.scenario.launch
+        course, slope = float(requirements.courses[0]), math.tan(float(requirements.slopes[0]))
+        launch = _Launch(course, float(requirements.runs[0]), slope)
+        if stated_launch is not None and stated_launch.course is not None:
+            course_text = f"on the launch course {round(math.degrees(stated_launch.course)) % 360}°"
+            launch = launch._replace(course_text=course_text)
+            if abs(float(wrap(stated_launch.course - course))) > PLAN_TOLERANCE_RAD:
+                course = stated_launch.course
+                launch = _Launch(course, leg_length=math.inf, slope=0.0, course_text=course_text)
     else:
         course = math.atan2(first_point[0] - start[0], first_point[1] - start[1])
         distance = math.dist(first_point[:2], start)
@@ -203,20 +211,6 @@ class _Launch(NamedTuple):
     leg_length: float
     slope: float
     course_text: str = ""
-
-
-def _find_launch(requirements: RouteRequirements) -> _Launch:
-    """Return the launch on the scenario's course, or along the first leg if the scenario states no course."""
-    stated_launch = requirements.setup.scenario.launch
-    first_leg = _Launch(
-        float(requirements.courses[0]), float(requirements.runs[0]), math.tan(float(requirements.slopes[0]))
-    )
-    if stated_launch is None or stated_launch.course is None:
-        return first_leg
-    course_text = f"on the launch course {round(math.degrees(stated_launch.course)) % 360}°"
-    if abs(float(wrap(stated_launch.course - first_leg.course))) <= PLAN_TOLERANCE_RAD:
-        return first_leg._replace(course_text=course_text)
-    return _Launch(stated_launch.course, leg_length=math.inf, slope=0.0, course_text=course_text)
 
 
 class _Climb(NamedTuple):

@@ -138,8 +138,33 @@ def _judge_planned_turn(
     if lateral is not None:
         facts.append(f"a negligible kink: a flyable path without this waypoint passes it at {lateral:.1f} m")
         return [], facts, "", None
-    # The message states the turn and its limit.
-    sharp_turn = _sharp_turn_message(requirements, waypoint, turn, limit, source)
+    # The message states the turn and the scenario's limit, or the length of leg that the turn needs.
+    speed = float(max(requirements.route.leg_airspeeds[waypoint - 1 : waypoint + 1]))
+    radius, bank_text = float(requirements.radius[waypoint]), bank_limit_text(requirements.setup)
+    if source == "scenario":
+        sharp_turn = message(f"{turn_text}, more than the scenario's limit of {math.degrees(limit):.1f}°")
+    elif not math.isfinite(radius):
+        sharp_turn = message(f"{turn_text} where the wind is too strong to hold the course of a leg at {speed:.0f} m/s")
+    elif requirements.setup.route.arc_radii[waypoint] > 0.0:
+        sharp_turn = message(
+            f"circles with radius {radius:.0f} m",
+            f"; at {speed:.0f} m/s and {bank_text} the smallest turn radius on these courses"
+            f" in this wind is {requirements.min_radius[waypoint]:.0f} m",
+        )
+    else:
+        used_length = float(requirements.length_after[waypoint])
+        length_text = "no leg would be long enough for the turn"
+        if used_length < MAX_FLY_BY_OFFSET_RADII * radius:
+            is_fly_over = requirements.setup.route.fly_over[waypoint]
+            used_text = "the next leg, after the waypoint" if is_fly_over else "each leg"
+            length_text = f"the turn takes {used_length:.0f} m of {used_text}"
+        room_text = f"room for only {math.degrees(limit):.1f}°" if limit > 0.0 else "no room"
+        sharp_turn = message(
+            f"{turn_text}, but its legs ({requirements.runs[waypoint - 1]:.0f} m and {requirements.runs[waypoint]:.0f}"
+            f" m) leave {room_text}",
+            f" beside the neighbouring turns. At {speed:.0f} m/s and {bank_text} the radius is {radius:.0f} m, and"
+            f" {length_text}",
+        )
     # The aircraft's bank limit may be a guess.
     if source == "aircraft" and turn <= float(requirements.possible_turn_limit[waypoint]) + PLAN_TOLERANCE_RAD:
         return [], [sharp_turn.text], UNKNOWN_AIRCRAFT, turn
@@ -167,49 +192,6 @@ def _unflown_turn_text(
         f"{requirements.setup.autopilot.title} flew {place_text(requirements.leg(leg))} for only"
         f" {active_time:.1f} s: the leg is {leg_length:.0f} m long, and a waypoint counts as reached within"
         f" {radius:.0f} m"
-    )
-
-
-def _sharp_turn_message(
-    requirements: RouteRequirements, waypoint: int, planned_turn: float, limit: float, source: str
-) -> Message:
-    """Explain why the planned turn at a waypoint is too sharp.
-
-    The message states the scenario's limit, or the length of leg that the turn needs.  All angles are in rad.
-
-    limit: largest allowed turn at the waypoint.
-    source: where the limit comes from, "scenario" or "aircraft".
-    """
-    turn_text = f"turns {math.degrees(planned_turn):.1f}°"
-    if source == "scenario":
-        return message(f"{turn_text}, more than the scenario's limit of {math.degrees(limit):.1f}°")
-    speed = float(max(requirements.route.leg_airspeeds[waypoint - 1 : waypoint + 1]))
-    bank_text = bank_limit_text(requirements.setup)
-    radius = float(requirements.radius[waypoint])
-    if not math.isfinite(radius):
-        return message(f"{turn_text} where the wind is too strong to hold the course of a leg at {speed:.0f} m/s")
-    if requirements.setup.route.arc_radii[waypoint] > 0.0:
-        return message(
-            f"circles with radius {radius:.0f} m",
-            f"; at {speed:.0f} m/s and {bank_text} the smallest turn radius on these courses"
-            f" in this wind is {requirements.min_radius[waypoint]:.0f} m",
-        )
-    length_text = "no leg would be long enough for the turn"
-    if requirements.length_after[waypoint] < MAX_FLY_BY_OFFSET_RADII * radius:
-        length_text = f"the turn takes {requirements.length_after[waypoint]:.0f} m of each leg"
-        if requirements.setup.route.fly_over[waypoint]:
-            length_text = (
-                f"the turn takes {requirements.length_after[waypoint]:.0f} m of the next leg, after the waypoint"
-            )
-    length_before, length_after = requirements.runs[waypoint - 1], requirements.runs[waypoint]
-    legs_text = f"its legs ({length_before:.0f} m and {length_after:.0f} m)"
-    room_text = (
-        f"{legs_text} leave room for only {math.degrees(limit):.1f}°" if limit > 0.0 else f"{legs_text} leave no room"
-    )
-    return message(
-        f"{turn_text}, but {room_text}",
-        f" beside the neighbouring turns. At {speed:.0f} m/s and {bank_text} the radius is {radius:.0f} m, and"
-        f" {length_text}",
     )
 
 
