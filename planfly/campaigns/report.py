@@ -533,20 +533,25 @@ def _flown_bound_lines(winds: WindsResult) -> list[str]:
     for is_estimated, (flyable, failed) in zip(winds.estimated, winds.flown_bounds, strict=True):
         if is_estimated:
             texts.append(None)
-        elif failed is None:
-            texts.append("not enough flights" if flyable is None else f"at least {flyable:.1f} m/s")
-        elif flyable is None:
-            texts.append(f"below {failed:.1f} m/s")
         else:
-            texts.append(f"between {flyable:.1f} and {failed:.1f} m/s")
+            parts = [] if flyable is None else [f"no failure up to {flyable:.1f} m/s"]
+            parts += [] if failed is None else [f"weakest failure at {failed:.1f} m/s"]
+            texts.append(", ".join(parts) or "not enough flights")
     counts = winds.flight_counts()
-    lines = ["directions in which the boundary is not proven, with the wind speed that their own flights suggest:"]
+    left_out = {*winds.lost, *(number for number, _ in winds.undecided)}
+    failed_counts = Counter(
+        direction
+        for number, (direction, _, is_flyable) in enumerate(winds.flights)
+        if not is_flyable and number not in left_out
+    )
+    lines = ["directions in which the boundary is not proven, with their own flights:"]
     for text, group in groupby(range(len(texts)), key=lambda number: texts[number]):
         if text is not None:
             numbers = list(group)
             last = f" to {winds.from_deg(numbers[-1]):g}°" if len(numbers) > 1 else ""
             flights = count_text(sum(counts[number] for number in numbers), "flight")
-            lines.append(f"  from {winds.from_deg(numbers[0]):g}°{last}: {text} ({flights})")
+            failed_count = sum(failed_counts[number] for number in numbers)
+            lines.append(f"  from {winds.from_deg(numbers[0]):g}°{last}: {text} ({failed_count} of {flights} failed)")
     return lines
 
 

@@ -459,6 +459,8 @@ def campaign_lines(summary: CampaignSummary) -> list[str]:
         "missed": f"the probability of a flyable flight is below {target}",
         "undecided": f"it is undecided whether the probability of a flyable flight is at least {target}",
     }
+    varied = [QUANTITY_BY_NAME[name].title if name in QUANTITY_BY_NAME else name for name in summary.dispersions]
+    constant = [quantity.title for name, quantity in QUANTITY_BY_NAME.items() if name not in summary.dispersions]
     answer_text = texts.get(estimate.answer, "no target is set (--prove P or --at-least P)")
     lines = [
         f"{answer_text}: {_flyable_text(tally)}, {share_text}"
@@ -469,6 +471,8 @@ def campaign_lines(summary: CampaignSummary) -> list[str]:
         f" {estimate.interval.high:.4f}",
         *deciding_flights_lines,
         *(f"  {line}" for line in flown_lines(summary.conditions)),
+        f"  Varied around these conditions: {', '.join(varied) or 'nothing'}; the same in every flight:"
+        f" {', '.join(constant) or 'nothing else'}",
         *([f"  Not judged: return ({summary.unjudged_return})"] if summary.unjudged_return else []),
         *undecided_lines(summary),
     ]

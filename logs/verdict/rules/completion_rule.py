@@ -41,7 +41,9 @@ def completion_findings(
         # A leg counts as flown only once its loiter is complete.
         flown_count = leg_count - len(set(leg_numbers[~aligned.passed[1:]].tolist()))
         if flown_count < leg_count:
-            faults.append(message(f"{flown_count} of {count_text(leg_count, 'leg')} flown"))
+            first_unflown = place_text(requirements.leg(int(np.argmin(aligned.passed[1:]))))
+            unflown_text = f"; the first leg that was not flown to its end is {first_unflown}"
+            faults.append(message(f"{flown_count} of {count_text(leg_count, 'leg')} flown", unflown_text))
         # A long gap between the log's rows, and positions that contradict the velocities, are faults, too.
         track = aligned.track
         steps = np.diff(track.time)

@@ -72,7 +72,7 @@ def _planned_finding(requirements: RouteRequirements, waypoint: int) -> Finding:
         reason=finding_reason(faults) if faults else fact,
         faults=faults,
         planned=offset,
-        limit=condition.radius,
+        limit=round(condition.radius, 3),
         source=condition.source,
         tolerance=ROUNDING_M,
         margin=condition.radius - offset if autopilot.turns.follows_path else None,
@@ -143,7 +143,7 @@ def _flown_finding(
         faults=faults,
         planned=offset,
         flown=distance,
-        limit=condition.radius,
+        limit=round(condition.radius, 3),
         source=condition.source,
         tolerance=condition.tolerance,
         # A waypoint reached by crossing its line has no margin, nor does one that was not reached.
