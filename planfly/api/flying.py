@@ -30,9 +30,8 @@ from planfly.flight_options import (
     select_mission_options,
 )
 from planfly.kernel_units.unit_kernels import FLYING, PLANNING_AND_FLYING
-from planfly.runtime.stages import report_replaced, stage
+from planfly.runtime.stages import report_replaced
 from planfly.workflow import pipeline
-from planfly.workflow.flight_limits import FlightLimits, computing_time_key, length_and_duration_text
 from planfly.workflow.open_flight import open_flight
 from planfly.workflow.output_paths import (
     FLY_LOG,
@@ -42,11 +41,13 @@ from planfly.workflow.output_paths import (
     prepare_folder,
 )
 from planfly.workflow.pipeline import (
+    FlightLimits,
     FlownMission,
     PlanThenFly,
     ReturnSummary,
     autopilot_log_path,
     fly_and_judge,
+    flying_stage,
     return_summary,
 )
 from planfly.workflow.suggestion_trials import judge_mission_geometry
@@ -168,10 +169,8 @@ def fly(
     limits = FlightLimits(options["max_hours"], options["max_log"])
     program = None if options["sitl"] is None else check_program(options["sitl"])
     setup = open_flight(mission, options, program, options["engine"])
-    target = None if log is None else expand_path_pattern(log, setup.name, setup.seed)
-    if target is not None:
-        _clear_log_file(target, log, mission, program, overwrite)
-    with stage(f"flying {length_and_duration_text(setup)}", computing_time_key(setup)) as advance:
+    target = None if log is None else _prepare_log_file(log, setup, mission, program, overwrite)
+    with flying_stage(setup) as advance:
         return fly_and_judge(
             setup,
             target,
@@ -216,17 +215,19 @@ def fly_by_each(
     return flights
 
 
-def _clear_log_file(
-    target: Path, log: str | Path | None, mission: Plan | str | Path, program: Path | None, overwrite: bool
-) -> None:
-    """Make the folder of a flight log, and remove an existing log and the autopilot program's log.
+def _prepare_log_file(
+    log: str | Path, setup: FlightSetup, mission: Plan | str | Path, program: Path | None, overwrite: bool
+) -> Path:
+    """Return the file of a flight's log, after making its folder and removing an existing log.
 
-    target: the file of the log.
-    log: the file as the user named it.
+    The log of the autopilot program is removed, too.
+
+    log: the file as the user named it, in which {name} and {seed} are replaced.
     Raises PlanflyError for a file that cannot be written, and for an existing file without `overwrite`.
     """
+    target = expand_path_pattern(log, setup.name, setup.seed)
     source = None if isinstance(mission, Plan) else Path(mission)
-    folder_must_exist = log is not None and target == Path(log)
+    folder_must_exist = target == Path(log)
     check_output_file(target, overwrite, source, suffix=".mcap", folder_must_exist=folder_must_exist)
     if program is not None:
         program_log = autopilot_log_path(target, program)
@@ -236,6 +237,7 @@ def _clear_log_file(
         # Remove the report and the pictures of the previous flight.
         prepare_folder(target.parent, LOG_FIGURES)
     report_replaced(target, *((autopilot_log_path(target, program),) if program is not None else ()))
+    return target
 
 
 # ----------------------------------------------------------------------
