@@ -29,9 +29,8 @@ from planfly.flight_options import (
     select_mission_options,
 )
 from planfly.kernel_units.unit_kernels import FLYING, PLANNING_AND_FLYING
-from planfly.runtime.stages import report_replaced, stage
+from planfly.runtime.stages import report_replaced
 from planfly.workflow import pipeline
-from planfly.workflow.flight_limits import FlightLimits, computing_time_key, length_and_duration_text
 from planfly.workflow.open_flight import open_flight
 from planfly.workflow.output_paths import (
     FLY_LOG,
@@ -41,11 +40,13 @@ from planfly.workflow.output_paths import (
     prepare_folder,
 )
 from planfly.workflow.pipeline import (
+    FlightLimits,
     FlownMission,
     PlanThenFly,
     ReturnSummary,
     autopilot_log_path,
     fly_and_judge,
+    flying_stage,
     return_summary,
 )
 from planfly.workflow.suggestion_trials import judge_mission_geometry
@@ -180,7 +181,7 @@ def fly(
             # Remove the report and the pictures of the previous flight.
             prepare_folder(target.parent, LOG_FIGURES)
         report_replaced(target, *program_logs)
-    with stage(f"flying {length_and_duration_text(setup)}", computing_time_key(setup)) as advance:
+    with flying_stage(setup) as advance:
         return fly_and_judge(
             setup,
             target,

@@ -52,10 +52,9 @@ from planfly.surveys.survey_text import (
     survey_text,
     usable_segments_text,
 )
-from planfly.workflow.flight_limits import length_and_duration_text
 from planfly.workflow.open_flight import open_flight
 from planfly.workflow.output_paths import SURVEY_FILES, check_output_folder, clean_folder
-from planfly.workflow.pipeline import FlownMission, fly_and_judge
+from planfly.workflow.pipeline import FlownMission, fly_and_judge, flying_stage
 from planfly.workflow.uav import uav_of_setup
 from world.errors import ArgumentError, LogError, MissionError, ParameterError
 from world.files import read_small_file, utf8_text, write_atomically
@@ -232,7 +231,7 @@ def survey(
     planned_setup = open_flight(what, options)
     setup = _with_camera(planned_setup.in_scenario(_with_parallel_lines_as_survey(planned_setup.scenario)), user_camera)
     _check_has_survey(setup)
-    with stage(f"flying {length_and_duration_text(setup)}", "flying a survey") as advance:
+    with flying_stage(setup, "flying a survey") as advance:
         flight = fly_and_judge(setup, log=None, advance=advance, reference="never")
     result = _measure_survey(route_requirements(flight.setup), flight.track, flight.verdict)
     if suggest and not result.usable and not result.unknown_lines:

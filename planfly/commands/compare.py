@@ -37,9 +37,11 @@ def compare(args: argparse.Namespace) -> int:
     """
     from logs.recording.reader import read_log
     from planfly.api import reporting
+    from planfly.campaigns.compare_campaigns import campaign_table
 
-    if any(_is_campaign(Path(name)) for name in (args.first, args.second)):
-        return _compare_campaigns(args)
+    for path in (Path(args.first), Path(args.second)):
+        if (path.is_dir() or path.suffix == ".sqlite") and campaign_table(path) is not None:
+            return _compare_campaigns(args)
     from logs.views.report.compare import difference_lines
 
     logs = [read_log(Path(file)) for file in (args.first, args.second)]
@@ -55,13 +57,6 @@ def compare(args: argparse.Namespace) -> int:
     code = INCOMPLETE if incomplete_logs else FLYABLE
     write_json_if_requested(args, lambda: _json_answer(comparison, files, code))
     return code
-
-
-def _is_campaign(path: Path) -> bool:
-    """Return True if a path is the folder or the table of a campaign."""
-    from planfly.campaigns.compare_campaigns import campaign_table
-
-    return (path.is_dir() or path.suffix == ".sqlite") and campaign_table(path) is not None
 
 
 def _compare_campaigns(args: argparse.Namespace) -> int:

@@ -586,7 +586,17 @@ def write_error_if_requested(args: argparse.Namespace, code: int, message: str) 
     # An option of another command may have the name of an argument, such as --scenario.
     names = ("what", "mission", "log", "scenario", "target")
     source = next((value for name in names if (value := getattr(args, name, None)) is not None), args.command)
-    _write_error(getattr(args, "json", None), getattr(args, "junit", None), str(source), code, message)
+    json_target, junit_target = getattr(args, "json", None), getattr(args, "junit", None)
+    if json_target is not None:
+        text = json.dumps({"schema": ERROR_SCHEMA, "exit_code": code, "error": message}, indent=1) + "\n"
+        if json_target == STANDARD_OUTPUT:
+            print(escape_json_controls(text), end="", file=_output.get() or sys.stdout)
+        else:
+            _replace_or_remove(Path(json_target), text)
+    if junit_target is not None:
+        from logs.verdict.junit import junit_error_text
+
+        _replace_or_remove(Path(junit_target), junit_error_text(str(source), message))
 
 
 def write_usage_error_if_requested(
@@ -618,20 +628,6 @@ def write_usage_error_if_requested(
         setattr(args, f"argument_{number}", argument.partition("=")[2] if argument.startswith("--") else argument)
     with contextlib.suppress(PlanflyError), redirect_output(args):
         write_error_if_requested(args, BAD_INPUT, message)
-
-
-def _write_error(json_target: str | None, junit_target: str | None, source: str, code: int, message: str) -> None:
-    """Write an error as JSON and as JUnit XML.  source: name of the mission or log."""
-    if json_target is not None:
-        text = json.dumps({"schema": ERROR_SCHEMA, "exit_code": code, "error": message}, indent=1) + "\n"
-        if json_target == STANDARD_OUTPUT:
-            print(escape_json_controls(text), end="", file=_output.get() or sys.stdout)
-        else:
-            _replace_or_remove(Path(json_target), text)
-    if junit_target is not None:
-        from logs.verdict.junit import junit_error_text
-
-        _replace_or_remove(Path(junit_target), junit_error_text(source, message))
 
 
 def _replace_or_remove(file: Path, text: str) -> None:
