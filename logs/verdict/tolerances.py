@@ -10,9 +10,9 @@ from aircraft import envelope
 
 # Precision of a plan's numbers
 
-# rad.  Tolerance of a planned angle: 1e-7 degrees of latitude (1 cm) on a 130 m leg, and rounding.
+# rad.  Tolerance of a planned angle. Items are rounded to 1e-7 degrees (1 cm), which turns a leg of 130 m by this much.
 PLAN_TOLERANCE_RAD = math.radians(0.01)
-# m.  The 1e-7 degrees of a mission file move a waypoint by up to 1 cm in each direction.
+# m.  A mission file states positions to 1e-7 degrees. This rounding moves a waypoint by up to 1 cm in each direction.
 ROUNDING_M = 0.02
 # m.  A leg, a loiter or a return may be this far below the required height above ground: the effect of `ROUNDING_M` on
 # steep ground.
@@ -40,7 +40,7 @@ LOITER_WIDENING_FRACTION = 0.25
 # m/s) it reached up to 2.09. It also stays within this distance of the last waypoint that the simulated PX4 circles:
 # up to 2.06 in 54 flights, in radii of that arc or of the loiter, whichever is larger.
 LOITER_SWING_RADII = 2.25
-# m.  A leg shorter than this is a vertical leg, with no course of its own.
+# m.  A leg that is horizontally shorter than this is a vertical climb or descent, and has no course of its own.
 MIN_LEG_LENGTH_M = 0.5
 # rad.  Largest bank that is possible if the bank limit is only guessed; a lower limit of autopilot or scenario
 # replaces it. What passes only with this bank is undecided. It is the steepest bank that a data sheet or a scenario
@@ -55,19 +55,19 @@ MAX_FLY_BY_OFFSET_RADII = 30.0
 
 # rad.  The mean bank over a second may exceed the limit by this: roll in gusts is not part of the turn.
 BANK_TOLERANCE_RAD = math.radians(5.0)
-# m.  Tolerance for a turn flown outside its arc.
+# m.  A turn may be flown this far outside its arc.
 OVERSHOOT_TOLERANCE_M = 5.0
-# m.  Mean distance from the next leg in the last second of a settled turn.
+# m.  A turn has settled if the mean distance from the next leg over a second is at most this.
 SETTLED_CROSS_TRACK_M = 1.0
 # m, by turbulence.  Increase of `SETTLED_CROSS_TRACK_M` by gusts.
 GUST_OFFSET_M = {"none": 0.0, "light": 0.5, "moderate": 1.0}
-# Fraction of the passing distance.  A turn may pass its waypoint closer than the arc at the bank limit, by the sum of
-# this and `CORNER_CUT_TOLERANCE_M`.
+# Fraction of the passing distance.  A turn may pass its waypoint closer than the arc at the bank limit does, by this
+# fraction of the arc's distance plus `CORNER_CUT_TOLERANCE_M`.
 CORNER_CUT_FRACTION = 0.01
-# m, by turbulence.  Cross-track error of an aircraft with good guidance: added to `CORNER_CUT_FRACTION` of the
-# passing distance.
+# m, by turbulence.  Cross-track error of an aircraft with good guidance: a turn may pass its waypoint closer than the
+# arc at the bank limit does, by this plus `CORNER_CUT_FRACTION` of the arc's distance.
 CORNER_CUT_TOLERANCE_M = {"none": 0.6, "light": 0.8, "moderate": 1.0}
-# Standard deviations.  Largest navigation error that the rules take into account.
+# Standard deviations.  Largest error of the navigation that the rules take into account.
 NAVIGATION_SIGMAS = 3.0
 # s.  A turn is measured for at most this long after its arc.
 SETTLING_WATCH_TIME_S = 10.0
@@ -77,7 +77,8 @@ STRAIGHT_RADIUS_RATIO = 10.0
 # Fraction of the corridor's half width.  A corner is negligible if the path without its waypoint passes the waypoint
 # within this. An aircraft on that path, or as far away on the waypoint's other side, is well inside the corridor.
 KINK_FRACTION = 0.25
-# Waypoints.  At most this many in a row are treated as one kink, or as one step; a survey's shortest lines are longer.
+# Waypoints.  Largest number of consecutive waypoints that are left out together when a turn or a step of altitude is
+# tested for being negligible. The lines of a survey are longer than such a piece.
 KINK_WAYPOINT_COUNT = 8
 
 # The slope rule
@@ -88,15 +89,16 @@ KINK_WAYPOINT_COUNT = 8
 NEGLIGIBLE_STEP_M = 10.0
 # rad.  A fitted slope may differ from the plan by this, in addition to the fit's own tolerance.
 SLOPE_TOLERANCE_RAD = math.radians(0.5)
-# m.  Largest height error from the leg's line, outside the blends at its ends.
+# m.  Largest distance above or below the leg's line. The blends at the leg's ends, where the slope changes, do not
+# count.
 HEIGHT_ERROR_LIMIT_M = 10.0
-# m.  Largest height error of a leg without any part outside the blends.
+# m.  Largest distance above or below the line of a leg that is so short that it consists of blends only.
 SHORT_LEG_HEIGHT_ERROR_LIMIT_M = 15.0
 # rad.  The pitch counts as being at the autopilot's limit if it is at most this far below the limit.
 PITCH_LIMIT_TOLERANCE_RAD = math.radians(1.0)
-# rad.  A leg with a smaller slope is level.
+# rad.  A leg with a gentler slope counts as level.
 LEVEL_SLOPE_RAD = math.radians(0.5)
-# m/s.  A reason calls wind below this speed calm air.
+# m/s.  Texts call a wind below this calm air.
 CALM_WIND_MPS = 0.5
 # m/s.  Tolerance of the mean airspeed while the throttle is at a limit, or of the airspeed on an arc; in turbulence the
 # standard deviation of the gusts is added.
@@ -105,31 +107,34 @@ SPEED_TOLERANCE_MPS = 1.0
 # to 0.2 at the ground.
 GUST_SPEED_FRACTION = 0.15
 # Standard deviations.  A slope is undecided if it is closer than this to the limit of an uncertain aircraft model: 95 %
-# one-sided, of a normal distribution.  Plans keep the same distance, so the value is the envelope's.
+# one-sided, of a normal distribution.  The planner keeps the same distance from the limit.
 UNDECIDED_FRACTION = envelope.UNDECIDED_SIGMAS
-# s.  Minimum duration of a climb at full throttle, or of a glide with closed throttle, that shows the aircraft's
+# s.  A climb at full throttle, or a glide with closed throttle, must last at least this long to show the aircraft's
 # ability: the speed settles in 5 s, and the gusts of 15 s average out.
 MIN_EVIDENCE_FLIGHT_S = 20.0
-# rad.  A measured ability may be less than a leg's slope by the sum of this and `ABILITY_SIGMAS` standard errors.
+# rad.  The ability (the steepest slope that a flight shows to be possible) may be less than a leg's slope by the sum of
+# this and `ABILITY_SIGMAS` standard errors.
 ABILITY_TOLERANCE_RAD = math.radians(0.1)
-# Standard errors.  Largest error of a measured ability that the rules take into account.
+# Standard errors.  Largest error of a measured ability (steepest possible slope) that the rules take into account.
 ABILITY_SIGMAS = 3.0
 
 # Measured slopes
 
-# s.  A leg is not flyable if the throttle is at a limit, and the mean airspeed off its command, for this long. Shorter
-# saturation is normal.
+# s.  Shortest time for which the throttle must be at a limit, while the mean airspeed is off its command, to show that
+# a leg is too steep. Shorter times at a limit are normal.
 SATURATED_TIME_S = 5.0
 # s.  On a constant slope at airspeed V, air that rises at w adds airspeed at the rate g w/V. Drag removes this airspeed
 # after about this time.
 SPEED_MEMORY_S = 12.0
-# m/s.  Smallest airspeed V in the rate g w/V. It bounds the rate for an aircraft that has nearly stopped.
+# m/s.  Smallest airspeed V with which the rate g w/V of `SPEED_MEMORY_S` is computed. It bounds the rate for an
+# aircraft that has nearly stopped.
 MIN_AIRBORNE_AIRSPEED_MPS = 10.0
-# Fraction of a window during which the throttle must be at a limit for the window to be saturated.
+# Fraction of a time window.  The throttle counts as being at a limit in a window if it is there for at least this
+# fraction of it.
 SATURATED_FRACTION = 0.8
-# Throttle, relative to the autopilot's limit.  A throttle of at least this is at its upper limit.
+# Throttle, relative to the autopilot's limit.  A throttle of at least this counts as full.
 FULL_THROTTLE_FRACTION = 0.99
-# Throttle 0..1.  A throttle of at most this is at its lower limit.
+# Throttle 0..1.  A throttle of at most this counts as idle.
 IDLE_THROTTLE_FRACTION = 0.01
 # A.  The motor is off if the battery current is at most this.
 ZERO_CURRENT_A = 0.02
@@ -138,24 +143,25 @@ ZERO_CURRENT_A = 0.02
 SATURATED_THROTTLE_FRACTION = 0.999
 # s.  Shortest time over which a climb or sink ability is measured.
 ABILITY_WINDOW_S = 1.5
-# s.  Time after the throttle reaches its limit from which an ability is measured.
+# s.  An ability to climb or sink is measured from this time after the throttle has reached its limit.
 ABILITY_SETTLING_S = 0.5
-# s.  Time after which measured values are independent.
+# s.  Values that are measured this far apart count as independent.
 ABILITY_SAMPLE_INTERVAL_S = 0.5
-# m/s of climb.  Resolution of speed and acceleration.
+# m/s of climb.  Resolution of the climb rate that follows from speed and acceleration.
 CLIMB_RATE_RESOLUTION_MPS = 0.02
-# Condition number above which the moments of a plane do not determine it.
+# Condition number.  A fit of measured climb rates is not used if its equations have a larger condition number, because
+# they then do not determine the result.
 MAX_CONDITION_NUMBER = 1e7
 # rad.  A measured ability with a larger standard error is not used.
 MAX_ABILITY_STD_ERROR_RAD = math.radians(0.3)
-# m/s^2.  Acceleration with which the aircraft is assumed to take up another commanded speed.
+# m/s^2.  Acceleration with which the aircraft is assumed to change to another commanded airspeed.
 MAX_STEADY_ACCELERATION_MPS2 = 0.5
 
 # Courses and slopes by least squares
 
-# m.  Length at either end of a leg that is left out of a fit, beyond the turns' tangents.
+# m.  Length at either end of a leg, beyond the turns, that is left out of a fit of its course or slope.
 TURN_EXCLUSION_M = 100.0
-# m.  Length that is left out of a fit, beyond the blend of slopes, and at a route's first waypoint.
+# m.  Length that is left out of a fit of a leg's slope next to a change of slope, and at the route's first waypoint.
 BLEND_EXCLUSION_M = 20.0
 # m.  Shortest piece of a leg to which a course is fitted.
 MIN_COURSE_STRETCH_M = 60.0
@@ -163,47 +169,47 @@ MIN_COURSE_STRETCH_M = 60.0
 MIN_SLOPE_STRETCH_M = 100.0
 # s.  Shortest time over which a slope is measured: over a shorter time the measured slope is too steep by degrees.
 MIN_STRETCH_TIME_S = 4.0
-# rad.  Resolution of a fitted course in calm air.
+# rad.  Smallest error of a fitted course, in calm air.
 COURSE_ERROR_FLOOR_RAD = math.radians(0.02)
-# rad.  Resolution of a fitted slope in calm air.
+# rad.  Smallest error of a fitted slope, in calm air.
 SLOPE_ERROR_FLOOR_RAD = math.radians(0.1)
-# rad.  Largest tolerance of a fit, including unsteady flight.
+# rad.  Largest tolerance of a fitted course or slope, even if the flight was unsteady.
 MAX_UNSTEADINESS_RAD = math.radians(0.5)
-# rad.  Tolerance of a course that was not fitted.
+# rad.  Tolerance of a flown course on a leg that is too short for a fit.
 ROUGH_COURSE_ERROR_RAD = math.radians(0.75)
-# rad.  Tolerance of a slope that was not fitted.
+# rad.  Tolerance of a flown slope on a leg that is too short for a fit.
 ROUGH_SLOPE_ERROR_RAD = math.radians(0.5)
 
 # The rules on waypoints, speed, departure and completion
 
-# m.  If neither mission nor autopilot states an acceptance radius, a waypoint is reached within this plus the distance
-# at which the fly-by path passes it.  A corridor is also wider by this than its turns need.
+# m.  If neither mission nor autopilot states an acceptance radius, it is the distance at which the fly-by path passes
+# the waypoint, plus this.  A corridor is also wider by this than its turns need.
 WAYPOINT_PASS_MARGIN_M = 10.0
 # m.  A larger height error at a waypoint is named in the first line of a verdict. At 106 waypoints of the simulated
-# ArduPlane and PX4, on slopes of up to 5 degrees and in up to moderate turbulence, the error was 11.4 m or less.
-# ArduPlane passed waypoints of a safe plan with a launch up to 49 m low.
+# ArduPlane and PX4, on slopes of up to 5 degrees and in up to moderate turbulence, the error was at most 11.4 m. After
+# a launch, ArduPlane passed waypoints of a safe plan up to 49 m too low.
 NOTABLE_HEIGHT_ERROR_M = 25.0
-# Ratio.  Largest distance beyond the next leg after a fly-over turn, divided by R (1 - cos turn), if the autopilot
-# turns by its own control law. It was up to 1.05 in 168 turns of the simulated ArduPlane and 1.24 in 80 turns of PX4
-# (95 to 180 degrees, wind up to 12 m/s, light turbulence).
+# Ratio.  Assumed largest distance beyond the next leg after a fly-over turn, divided by R (1 - cos turn), if an
+# autopilot turns by its own control law. It was up to 1.05 in 168 turns of the simulated ArduPlane, and up to 1.24 in
+# 80 turns of PX4 (95 to 180 degrees, wind up to 12 m/s, light turbulence).
 FLY_OVER_SWING_RATIO = 1.25
-# m.  Approaches to a waypoint are equally close if their distances differ by less than this. The approach nearest in
-# altitude then counts. A path that crosses itself at another altitude has such approaches.
+# m.  A path may pass a waypoint twice, at different altitudes. If both distances differ by less than this, the pass
+# that is nearer in altitude counts.
 EQUAL_DISTANCE_TOLERANCE_M = 0.5
-# m/s.  Error of a leg's mean airspeed.
+# m/s.  Tolerance of a leg's mean airspeed.
 MEAN_SPEED_TOLERANCE_MPS = 1.0
-# Fraction of the commanded airspeed.  An airspeed is not held if it has settled further from its command than this,
-# and by at least `MEAN_SPEED_TOLERANCE_MPS`. Five aircraft with three control laws stayed within 10 % in still air,
+# Fraction of the commanded airspeed.  A mean airspeed may differ from its command by this, or by
+# `MEAN_SPEED_TOLERANCE_MPS` if that is more. Five aircraft with three control laws stayed within 10 % in still air,
 # also after a command of 10 m/s more. With 10 % less airspeed, lift is a fifth less.
 HELD_SPEED_FRACTION = 0.1
-# m/s.  PX4 flies faster on purpose if the commanded airspeed leaves less ground speed than this (FW_GND_SPD_MIN).
+# m/s.  PX4 flies faster than commanded if the ground speed would otherwise be less than this (FW_GND_SPD_MIN).
 MIN_GROUND_SPEED_MPS = 5.0
-# Fraction of a leg's duration at `MIN_CONTROLLED_AIRSPEED_MPS`.  Steady flight for this long is enough for the mean
-# airspeed of a leg too short for `SATURATED_TIME_S`.
+# Fraction of a leg's duration at `MIN_CONTROLLED_AIRSPEED_MPS`.  A mean airspeed is judged if the leg is flown steadily
+# for `SATURATED_TIME_S`, or for this fraction of the leg's duration if that is shorter.
 MEASURED_FRACTION = 0.5
-# m.  A change of slope may be flown this far before or after its waypoint, which matters on a short leg.
+# m.  An aircraft may begin a new slope this far before or after the waypoint, which matters on a short leg.
 SLOPE_CHANGE_LAG_M = 10.0
-# s.  Duration of a gust.
+# s.  Assumed duration of a gust.
 GUST_DURATION_S = 10.0
 # Standard deviations.  Largest effect of gusts on a leg's mean airspeed that the rules take into account.
 GUST_SIGMAS = 2.0
@@ -211,15 +217,15 @@ GUST_SIGMAS = 2.0
 MAX_CONTROLLED_BANK_RAD = math.radians(75.0)
 # m/s.  Airspeed below this is a loss of control of the Aerosonde.
 MIN_CONTROLLED_AIRSPEED_MPS = 15.0
-# Fraction of the slowest level speed.  Airspeed below this is a loss of control of every other aircraft; for the
-# Aerosonde both are the same.
+# Fraction of the slowest level speed.  A lower airspeed is a loss of control. (For the Aerosonde,
+# `MIN_CONTROLLED_AIRSPEED_MPS` is the same limit.)
 MIN_CONTROLLED_STALL_RATIO = 0.94
 # s.  A log with a longer pause than this between rows has lost rows.
 MAX_ROW_GAP_S = 0.5
-# Median steps between rows.  In a sparse log, `MAX_ROW_GAP_S` may be an ordinary step. Only more than this many steps
-# are then a pause.
+# Median steps between rows.  A pause must also be longer than this many steps, because in a sparse log a step may be
+# longer than `MAX_ROW_GAP_S`.
 MAX_ROW_GAP_TICKS = 5.0
-# m/s.  Largest disagreement between position and velocity in one tick; beyond it the record contradicts itself.
+# m/s.  A log contradicts itself if the logged velocity differs from the change of the position by more than this.
 MAX_VELOCITY_DISAGREEMENT_MPS = 10.0
 # s.  Airspeed, bank and load factor are averaged over this time for comparison with the stall.
 STALL_AVERAGING_TIME_S = 1.0
@@ -246,8 +252,8 @@ PHOTO_COVERAGE_FRACTION = 0.95
 PHOTO_OFFSET_FRACTION = 0.25
 # rad.  Largest bank in a photo: at 60 m above ground its center is then 10 m to the side.
 MAX_PHOTO_BANK_RAD = math.radians(10.0)
-# Fraction of the planned height above ground.  A photo may be this far above or below it: the area that a photo shows,
-# and its overlap, depend on the height.
+# Fraction of the planned height above ground.  A photo may be taken this much higher or lower: the area that a photo
+# shows, and its overlap, depend on the height.
 PHOTO_HEIGHT_FRACTION = 0.1
 # m.  Smallest tolerance of a photo's height above ground.
 MIN_PHOTO_HEIGHT_ERROR_M = 5.0
@@ -336,13 +342,13 @@ MAX_TOUCHDOWN_SINK_MPS = 5.0
 
 # Alignment of a track with its route
 
-# m.  A waypoint further than this from the track attracts no rows.
+# m.  A waypoint further than this from the track was not passed.
 CAPTURE_RADIUS_M = 500.0
-# s.  To assign stretches of a track to waypoints, rows are thinned to at least this interval; the row nearest to each
-# waypoint is then searched among all rows.
+# s.  Rows are thinned to at least this interval to find which part of a track belongs to which waypoint. The row
+# nearest to each waypoint is then searched among all rows.
 CHORD_TIME_S = 0.25
-# m.  A waypoint at which the track ends was passed if the track ends within this plus the distance at which the fly-by
-# path passes it.
+# m.  A track that ends near a waypoint has passed it if the distance is at most this plus the distance at which the
+# fly-by path passes the waypoint.
 FINAL_WAYPOINT_TOLERANCE_M = 10.0
 # s.  An imported flight that continues this long after its last waypoint has flown a part of the next leg.
 PARTIAL_LEG_MIN_S = 2.0
@@ -351,52 +357,53 @@ PARTIAL_LEG_MIN_S = 2.0
 MAX_UNSEEN_TIME_S = 10.0
 # m.  A flight that stays further than this from every waypoint of a plan was flown somewhere else.
 PLAN_MISMATCH_DISTANCE_M = 1000.0
-# m.  When the order of waypoints is checked, a waypoint is passed within the corridor's half width, but at least this.
+# m.  When the order of waypoints is checked, a waypoint counts as passed within the corridor's half width, but at least
+# within this.
 MIN_NEAR_WAYPOINT_M = 50.0
-# m.  Upper limit of the distance within which a waypoint is passed when the order is checked, for a wide corridor.
+# m.  When the order of waypoints is checked, a waypoint counts as passed within the corridor's half width, but at most
+# within this.
 MAX_NEAR_WAYPOINT_M = 150.0
-# Fraction.  If the plan is the one that was flown, this fraction of the passed waypoints was passed in the plan's
-# order.
+# Fraction of the passed waypoints.  At least this many must be passed in the plan's order; otherwise the log is a
+# flight of another plan.
 MIN_IN_ORDER_FRACTION = 0.8
-# m.  Largest plausible position; anything larger is garbage.
+# m.  Largest plausible distance from the origin; a row with a larger one is invalid.
 MAX_PLAUSIBLE_POSITION_M = 1e7
-# m/s.  Largest plausible speed.
+# m/s.  Largest plausible speed; a row with a larger one is invalid.
 MAX_PLAUSIBLE_SPEED_MPS = 1e4
-# rad, deflection, m/s.  Largest plausible attitude, control or wind.
+# rad, deflection, m/s.  Largest plausible attitude, control or wind; a row with a larger one is invalid.
 MAX_PLAUSIBLE_VALUE = 1e3
-# s.  Stays in a sphere on neighbouring segments are one stay if the pause between them is at most this, the effect of
-# rounding.
+# s.  Two stays in a sphere count as one if the pause between them is at most this, which is the effect of rounding.
 SPHERE_STAY_TOLERANCE_S = 1e-6
-# Diagonals of a block of segments.  At this distance from a sphere's center the segments are joined to longer ones,
-# which changes the exposure by less than 0.1 %.
+# Diagonals of a block of segments.  Segments of the track that are further than this from a sphere's center are joined
+# to longer ones for the exposure, which changes it by less than 0.1 %.
 SPHERE_FAR_DIAGONALS = 30.0
 
 # PX4's checks: constants of its `FeasibilityChecker` in addition to `flight.autopilots.parts.FeasibilityLimits`
 
-# rad.  A landing approach may be steeper than FW_LND_ANG by this; a literal in the checker.
+# rad.  A landing approach may be steeper than FW_LND_ANG by this; the number is in the source of PX4's checker.
 PX4_LANDING_BUFFER_RAD = math.radians(0.1)
-# m.  MIS_DIST_1WP.
+# m.  Largest distance of the first waypoint from home: the default of PX4's MIS_DIST_1WP.
 PX4_FIRST_WAYPOINT_DISTANCE_M = 10_000.0
-# m.  MIS_DIST_WPS of the releases that had it.
+# m.  Largest distance between waypoints: the default of MIS_DIST_WPS, in the releases that had this parameter.
 PX4_WAYPOINT_SPACING_M = 900.0
-# m.  A condition gate nearer than this to a waypoint is at the same position.
+# m.  A condition gate nearer than this to a waypoint counts as being at the waypoint.
 PX4_GATE_SPACING_M = 0.05
 
 # Suggestions
 
-# rad.  A suggested angle passes by this much, so that rounding does not undo it.
+# rad.  A suggested angle keeps its limit by this much, so that rounding does not undo it.
 SUGGESTION_ANGLE_MARGIN_RAD = math.radians(0.1)
-# m.  A suggested length passes by this much.
+# m.  A suggested length keeps its limit by this much.
 SUGGESTION_LENGTH_MARGIN_M = 1.0
-# Fraction.  A suggested speed passes by this much.
+# Fraction.  A suggested speed keeps its limit by this much.
 SUGGESTION_SPEED_MARGIN_FRACTION = 0.03
 # m/s.  Step of a suggested speed.
 SUGGESTION_SPEED_STEP_MPS = 0.5
-# Ratio of the least suggested speed to the slowest level speed.
+# Ratio.  The least suggested speed is this times the slowest level speed.
 MIN_SUGGESTED_SPEED_RATIO = 1.1
-# m.  Least rise that is worth suggesting.
+# m.  A smaller rise is not suggested.
 MIN_SUGGESTED_RISE_M = 1.0
-# Number of times a gentler turn is tried.
+# Trials.  Largest number of gentler turns that are tried.
 SUGGESTION_TRIAL_COUNT = 6
-# Number of times a larger shift past a zone is tried; each comes nearer by a third or more.
+# Trials.  Largest number of larger shifts past a zone that are tried; each comes nearer by a third or more.
 ZONE_SUGGESTION_TRIAL_COUNT = 40

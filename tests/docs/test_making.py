@@ -53,7 +53,7 @@ def test_angles_are_degrees_and_nothing_else_is() -> None:
     assert shown["GUST_OFFSET_M"].value == "none 0, light 0.5, moderate 1"
     assert not shown["BANK_TOLERANCE_RAD"].text.startswith("rad")
     assert (shown["GUST_OFFSET_M"].unit, shown["OVERSHOOT_TOLERANCE_M"].unit) == ("m, by turbulence", "m")
-    assert shown["OVERSHOOT_TOLERANCE_M"].text == "Tolerance for a turn flown outside its arc."
+    assert shown["OVERSHOOT_TOLERANCE_M"].text == "A turn may be flown this far outside its arc."
     assert [one.name for one in tolerance_list() if not one.text] == []
 
 
