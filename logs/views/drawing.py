@@ -306,6 +306,7 @@ def can_share_legend(panels: Sequence[Panel]) -> bool:
 
     In all panels, each line style must have the same meaning, and each meaning the same style; some styles must repeat.
 
+    >>> from logs.views.charts import Layer
     >>> none = np.zeros(2)
     >>> flown, wanted = Layer("line", "flown", "flown", none, none), Layer("line", "command", "commanded", none, none)
     >>> can_share_legend([Panel("bank", "", (wanted, flown)), Panel("speed", "", (wanted, flown))])
