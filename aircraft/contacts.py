@@ -106,29 +106,18 @@ def with_contacts(model: bytes, aircraft: Aircraft, gear: Gear) -> bytes:
     if _model_contacts(model):
         return model
     contacts = default_contacts(aircraft, gear)
-    text = "\n".join(_contact_xml(contact, aircraft, contacts, _center_of_gravity(model)) for contact in contacts)
-    section = f"<ground_reactions>\n{text}\n</ground_reactions>".encode()
-    changed_model, count = re.subn(
-        rb"<ground_reactions\s*(/>|>\s*</ground_reactions>)", lambda _: section, model, count=1
-    )
-    return changed_model if count else model.replace(b"</fdm_config>", section + b"\n</fdm_config>")
-
-
-def _contact_xml(contact: Contact, aircraft: Aircraft, contacts: tuple[Contact, ...], centre: Floats) -> str:
-    """Return the XML of one contact.
-
-    contacts: all contacts; the contacts on which the aircraft stands share its weight.
-    centre: center of gravity, m, (3,).
-
-    Positions in the XML, and the centre, are in meters aft, right and up from the model's reference point.
-    """
-    standing_count = sum(any_contact.is_support for any_contact in contacts)
+    # The contacts on which the aircraft stands share its weight.
+    standing_count = sum(contact.is_support for contact in contacts)
     stiffness = aircraft.mass * GRAVITY / (_SAG_SPANS * aircraft.wing_span) / standing_count
     damping = 2.0 * _DAMPING_RATIO * math.sqrt(stiffness * aircraft.mass / standing_count)
-    aft, right, up = centre + np.array([-contact.forward, contact.right, -contact.down])
-    static, dynamic, rolling = _WHEEL_FRICTION if contact.wheel else _SKID_FRICTION
-    contact_type, name = "BOGEY" if contact.wheel else "STRUCTURE", contact.name.upper().replace(" ", "_")
-    return f"""  <contact type="{contact_type}" name="{name}">
+    centre = _center_of_gravity(model)
+    texts = []
+    for contact in contacts:
+        # Position in meters aft, right and up from the model's reference point.
+        aft, right, up = centre + np.array([-contact.forward, contact.right, -contact.down])
+        static, dynamic, rolling = _WHEEL_FRICTION if contact.wheel else _SKID_FRICTION
+        contact_type, name = "BOGEY" if contact.wheel else "STRUCTURE", contact.name.upper().replace(" ", "_")
+        texts.append(f"""  <contact type="{contact_type}" name="{name}">
     <location unit="M"> <x> {aft:.6f} </x> <y> {right:.6f} </y> <z> {up:.6f} </z> </location>
     <static_friction> {static} </static_friction>
     <dynamic_friction> {dynamic} </dynamic_friction>
@@ -138,7 +127,12 @@ def _contact_xml(contact: Contact, aircraft: Aircraft, contacts: tuple[Contact, 
     <max_steer unit="DEG"> 0 </max_steer>
     <brake_group> NONE </brake_group>
     <retractable> 0 </retractable>
-  </contact>"""
+  </contact>""")
+    section = "\n".join(["<ground_reactions>", *texts, "</ground_reactions>"]).encode()
+    changed_model, count = re.subn(
+        rb"<ground_reactions\s*(/>|>\s*</ground_reactions>)", lambda _: section, model, count=1
+    )
+    return changed_model if count else model.replace(b"</fdm_config>", section + b"\n</fdm_config>")
 
 
 def _model_contacts(model: bytes) -> tuple[Contact, ...]:

@@ -407,7 +407,16 @@ def size_aircraft(
             propulsion, full_sheet = _size_any_motor(sheet, filled_sheet, drag)
             aero = matched_aero
     if isinstance(propulsion, ElectricMotor):
-        propulsion = _with_calibrated_power(propulsion, full_sheet, drag, prior)
+        # In level flight at cruise the battery power without avionics equals drag times airspeed divided by the
+        # propulsive efficiency of the prior.
+        speed, min_throttle, max_throttle = sheet.cruise, 0.0, 1.0
+        for _ in range(60):
+            throttle = 0.5 * (min_throttle + max_throttle)
+            has_excess = propulsion.thrust(throttle, speed, SHEET_DENSITY) > drag(speed)
+            min_throttle, max_throttle = (min_throttle, throttle) if has_excess else (throttle, max_throttle)
+        motor_power = drag(speed) * speed / prior.propulsive_efficiency(sheet.mass)
+        power_ratio = motor_power / propulsion.power(max_throttle, speed, SHEET_DENSITY)
+        propulsion = replace(propulsion, power_ratio=power_ratio, avionics=prior.avionics)
     chord = full_sheet.area / full_sheet.span
     jx, jy, jz = (full_sheet.mass * (ratio * full_sheet.span) ** 2 for ratio in aircraft_class.gyration)
     numbers = ModelNumbers(
@@ -751,23 +760,6 @@ def _motor_with_typical_losses(propeller: Propeller, volts: float, emf: float, c
         )
         power = math.sqrt(power * max(1.0, motor.power(1.0, cruise, SHEET_DENSITY)))
     return motor
-
-
-def _with_calibrated_power(motor: ElectricMotor, sheet: DataSheet, drag: Drag, prior: PowerPrior) -> ElectricMotor:
-    """Return a motor with the avionics power and the efficiency of a prior.
-
-    `power_ratio` is set so that in level flight at cruise the battery power without avionics equals drag times airspeed
-    divided by the propulsive efficiency of the prior.
-    """
-    thrust, min_throttle, max_throttle = drag(sheet.cruise), 0.0, 1.0
-    for _ in range(60):
-        throttle = 0.5 * (min_throttle + max_throttle)
-        has_excess = motor.thrust(throttle, sheet.cruise, SHEET_DENSITY) > thrust
-        min_throttle, max_throttle = (min_throttle, throttle) if has_excess else (throttle, max_throttle)
-    motor_power = thrust * sheet.cruise / prior.propulsive_efficiency(sheet.mass)
-    return replace(
-        motor, power_ratio=motor_power / motor.power(max_throttle, sheet.cruise, SHEET_DENSITY), avionics=prior.avionics
-    )
 
 
 def _size_engine(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> tuple[FuelEngine, DataSheet]:

@@ -99,12 +99,19 @@ def read_model(table: object, aircraft: str) -> Model:
         else:
             property_name, factor = _read_entry(readings[name], f"model.reading.{name}", 1)
             reading_properties.append(Reading(property_name, factor))
-    return Model(
-        _shipped_model_name(table, aircraft),
-        _read_flag(table, "engine_settles"),
-        tuple(command_properties),
-        tuple(reading_properties),
-    )
+    engine_settles = table.get("engine_settles", False)
+    if not isinstance(engine_settles, bool):
+        field = "model.engine_settles"
+        raise FlightError(f"{field} = {engine_settles!r} is not true or false", field=field, value=engine_settles)
+    # The name must not lead outside JSBSim's folder, because it is also the name of a folder.
+    shipped_name = table.get("shipped_by_jsbsim", False)
+    if isinstance(shipped_name, bool):
+        shipped_name = aircraft if shipped_name else ""
+    elif not isinstance(shipped_name, str) or _MODEL_NAME.fullmatch(shipped_name) is None:
+        field, allowed = "model.shipped_by_jsbsim", "true, false or the name of a model that JSBSim ships"
+        message = f"{field} = {shipped_name!r} is not {allowed}"
+        raise FlightError(message, field=field, value=shipped_name, allowed=allowed)
+    return Model(shipped_name, engine_settles, tuple(command_properties), tuple(reading_properties))
 
 
 def _check_table(value: object, key: str, known_keys: tuple[str, ...]) -> dict[str, Any]:
@@ -114,29 +121,6 @@ def _check_table(value: object, key: str, known_keys: tuple[str, ...]) -> dict[s
     if unknown := sorted(value.keys() - set(known_keys)):
         suggestion = did_you_mean(unknown[0], sorted(set(known_keys) - value.keys()))
         raise FlightError(f"{key}: unknown key {', '.join(unknown)}{suggestion}", field=key, value=unknown[0])
-    return value
-
-
-def _shipped_model_name(table: dict[str, Any], aircraft: str) -> str:
-    """Return the name of the model if JSBSim ships it, otherwise "".
-
-    The name must not lead outside JSBSim's folder, because it is also the name of a folder. Raises FlightError for an
-    invalid name.
-    """
-    value = table.get("shipped_by_jsbsim", False)
-    if isinstance(value, bool):
-        return aircraft if value else ""
-    if not isinstance(value, str) or _MODEL_NAME.fullmatch(value) is None:
-        field, allowed = "model.shipped_by_jsbsim", "true, false or the name of a model that JSBSim ships"
-        raise FlightError(f"{field} = {value!r} is not {allowed}", field=field, value=value, allowed=allowed)
-    return value
-
-
-def _read_flag(table: dict[str, Any], name: str) -> bool:
-    """Return a flag of the ``[model]`` table; False if it is missing. Raises FlightError for another type."""
-    value = table.get(name, False)
-    if not isinstance(value, bool):
-        raise FlightError(f"model.{name} = {value!r} is not true or false", field=f"model.{name}", value=value)
     return value
 
 

@@ -321,9 +321,50 @@ _CONTROL = "aero/control-factor"
 
 def _aerodynamics_xml(numbers: ModelNumbers) -> str:
     """Return the XML section of the aerodynamic forces and moments."""
+    aero, factors = numbers.aero, numbers.factors
     span, chord = "<p> metrics/bw-ft </p>", "<p> metrics/cbarw-ft </p>"
-    drag, lift, side = _force_coefficients(numbers.aero, numbers.factors)
-    roll, pitch, yaw = _moment_coefficients(numbers.aero, numbers.factors)
+    linear_lift = "<product> <p> aero/lift-linear </p> <p> aero/flow-direction </p> </product>"
+    lift_difference = f"<difference> {linear_lift} <v> {number(aero.lift_at_least_drag)} </v> </difference>"
+    induced = (f"<p> {name} </p>" for name in _factor_property("induced-drag", factors))
+    drag = add(
+        scale(aero.drag_min, *_factor_property("zero-lift-drag", factors)),
+        multiply(f"<v> {number(aero.drag_lift)} </v>", *induced, lift_difference, lift_difference),
+        multiply(f"<v> {number(aero.drag_elevator)} </v>", f"<abs> <p> {_ELEVATOR} </p> </abs>"),
+        scale(aero.drag_elevator_2, _ELEVATOR, _ELEVATOR),
+        scale(aero.drag_beta_2, _BETA, _BETA),
+    )
+    lift = add(
+        "<p> aero/lift-alpha </p>",
+        scale(aero.lift_q, "aero/ci2vel", _RATE_Q),
+        scale(aero.lift_elevator, _ELEVATOR),
+    )
+    side = add(
+        scale(aero.side_beta, _BETA),
+        scale(aero.side_p, "aero/bi2vel", _RATE_P),
+        scale(aero.side_r, "aero/bi2vel", _RATE_R),
+        scale(aero.side_aileron, _AILERON),
+        scale(aero.side_rudder, _RUDDER),
+    )
+    roll = add(
+        scale(aero.roll_beta, _BETA),
+        scale(aero.roll_p, "aero/bi2vel", _RATE_P, *_factor_property("roll-damping", factors)),
+        scale(aero.roll_r, "aero/bi2vel", _RATE_R),
+        scale(aero.roll_aileron, _CONTROL, _AILERON, *_factor_property("aileron-power", factors)),
+        scale(aero.roll_rudder, _CONTROL, _RUDDER),
+    )
+    pitch = add(
+        f"<v> {number(aero.pitch_0)} </v>",
+        scale(aero.pitch_alpha, _ALPHA, *_factor_property("pitch-stiffness", factors)),
+        scale(aero.pitch_q, "aero/ci2vel", _RATE_Q, *_factor_property("pitch-damping", factors)),
+        scale(aero.pitch_elevator, _CONTROL, _ELEVATOR, *_factor_property("elevator-power", factors)),
+    )
+    yaw = add(
+        scale(aero.yaw_beta, _BETA),
+        scale(aero.yaw_p, "aero/bi2vel", _RATE_P),
+        scale(aero.yaw_r, "aero/bi2vel", _RATE_R),
+        scale(aero.yaw_aileron, _CONTROL, _AILERON),
+        scale(aero.yaw_rudder, _CONTROL, _RUDDER),
+    )
     drag_factor = "<p> aero/drag-factor </p>"
     axes = "\n".join(
         [
@@ -364,58 +405,6 @@ def _factor_property(name: str, factors: tuple[str, ...]) -> tuple[str, ...]:
     return (f"ident/{name}",) if name in factors else ()
 
 
-def _force_coefficients(aero: AeroCoefficients, factors: tuple[str, ...]) -> tuple[str, str, str]:
-    """Return the XML of the coefficients of drag, lift and side force."""
-    lift = "<product> <p> aero/lift-linear </p> <p> aero/flow-direction </p> </product>"
-    lift_difference = f"<difference> {lift} <v> {number(aero.lift_at_least_drag)} </v> </difference>"
-    induced = (f"<p> {name} </p>" for name in _factor_property("induced-drag", factors))
-    drag = add(
-        scale(aero.drag_min, *_factor_property("zero-lift-drag", factors)),
-        multiply(f"<v> {number(aero.drag_lift)} </v>", *induced, lift_difference, lift_difference),
-        multiply(f"<v> {number(aero.drag_elevator)} </v>", f"<abs> <p> {_ELEVATOR} </p> </abs>"),
-        scale(aero.drag_elevator_2, _ELEVATOR, _ELEVATOR),
-        scale(aero.drag_beta_2, _BETA, _BETA),
-    )
-    lift = add(
-        "<p> aero/lift-alpha </p>",
-        scale(aero.lift_q, "aero/ci2vel", _RATE_Q),
-        scale(aero.lift_elevator, _ELEVATOR),
-    )
-    side = add(
-        scale(aero.side_beta, _BETA),
-        scale(aero.side_p, "aero/bi2vel", _RATE_P),
-        scale(aero.side_r, "aero/bi2vel", _RATE_R),
-        scale(aero.side_aileron, _AILERON),
-        scale(aero.side_rudder, _RUDDER),
-    )
-    return drag, lift, side
-
-
-def _moment_coefficients(aero: AeroCoefficients, factors: tuple[str, ...]) -> tuple[str, str, str]:
-    """Return the XML of the coefficients of rolling, pitching and yawing moment."""
-    roll = add(
-        scale(aero.roll_beta, _BETA),
-        scale(aero.roll_p, "aero/bi2vel", _RATE_P, *_factor_property("roll-damping", factors)),
-        scale(aero.roll_r, "aero/bi2vel", _RATE_R),
-        scale(aero.roll_aileron, _CONTROL, _AILERON, *_factor_property("aileron-power", factors)),
-        scale(aero.roll_rudder, _CONTROL, _RUDDER),
-    )
-    pitch = add(
-        f"<v> {number(aero.pitch_0)} </v>",
-        scale(aero.pitch_alpha, _ALPHA, *_factor_property("pitch-stiffness", factors)),
-        scale(aero.pitch_q, "aero/ci2vel", _RATE_Q, *_factor_property("pitch-damping", factors)),
-        scale(aero.pitch_elevator, _CONTROL, _ELEVATOR, *_factor_property("elevator-power", factors)),
-    )
-    yaw = add(
-        scale(aero.yaw_beta, _BETA),
-        scale(aero.yaw_p, "aero/bi2vel", _RATE_P),
-        scale(aero.yaw_r, "aero/bi2vel", _RATE_R),
-        scale(aero.yaw_aileron, _CONTROL, _AILERON),
-        scale(aero.yaw_rudder, _CONTROL, _RUDDER),
-    )
-    return roll, pitch, yaw
-
-
 def _lift_curve_xml(aero: AeroCoefficients, factors: tuple[str, ...]) -> str:
     """Return the XML of the lift by angle of attack.
 
@@ -425,6 +414,18 @@ def _lift_curve_xml(aero: AeroCoefficients, factors: tuple[str, ...]) -> str:
         f"<v> {number(aero.lift_0)} </v>",
         scale(aero.lift_alpha, _ALPHA, *_factor_property("lift-slope", factors)),
     )
+    # Rows of the separated fraction of the flow by angle of attack (rad), which follows Beard and McLain, eq. 4.10, and
+    # is exactly 0 in attached flow.
+    stall_alpha, sharpness = aero.stall_alpha, aero.stall_sharpness
+    width = 10.0 / sharpness
+    steps = [stall_alpha - width + 0.02 * k for k in range(math.ceil(2.0 * width / 0.02) + 1)]
+    separation_rows = []
+    for alpha in sorted({-math.pi, *(-step for step in steps), *steps, math.pi}):
+        upper_blend = math.exp(-sharpness * (alpha - stall_alpha))
+        lower_blend = math.exp(sharpness * (alpha + stall_alpha))
+        fraction = (1.0 + upper_blend + lower_blend) / ((1.0 + upper_blend) * (1.0 + lower_blend))
+        fraction = 0.0 if abs(alpha) <= stall_alpha - width + 1e-9 else min(1.0, fraction)
+        separation_rows.append(f"          {alpha:.6f}  {fraction:.8f}")
     sine = f"<sin> <p> {_ALPHA} </p> </sin>"
     flat_plate = multiply("<v> 2 </v>", sine, f"<abs> {sine} </abs>", f"<cos> <p> {_ALPHA} </p> </cos>")
     difference = f"<difference> {flat_plate} <p> aero/lift-linear </p> </difference>"
@@ -448,31 +449,10 @@ def _lift_curve_xml(aero: AeroCoefficients, factors: tuple[str, ...]) -> str:
       <table>
         <independentVar lookup="row"> {_ALPHA} </independentVar>
         <tableData>
-{_separation_table(aero.stall_alpha, aero.stall_sharpness)}
+{chr(10).join(separation_rows)}
         </tableData>
       </table>
     </function>
     <function name="aero/lift-alpha">
       {add("<p> aero/lift-linear </p>", multiply("<p> aero/separated </p>", difference))}
     </function>"""
-
-
-def _separation_table(stall_alpha: float, sharpness: float) -> str:
-    """Return the rows of a JSBSim table of the separated fraction of the flow by angle of attack (rad).
-
-    The fraction follows Beard and McLain, eq. 4.10, and is exactly 0 in attached flow.
-
-    stall_alpha: angle of attack of the stall, rad.
-    sharpness: M of the textbook; a larger value gives a sharper stall.
-    """
-    width = 10.0 / sharpness
-    steps = [stall_alpha - width + 0.02 * k for k in range(math.ceil(2.0 * width / 0.02) + 1)]
-    points = sorted({-math.pi, *(-step for step in steps), *steps, math.pi})
-    rows = []
-    for alpha in points:
-        upper_blend = math.exp(-sharpness * (alpha - stall_alpha))
-        lower_blend = math.exp(sharpness * (alpha + stall_alpha))
-        fraction = (1.0 + upper_blend + lower_blend) / ((1.0 + upper_blend) * (1.0 + lower_blend))
-        fraction = 0.0 if abs(alpha) <= stall_alpha - width + 1e-9 else min(1.0, fraction)
-        rows.append(f"          {alpha:.6f}  {fraction:.8f}")
-    return "\n".join(rows)

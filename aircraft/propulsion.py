@@ -361,6 +361,17 @@ class ShaftPower:
         """
         factor = _factor_element(factors)
         d = self.diameter
+        # Rows of the cube root in increasing order, and J.  The first row has the J at which CP is 0; the last rows are
+        # for an aircraft that is almost at rest.
+        max_ratio = next(k / 1000.0 for k in range(50, 3000) if _evaluate(self.power, k / 1000.0) <= 0.0)
+        rows = [(0.0, max_ratio)]
+        # The root is steep where the power vanishes: use finer steps towards it.
+        for k in range(1, 201):
+            j = max_ratio * (1.0 - (k / 200.0) ** 2 * 0.99)
+            loading = max(0.0, _evaluate(self.power, j)) ** (1.0 / 3.0) / j
+            if loading > rows[-1][0]:
+                rows.append((loading, j))
+        advance_table = "\n".join(f"          {loading:.9f}  {j:.9f}" for loading, j in rows)
         speed_factor = factor("motor-speed")
         shaft = multiply(
             speed_factor,
@@ -393,7 +404,7 @@ class ShaftPower:
       <table>
         <independentVar lookup="row"> motor/loading </independentVar>
         <tableData>
-{self._advance_table()}
+{advance_table}
         </tableData>
       </table>
     </function>
@@ -409,21 +420,6 @@ class ShaftPower:
     <function name="motor/battery-current-a">
       <quotient> <p> motor/battery-power-w </p> <p> motor/battery-v </p> </quotient>
     </function>"""
-
-    def _advance_table(self) -> str:
-        """Return the rows of a JSBSim table: the cube root of CP(J) / J^3 in increasing order, and J.
-
-        The first row has the J at which CP is 0. The last rows are for an aircraft that is almost at rest.
-        """
-        max_ratio = next(k / 1000.0 for k in range(50, 3000) if _evaluate(self.power, k / 1000.0) <= 0.0)
-        rows = [(0.0, max_ratio)]
-        # The root is steep where the power vanishes: use finer steps towards it.
-        for k in range(1, 201):
-            j = max_ratio * (1.0 - (k / 200.0) ** 2 * 0.99)
-            loading = max(0.0, _evaluate(self.power, j)) ** (1.0 / 3.0) / j
-            if loading > rows[-1][0]:
-                rows.append((loading, j))
-        return "\n".join(f"          {loading:.9f}  {j:.9f}" for loading, j in rows)
 
 
 # Air density at sea level, kg/m^3.

@@ -150,7 +150,13 @@ def read_uncertainty(folder: Path) -> Uncertainty | None:
     entries = table.get("quantity", [])
     if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
         raise FlightError.at(str(file), "quantity", entries, "expected [[quantity]] tables", shown=repr(entries)[:60])
-    quantities = tuple(_read_quantity(entry, file) for entry in entries)
+    quantities = []
+    for entry in entries:
+        name = entry.get("property")
+        _check_name(name, str(file), "property")
+        estimate, sd = (_read_number(entry, key, file, low, 1e6) for key, low in (("estimate", -1e6), ("sd", 0.0)))
+        unit, reason = str(entry.get("unit", "factor")), str(entry.get("reason", ""))
+        quantities.append(UncertainQuantity(str(name), unit, estimate, sd, reason))
     power_sd = POWER_SD if file.name == UNCERTAINTY_FILES[1] else 0.0
     if "power_sd" in table:
         power_sd = _read_number(table, "power_sd", file, 0.0, 1.0)
@@ -161,7 +167,7 @@ def read_uncertainty(folder: Path) -> Uncertainty | None:
         source,
         climb_sd,
         descent_sd,
-        quantities,
+        tuple(quantities),
         power_sd,
         max_speed_sd=max_speed_sd,
         climb_shortfall=math.radians(shortfall),
@@ -177,16 +183,6 @@ def _read_number(table: dict[str, Any], key: str, file: Path, min_value: float, 
             str(file), key, value, f"expected a number from {min_value:g} to {max_value:g}", shown=repr(value)
         )
     return float(value)
-
-
-def _read_quantity(entry: dict[str, Any], file: Path) -> UncertainQuantity:
-    """Return the uncertain quantity in a [[quantity]] table. Raises FlightError for an invalid entry."""
-    name = entry.get("property")
-    _check_name(name, str(file), "property")
-    estimate, sd = (
-        _read_number(entry, key, file, min_value, 1e6) for key, min_value in (("estimate", -1e6), ("sd", 0.0))
-    )
-    return UncertainQuantity(str(name), str(entry.get("unit", "factor")), estimate, sd, str(entry.get("reason", "")))
 
 
 def _check_name(name: object, file: str, key: str, error: type[PlanflyError] = FlightError) -> None:

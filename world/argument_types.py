@@ -64,23 +64,15 @@ def check_types(
         for value in argument if parameter.kind is parameter.VAR_POSITIONAL else (argument,):
             if (expected := _expected_type(value, parameter.annotation)) is not None:
                 raise ArgumentError.of_argument(name, value, f"expected {expected}", shown=type(value).__name__)
-        bound.arguments[name] = _python_number(argument, parameter.annotation)
+        if isinstance(argument, Real) and not isinstance(argument, int):
+            # A number that is not whole is unchanged if only integers are allowed.
+            members = get_args(parameter.annotation) or (parameter.annotation,)
+            takes_integers = int in members or all(isinstance(member, int) for member in members)
+            if float in members:
+                bound.arguments[name] = float(argument)
+            elif takes_integers and float(argument).is_integer():
+                bound.arguments[name] = int(float(argument))
     return bound.args, bound.kwargs
-
-
-def _python_number(value: Any, annotation: Any) -> Any:
-    """Convert a number to the integer or float that an annotation requires; other values are unchanged.
-
-    A number that is not whole is unchanged if only integers are allowed.
-    """
-    if not isinstance(value, Real) or isinstance(value, int):
-        return value
-    members = get_args(annotation) or (annotation,)
-    if float in members:
-        return float(value)
-    number = float(value)
-    takes_integers = int in members or all(isinstance(member, int) for member in members)
-    return int(number) if takes_integers and number.is_integer() else value
 
 
 def _expected_type(value: Any, annotation: Any) -> str | None:

@@ -96,12 +96,30 @@ def join_tiles(tiles: Sequence[RasterFile], name: str) -> RasterFile:
     name: name of the raster in messages.
 
     Where tiles overlap, the heights of the first tile with data are used. Raises TerrainError for tiles that are not on
-    one grid.
+    one grid, or that have different reference systems.
     """
     first = tiles[0]
     if len(tiles) == 1:
         return replace(first, name=name)
-    positions = [_place_on_grid(first, tile) for tile in tiles]
+    # Row and column of each tile's first pixel on the grid of the first tile.
+    positions = []
+    for tile in tiles:
+        if tile.crs != first.crs:
+            allowed = f"all tiles need the reference system of {first.name}"
+            raise TerrainError(f"{tile.name}: another reference system; {allowed}", file=tile.name, allowed=allowed)
+        last_row, last_col = tile.shape[0] - 1.0, tile.shape[1] - 1.0
+        lon, lat = tile.to_lon_lat(np.array([0.0, last_col]), np.array([0.0, last_row]))
+        col, row = first.to_pixels(lon, lat)
+        top_row, left_col = round(float(row[0])), round(float(col[0]))
+        offset = max(
+            math.hypot(col[0] - left_col, row[0] - top_row),
+            math.hypot(col[1] - left_col - last_col, row[1] - top_row - last_row),
+        )
+        if not offset <= MAX_GRID_OFFSET_PIXELS:
+            allowed = "resample both to one grid (gdalwarp)"
+            shown = f"its pixel grid is offset by {offset:.3g} pixels from the grid of {first.name}"
+            raise TerrainError(f"{tile.name}: {shown}: {allowed}", file=tile.name, allowed=allowed)
+        positions.append((top_row, left_col))
     top, left = (min(position[k] for position in positions) for k in (0, 1))
     rows = max(row + tile.shape[0] for (row, _), tile in zip(positions, tiles, strict=True)) - top
     cols = max(col + tile.shape[1] for (_, col), tile in zip(positions, tiles, strict=True)) - left
@@ -142,29 +160,3 @@ def join_tiles(tiles: Sequence[RasterFile], name: str) -> RasterFile:
         read=read,
         grid=shift_grid(first.grid, top, left),
     )
-
-
-def _place_on_grid(first: RasterFile, tile: RasterFile) -> tuple[int, int]:
-    """Return the row and column of a tile's first pixel on the grid of the first tile.
-
-    Raises TerrainError if the two grids do not coincide, or if the reference systems differ.
-    """
-    if tile.crs != first.crs:
-        allowed = f"all tiles need the reference system of {first.name}"
-        raise TerrainError(f"{tile.name}: another reference system; {allowed}", file=tile.name, allowed=allowed)
-    rows, cols = tile.shape
-    lon, lat = tile.to_lon_lat(np.array([0.0, cols - 1.0]), np.array([0.0, rows - 1.0]))
-    col, row = first.to_pixels(lon, lat)
-    position = (round(float(row[0])), round(float(col[0])))
-    offset = max(
-        math.hypot(col[0] - position[1], row[0] - position[0]),
-        math.hypot(col[1] - position[1] - (cols - 1), row[1] - position[0] - (rows - 1)),
-    )
-    if not offset <= MAX_GRID_OFFSET_PIXELS:
-        allowed = "resample both to one grid (gdalwarp)"
-        raise TerrainError(
-            f"{tile.name}: its pixel grid is offset by {offset:.3g} pixels from the grid of {first.name}: {allowed}",
-            file=tile.name,
-            allowed=allowed,
-        )
-    return position

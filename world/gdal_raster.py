@@ -8,7 +8,7 @@ import math
 import os
 import re
 import warnings
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -91,7 +91,15 @@ def _open_raster_file(file: Path, driver: str, failure_text: str) -> RasterFile:
                 require_min_pixels(file, (source.height, source.width))
                 shape, grid = (source.height, source.width), tuple(source.transform)[:6]
                 scale, crs = (source.scales[0], source.offsets[0]), _read_crs(file, driver, source)
-                unit = _stated_height_unit(source.units[0] or "", {**source.tags(), **source.tags(1)}.items())
+                # GDAL ignores the tags of other programs: heights in feet with such a tag would be read as metres.
+                foot_tags = (
+                    f"{value} (tag {key})"
+                    for key, value in {**source.tags(), **source.tags(1)}.items()
+                    if "unit" in key.lower()
+                    and not _HORIZONTAL_TAG.search(key)
+                    and not _FOOT_NAMES.isdisjoint(re.split("[^a-z]+", value.lower()))
+                )
+                unit = next(foot_tags, source.units[0] or "")
                 may_have_gaps = driver == "GTiff" and source.nodata is None
     except NotGeoreferencedWarning:
         _raise_unplaced(file)
@@ -141,22 +149,6 @@ def _read_crs(file: Path, driver: str, source: Any) -> str | None:
     with rasterio.Env(GTIFF_SRS_SOURCE="EPSG"), open_dataset(file, driver) as epsg_source:
         has_height = "CS[ellipsoidal,3]" in epsg_source.crs.to_wkt(version="WKT2_2019")
     return crs_to_wkt(wkt, with_height=has_height)
-
-
-def _stated_height_unit(unit: str, tags: Iterable[tuple[str, str]]) -> str:
-    """Return the unit of a file's heights: the unit of its band, or feet if a tag says so; "" if not stated.
-
-    GDAL ignores the tags of other programs. Without this function, heights in feet with such a tag would be read as
-    metres.
-    """
-    for key, value in tags:
-        if (
-            "unit" in key.lower()
-            and not _HORIZONTAL_TAG.search(key)
-            and _FOOT_NAMES & set(re.split("[^a-z]+", value.lower()))
-        ):
-            return f"{value} (tag {key})"
-    return unit
 
 
 def _make_raster_file(

@@ -72,9 +72,16 @@ def height_datum(crs: str | None, stated_datum: StatedDatum | None) -> HeightDat
         return HeightDatum(f"{_MEAN_SEA_LEVEL} ({stated_datum.upper()}, as stated)")
     if stated_datum == "ellipsoid" or (crs is not None and is_above_ellipsoid(crs)):
         name, transformer = _find_geoid()
-        return HeightDatum(
-            f"{_MEAN_SEA_LEVEL}, converted from the ellipsoid by {name}", _make_sea_level_function(transformer)
-        )
+
+        def sea_level(lon: Floats, lat: Floats) -> Floats:
+            """Return the geoid's height above the ellipsoid at longitudes and latitudes (deg), m.
+
+            It is minus the height above the geoid of a point on the ellipsoid.
+            """
+            _, _, negated_heights = transformer.transform(lon, lat, np.zeros(np.shape(lon)))
+            return -np.asarray(negated_heights, dtype=np.float64)
+
+        return HeightDatum(f"{_MEAN_SEA_LEVEL}, converted from the ellipsoid by {name}", sea_level)
     name = ""
     if crs is not None:
         from pyproj import CRS
@@ -84,23 +91,6 @@ def height_datum(crs: str | None, stated_datum: StatedDatum | None) -> HeightDat
             raise ValueError("heights are positive downwards, as depths")
         name = next((part.name for part in system.sub_crs_list if part.is_vertical), "")
     return HeightDatum(f"{_MEAN_SEA_LEVEL} ({name}, as the file states)" if name else UNSTATED)
-
-
-def _make_sea_level_function(transformer: Any) -> Callable[[Floats, Floats], Floats]:
-    """Make a function of longitudes and latitudes (deg) that returns the geoid's height above the ellipsoid, m.
-
-    transformer: pyproj transformer of heights above the ellipsoid to heights above the geoid.
-    """
-
-    def heights(lon: Floats, lat: Floats) -> Floats:
-        """Return the geoid's height above the ellipsoid at longitudes and latitudes (deg), m.
-
-        It is minus the height above the geoid of a point on the ellipsoid.
-        """
-        _, _, negated_heights = transformer.transform(lon, lat, np.zeros(np.shape(lon)))
-        return -np.asarray(negated_heights, dtype=np.float64)
-
-    return heights
 
 
 @cache

@@ -89,7 +89,8 @@ def read_population(file: Path, unit: PopulationUnit, origin: GeoOrigin, area: B
     origin: origin of the map.
     area: polygons on the map, m.
 
-    Raises PlanflyError for a file that is not a population raster, or that has no data in the area.
+    Raises PlanflyError for a file that is not a population raster, that has no data in the area, or that has a cell
+    with an implausible density there.
     """
     import rasterio
     from rasterio.errors import NotGeoreferencedWarning, RasterioError
@@ -110,7 +111,17 @@ def read_population(file: Path, unit: PopulationUnit, origin: GeoOrigin, area: B
     cell_areas = window.cell_areas_km2()
     densities = values / cell_areas if unit == "per-cell" else values
     is_inside = window.touched_cells()
-    _check_densities(file, window, densities, is_inside, unit)
+    is_bad = is_inside & ((densities < 0.0) | (densities > _MAX_DENSITY_PER_KM2))
+    if is_bad.any():
+        row, column = (int(index[0]) for index in np.nonzero(is_bad))
+        lat, lon = window.cell_centre(row, column)
+        density = float(densities[row, column])
+        allowed = f"at latitude {lat:.5f}, longitude {lon:.5f}: allowed 0..{_MAX_DENSITY_PER_KM2:,.0f} people per km2"
+        if density < 0.0:
+            allowed += "; does the file state its NoData value?"
+        elif unit == "per-cell":
+            allowed += "; for a raster of densities the population unit is per-km2"
+        raise PlanflyError.at(file, "population density", density, allowed, shown=f"{density:.6g}")
     known = is_inside & np.isfinite(densities)
     if not known.any():
         raise PlanflyError(f"{file}: no data in the ground risk buffer; {window.coverage_text()}", file=file)
@@ -145,27 +156,6 @@ def _check_source(file: Path, source: Any, unit: PopulationUnit) -> None:
     if stated in METRES or (unit == "per-cell" and "km" in stated):
         expected = "expected people per cell, or people per km2 with the population unit per-km2"
         raise PlanflyError.at(file, "unit", stated, expected)
-
-
-def _check_densities(file: Path, window: "_Window", densities: Floats, is_inside: Flags, unit: PopulationUnit) -> None:
-    """Raise PlanflyError if a cell in the area has an implausible population density.
-
-    densities: people per km2, (rows, columns) of the window.
-    is_inside: mask of the cells in the area, (rows, columns).
-    unit: unit of the raster's numbers, for a hint in the message.
-    """
-    is_bad = is_inside & ((densities < 0.0) | (densities > _MAX_DENSITY_PER_KM2))
-    if not is_bad.any():
-        return
-    row, column = (int(index[0]) for index in np.nonzero(is_bad))
-    lat, lon = window.cell_centre(row, column)
-    density = float(densities[row, column])
-    allowed = f"at latitude {lat:.5f}, longitude {lon:.5f}: allowed 0..{_MAX_DENSITY_PER_KM2:,.0f} people per km2"
-    if density < 0.0:
-        allowed += "; does the file state its NoData value?"
-    elif unit == "per-cell":
-        allowed += "; for a raster of densities the population unit is per-km2"
-    raise PlanflyError.at(file, "population density", density, allowed, shown=f"{density:.6g}")
 
 
 def _transformed(grid: Any, x: Any, y: Any) -> tuple[Any, Any]:

@@ -416,12 +416,26 @@ def scenario_from_spec(
     else:
         raise ScenarioError(f"{source}: area: missing, and no elevation file implies it", file=source, field="area")
     if raster is not None:
-        ground = _read_terrain_of_area(raster, origin, bounds, station_position(spec.link, origin))
-    elif ground is None:
-        ground = _make_terrain(spec.terrain, bounds)
+        # The terrain extends to the ground station of the link if the station lies outside the area.
+        require_covered(raster, origin, bounds)
+        box = _box_with(raster, origin, bounds, station_position(spec.link, origin))
+        ground = read_terrain(raster, origin, box, GROUND_BUFFER)
+    elif ground is None and spec.terrain.kind == "flat":
+        ground = make_flat_terrain(bounds, float(spec.terrain.amsl_m or 0.0), 5 * GROUND_BUFFER)
+    elif ground is None and spec.terrain.kind == "peaks":
+        peaks = [Peak(peak.east_m, peak.north_m, peak.height_m, peak.sigma_m) for peak in spec.terrain.peak or []]
+        ground = make_peaks_terrain(bounds, peaks, GROUND_BUFFER)
     if ground is not None and spec.terrain.vertical_error_m is not None:
         ground = replace(ground, vertical_error=spec.terrain.vertical_error_m)
-    spec = _with_absolute_paths(spec, base)
+    # The paths of the aircraft's folder, the parameter file and the forecast become absolute.
+    flight, wind, flight_paths = spec.flight, spec.wind, {}
+    if names_folder(flight.aircraft):
+        flight_paths["aircraft"] = absolute_path(Path(base or "", flight.aircraft))
+    if flight.params is not None:
+        flight_paths["params"] = absolute_path(Path(base or "", flight.params))
+    if wind.forecast is not None:
+        wind = wind.model_copy(update={"forecast": absolute_path(Path(base or "", wind.forecast))})
+    spec = spec.model_copy(update={"flight": flight.model_copy(update=flight_paths), "wind": wind})
     # Origin and area from the elevation file are stored, so that a log without the file makes the same scenario.
     origin_table = checked_table(
         lambda: OriginTable(lat_deg=origin.lat_deg, lon_deg=origin.lon_deg), f"{source}: origin"
@@ -435,21 +449,6 @@ def scenario_from_spec(
     replaced = terrain is not None or is_stored
     scenario = _assemble_scenario(spec, source, origin, bounds, ground, external=external, replaced=replaced)
     return scenario if is_stored else _with_forecast_wind(scenario)
-
-
-def _with_absolute_paths(spec: ScenarioFile, base: Path | None) -> ScenarioFile:
-    """Return a scenario file's data with absolute paths of the aircraft's folder, the parameter file and the forecast.
-
-    base: folder of relative paths; None for the current folder.
-    """
-    flight, wind, changes = spec.flight, spec.wind, {}
-    if names_folder(flight.aircraft):
-        changes["aircraft"] = absolute_path(Path(base or "", flight.aircraft))
-    if flight.params is not None:
-        changes["params"] = absolute_path(Path(base or "", flight.params))
-    if wind.forecast is not None:
-        wind = wind.model_copy(update={"forecast": absolute_path(Path(base or "", wind.forecast))})
-    return spec.model_copy(update={"flight": flight.model_copy(update=changes), "wind": wind})
 
 
 def _replace_terrain(spec: ScenarioFile, terrain: str, source: str, base: Path | None) -> ScenarioFile:
@@ -585,20 +584,6 @@ def _assemble_scenario(
     )
 
 
-def _read_terrain_of_area(
-    raster: RasterFile, origin: GeoOrigin, bounds: Floats, station: tuple[float, float] | None
-) -> Terrain:
-    """Read the terrain of a scenario's area and, if it lies outside, up to the ground station of its link.
-
-    bounds: [[west, east], [south, north]] of the area, (2, 2) m.
-    station: east and north of the station's antenna, m; None without one.
-
-    Raises TerrainError if the area extends beyond the elevation file.
-    """
-    require_covered(raster, origin, bounds)
-    return read_terrain(raster, origin, _box_with(raster, origin, bounds, station), GROUND_BUFFER)
-
-
 def _box_with(raster: RasterFile, origin: GeoOrigin, bounds: Floats, position: tuple[float, float] | None) -> Floats:
     """Return an area that is extended to contain a position, if the elevation file has pixels there.
 
@@ -631,16 +616,6 @@ def with_ground_at(scenario: Scenario, position: tuple[float, float]) -> Scenari
         return scenario
     extended_terrain = read_terrain(raster, scenario.origin, box, GROUND_BUFFER)
     return replace(scenario, terrain=replace(extended_terrain, vertical_error=terrain.vertical_error))
-
-
-def _make_terrain(table: TerrainTable, bounds: Floats) -> Terrain | None:
-    """Make the flat or hilly terrain that a [terrain] table describes; return None for any other kind."""
-    if table.kind == "flat":
-        return make_flat_terrain(bounds, float(table.amsl_m or 0.0), 5 * GROUND_BUFFER)
-    if table.kind == "peaks":
-        peaks = [Peak(peak.east_m, peak.north_m, peak.height_m, peak.sigma_m) for peak in table.peak or []]
-        return make_peaks_terrain(bounds, peaks, GROUND_BUFFER)
-    return None
 
 
 def lat_lon_of_points(scenario: Scenario, points: Floats) -> tuple[Floats, Floats]:

@@ -212,16 +212,45 @@ def draft_text(draft: Draft) -> str:
     <BLANKLINE>
     <BLANKLINE>
     """
-    return "\n".join(
-        (
-            _head_text(draft),
-            _terrain_text(draft),
-            _area_and_ends_text(draft),
-            _limits_text(draft),
-            _flight_text(draft),
-            _examples_text(draft),
-        )
+    start, destination = (
+        f"{_number_text(place.lat)}, {_number_text(place.lon)}" for place in (draft.start, draft.destination)
     )
+    head = f"""\
+# From {start} to {destination}.  Lines that begin with "# " and a key are examples; remove the "# " to use them.
+# All keys: docs/scenario-file.md of planfly.
+name = {_quote(draft.name)}
+
+[origin]                      # where east_m = north_m = 0: half way
+lat_deg = {_number_text(draft.origin.lat_deg)}
+lon_deg = {_number_text(draft.origin.lon_deg)}
+"""
+    limits = f"""\
+[limits]                      # turns and slopes: what the aircraft can do, unless a number is given
+{_entry_line("min_clearance_m", _number_text(draft.clearance), "above ground")}
+{_entry_line("# max_height_m", _number_text(max(400.0, 2.0 * draft.height)), "above ground")}
+{_entry_line("# max_turn_deg", "60", "at a waypoint")}
+{_entry_line("# corridor_m", "60", "half width about the legs; by default as wide as the autopilot requires")}
+"""
+    autopilots = """"ardupilot", "px4", or "planfly": planfly's own guidance"""
+    airspeed = _number_text(draft.airspeed)
+    key = "px4_version" if draft.autopilot == "px4" else "arduplane_version"
+    version = "" if draft.version is None else f"\n{key} = {_quote(draft.version)}"
+    flight = f"""\
+[flight]
+{_entry_line("aircraft", _quote(draft.aircraft), "an aircraft listed by 'planfly aircraft', or a folder of your own")}
+{_entry_line("autopilot", _quote(draft.autopilot), autopilots)}{version}
+{_entry_line("# params", '"mine.param"', "parameter file of the autopilot, as saved by a ground station")}
+{_entry_line("# airspeed_mps", airspeed, "equivalent, for planfly's guidance true; the default is this")}
+
+[wind]
+{_entry_line("speed_mps", "0", "your forecast, 0 to 40")}
+{_entry_line("from_deg", "0", "direction the wind comes from; 270 is a west wind")}
+{_entry_line("turbulence", '"none"', '"light" or "moderate"')}
+
+[planner]
+{_entry_line("seed", "1", "the same seed finds the same path")}
+"""
+    return "\n".join((head, _terrain_text(draft), _area_and_ends_text(draft), limits, flight, _examples_text(draft)))
 
 
 def _quote(value: str) -> str:
@@ -237,22 +266,6 @@ def _number_text(value: float) -> str:
 def _entry_line(key: str, value: str, comment: str = "") -> str:
     """Return a line "key = value", followed by an aligned comment if there is one."""
     return f"{f'{key} = {value}':<30}# {comment}" if comment else f"{key} = {value}"
-
-
-def _head_text(draft: Draft) -> str:
-    """Return the head of a scenario file, with name and origin."""
-    start, destination = (
-        f"{_number_text(place.lat)}, {_number_text(place.lon)}" for place in (draft.start, draft.destination)
-    )
-    return f"""\
-# From {start} to {destination}.  Lines that begin with "# " and a key are examples; remove the "# " to use them.
-# All keys: docs/scenario-file.md of planfly.
-name = {_quote(draft.name)}
-
-[origin]                      # where east_m = north_m = 0: half way
-lat_deg = {_number_text(draft.origin.lat_deg)}
-lon_deg = {_number_text(draft.origin.lon_deg)}
-"""
 
 
 def _terrain_text(draft: Draft) -> str:
@@ -297,40 +310,6 @@ north_m = [{north0}, {north1}]
 {_entry_line("ceiling_amsl_m", _number_text(draft.ceiling), "above mean sea level")}
 
 """ + "\n".join(ends)
-
-
-def _limits_text(draft: Draft) -> str:
-    """Return the [limits] table of a scenario file, with comments."""
-    return f"""\
-[limits]                      # turns and slopes: what the aircraft can do, unless a number is given
-{_entry_line("min_clearance_m", _number_text(draft.clearance), "above ground")}
-{_entry_line("# max_height_m", _number_text(max(400.0, 2.0 * draft.height)), "above ground")}
-{_entry_line("# max_turn_deg", "60", "at a waypoint")}
-{_entry_line("# corridor_m", "60", "half width about the legs; by default as wide as the autopilot requires")}
-"""
-
-
-def _flight_text(draft: Draft) -> str:
-    """Return the [flight] table of a scenario file, with comments."""
-    autopilots = """"ardupilot", "px4", or "planfly": planfly's own guidance"""
-    airspeed = _number_text(draft.airspeed)
-    key = "px4_version" if draft.autopilot == "px4" else "arduplane_version"
-    version = "" if draft.version is None else f"\n{key} = {_quote(draft.version)}"
-    return f"""\
-[flight]
-{_entry_line("aircraft", _quote(draft.aircraft), "an aircraft listed by 'planfly aircraft', or a folder of your own")}
-{_entry_line("autopilot", _quote(draft.autopilot), autopilots)}{version}
-{_entry_line("# params", '"mine.param"', "parameter file of the autopilot, as saved by a ground station")}
-{_entry_line("# airspeed_mps", airspeed, "equivalent, for planfly's guidance true; the default is this")}
-
-[wind]
-{_entry_line("speed_mps", "0", "your forecast, 0 to 40")}
-{_entry_line("from_deg", "0", "direction the wind comes from; 270 is a west wind")}
-{_entry_line("turbulence", '"none"', '"light" or "moderate"')}
-
-[planner]
-{_entry_line("seed", "1", "the same seed finds the same path")}
-"""
 
 
 def _examples_text(draft: Draft) -> str:

@@ -140,19 +140,43 @@ def first_fault(
         if error_entry["type"] == "extra_forbidden" and _spelling_suggestion(error_entry["loc"], model)
     ]
     first_error = (misspelt_keys or errors)[0]
-    keys = [str(part) for part in (first_error["loc"] if data is None else _data_keys(first_error["loc"], data))]
+    location = list(first_error["loc"])
+    if data is not None:
+        # Only the parts that are keys or indices of the data, without names of types.
+        location.clear()
+        for part in first_error["loc"]:
+            known_keys = range(len(data)) if isinstance(data, list) else data if isinstance(data, dict) else ()
+            if part in known_keys:
+                location.append(part)
+                data = data[part]
+    keys = [str(part) for part in location]
     message = expected_values(first_error, container)
     value = first_error.get("input")
     if isinstance(value, dict | list):
-        value = None
-    value_text = "" if isinstance(first_error.get("input"), dict | list) else f": {_value_text(value)}"
+        value, value_text = None, ""
+    elif isinstance(value, float) and not math.isfinite(value):
+        value_text = f": {value}"
+    else:
+        text = json.dumps(value, default=str)
+        value_text = f": {text if len(text) <= 60 else text[:57] + '...'}"
     if first_error["type"] == "extra_forbidden":
         message = f"unknown key{_spelling_suggestion(first_error['loc'], model)}"
         value_text = ""
     if first_error["type"] == "missing":
         value, value_text = None, ""
         keys = [str(part) for part in first_error["loc"]]
-    remainder = _remaining_faults_text(errors)
+    # The errors after the first: their number, or the missing keys if all are missing keys.  Nothing is said if all
+    # concern one value, for which pydantic reports an error for each allowed type.
+    remainder = ""
+    if len({error_entry["loc"][:2] for error_entry in errors}) > 1 or errors[0]["loc"] in _ENDS:
+        others = [".".join(map(str, error_entry["loc"])) for error_entry in errors[1:]]
+        if any(error_entry["type"] != "missing" for error_entry in errors):
+            remainder = f" (and {count_text(len(others), 'more error')})" if others else ""
+        else:
+            remainder = f" (also missing: {', '.join(others)})" if others else ""
+            if any(error_entry["loc"] in _ENDS for error_entry in errors):
+                remainder += "; tables [start] and [destination] need east_m and north_m, or lat_deg and lon_deg, and "
+                remainder += "amsl_m or height_m"
     field = ".".join(key if key.isprintable() else json.dumps(key) for key in keys)
     # A check of the whole file names its key itself.
     prefix = "" if not field and first_error["type"] == "value_error" else f"{field or 'file'}{value_text}: "
@@ -211,65 +235,20 @@ def expected_values(error_entry: Mapping[str, Any], container: str) -> str:
 _ENDS = (("start",), ("destination",))
 
 
-def _remaining_faults_text(errors: Sequence[Any]) -> str:
-    """Describe the errors after the first as the end of a message.
-
-    The text has the names of the missing keys if all errors are missing keys, or else the number of errors. It is "" if
-    all errors concern one value, for which pydantic reports an error for each allowed type.
-    """
-    if len({error_entry["loc"][:2] for error_entry in errors}) < 2 and errors[0]["loc"] not in _ENDS:
-        return ""
-    if any(error_entry["type"] != "missing" for error_entry in errors):
-        return f" (and {count_text(len(errors) - 1, 'more error')})" if len(errors) > 1 else ""
-    others = [".".join(map(str, error_entry["loc"])) for error_entry in errors[1:]]
-    text = f" (also missing: {', '.join(others)})" if others else ""
-    if any(error_entry["loc"] in _ENDS for error_entry in errors):
-        text += (
-            "; tables [start] and [destination] need east_m and north_m, or lat_deg and lon_deg, and amsl_m or height_m"
-        )
-    return text
-
-
 def _spelling_suggestion(parts: Sequence[str | int], model: type[BaseModel] | None) -> str:
     """Return a suggestion for an unknown key, as the end of a message; "" if no known key is similar.
 
     parts: keys that lead to the unknown key, and the key itself.
     model: model of the data; None for no suggestion.
     """
-    return "" if model is None else did_you_mean(str(parts[-1]), _known_keys(parts[:-1], model))
-
-
-def _known_keys(parts: Sequence[str | int], model: type[BaseModel]) -> list[str]:
-    """Return the known keys of the table at the end of ``parts``, or of the model itself.
-
-    parts: keys and list indices that lead to the table.
-    """
+    if model is None:
+        return ""
     tables = [model]
-    for part in parts:
+    for part in parts[:-1]:
         # The list grows during the loop, as an annotation may be a list, a union, or both.
         annotations = [table.model_fields[str(part)].annotation for table in tables if str(part) in table.model_fields]
         for annotation in annotations:
             annotations += get_args(annotation)
-        tables_of_part = [kind for kind in annotations if isinstance(kind, type) and issubclass(kind, BaseModel)]
         # An index or the name of a variant leads to no other table.
-        tables = tables_of_part or tables
-    return [key for table in tables for key in table.model_fields]
-
-
-def _data_keys(parts: tuple[str | int, ...], data: Any) -> list[str | int]:
-    """Return the parts of a pydantic location that are keys or indices of the data, without names of types."""
-    keys = []
-    for part in parts:
-        known_keys = range(len(data)) if isinstance(data, list) else data if isinstance(data, dict) else ()
-        if part in known_keys:
-            keys.append(part)
-            data = data[part]
-    return keys
-
-
-def _value_text(value: Any) -> str:
-    """Return a value as JSON text for a message; at most 60 characters."""
-    if isinstance(value, float) and not math.isfinite(value):
-        return str(value)
-    text = json.dumps(value, default=str)
-    return text if len(text) <= 60 else text[:57] + "..."
+        tables = [kind for kind in annotations if isinstance(kind, type) and issubclass(kind, BaseModel)] or tables
+    return did_you_mean(str(parts[-1]), [key for table in tables for key in table.model_fields])

@@ -4,6 +4,7 @@ The models mirror the TOML key for key.  `world.scenario_file` reads a file into
 into a `Scenario`.
 """
 
+from collections.abc import Callable
 from typing import Annotated, Any, Literal, NamedTuple, get_args
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, field_validator, model_validator
@@ -102,19 +103,18 @@ def _check_latitude(corner: list[float]) -> list[float]:
     return corner
 
 
-def _check_period(text: str) -> str:
-    """Return the text; raise ValueError if it does not state a period of time."""
-    parse_period(text)
-    return text
+def _make_text_check(parse: Callable[[str], object]) -> Callable[[str], str]:
+    """Make a function that returns a text which a parser accepts, and raises its ValueError for another text."""
+
+    def check(text: str) -> str:
+        """Return the text; raise ValueError if the parser does not accept it."""
+        parse(text)
+        return text
+
+    return check
 
 
-def _check_span(text: str) -> str:
-    """Return the text; raise ValueError if it states neither a start time nor a time span."""
-    parse_span(text)
-    return text
-
-
-_ZoneTime = Annotated[str, Field(min_length=1, max_length=100), AfterValidator(_check_period)]
+_ZoneTime = Annotated[str, Field(min_length=1, max_length=100), AfterValidator(_make_text_check(parse_period))]
 _MetreCorner = Annotated[list[Metres], Field(min_length=2, max_length=2)]
 _Degrees = Annotated[float, in_range(-180.0, 180.0)]
 _DegreeCorner = Annotated[list[_Degrees], Field(min_length=2, max_length=2), AfterValidator(_check_latitude)]
@@ -775,7 +775,7 @@ class ScenarioFile(ScenarioTable):
     zones: Annotated[list[ZoneTable], Field(max_length=MAX_ZONES)] | None = None
     zones_file: FilePath | Annotated[list[FilePath], Field(max_length=100)] | None = None
     zone_notes: Annotated[list[str], Field(max_length=1000)] | None = None
-    at: Annotated[str, Field(max_length=100), AfterValidator(_check_span)] | None = None
+    at: Annotated[str, Field(max_length=100), AfterValidator(_make_text_check(parse_span))] | None = None
     limits: LimitsTable = LimitsTable()
     planner: PlannerTable = PlannerTable()
     flight: FlightTable = FlightTable()

@@ -373,13 +373,8 @@ def _fill_from_tile(heights: Heights, lat: Floats, lon: Floats, tile: _PlacedTil
     tile_heights = tile.raster.read(top, min(rows, int(row[-1]) + 2), left, min(cols, int(col[-1]) + 2))
     tile_heights[~is_ground(tile_heights)] = np.nan
     area_heights = heights[rows_covered[0] : rows_covered[-1] + 1, columns[0] : columns[-1] + 1]
-    values = _interpolate(tile_heights, row - top, col - left)
-    is_empty = np.isnan(area_heights)
-    area_heights[is_empty] = values[is_empty]
-
-
-def _interpolate(tile_heights: Heights, row: Floats, col: Floats) -> Heights:
-    """Interpolate heights (m, n) bilinearly at rows (m,) and columns (n,)."""
+    # Bilinear interpolation.
+    row, col = row - top, col - left
     r0, c0 = np.floor(row).astype(int), np.floor(col).astype(int)
     r1, c1 = np.minimum(r0 + 1, tile_heights.shape[0] - 1), np.minimum(c0 + 1, tile_heights.shape[1] - 1)
     row_fractions, col_fractions = (row - r0)[:, None], (col - c0)[None, :]
@@ -390,4 +385,6 @@ def _interpolate(tile_heights: Heights, row: Floats, col: Floats) -> Heights:
 
     upper = blend(tile_heights[np.ix_(r0, c0)], tile_heights[np.ix_(r0, c1)], col_fractions)
     lower = blend(tile_heights[np.ix_(r1, c0)], tile_heights[np.ix_(r1, c1)], col_fractions)
-    return blend(upper.astype(np.float32), lower.astype(np.float32), row_fractions).astype(np.float32)
+    values = blend(upper.astype(np.float32), lower.astype(np.float32), row_fractions).astype(np.float32)
+    is_empty = np.isnan(area_heights)
+    area_heights[is_empty] = values[is_empty]

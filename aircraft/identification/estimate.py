@@ -140,7 +140,15 @@ def estimate_model(records: Sequence[FlightRecord], base: BaseModel, *, dynamics
                 nominal=nominal.refinement,
             )
             shifts[fixed_parameter.name] = shifted_estimate.values - nominal.values
-    shifts |= _lift_shifts(signals, base, nominal)
+    # Shifts of the lift curve along each principal axis of its covariance, by one standard deviation.
+    # `nominal.covariance` already contains the uncertainty of the lift curve itself, which is therefore subtracted.
+    eigenvalues, axes = np.linalg.eigh(nominal.covariance[:2, :2])
+    for k in range(2):
+        lift = nominal.values[:2] + np.sqrt(max(0.0, float(eigenvalues[k]))) * axes[:, k]
+        shifted = fit_parameters(signals, base, lift=lift, dynamics=nominal.dynamics, nominal=nominal.refinement)
+        shift = shifted.values - nominal.values
+        nominal.covariance[:2, :2] -= np.outer(shift[:2], shift[:2])
+        shifts[f"lift curve, axis {k + 1}"] = shift
     if nominal.refinement is not None:
         for name, horizons in OTHER_HORIZONS_S.items():
             other_refinement = refine_moments(signals, base, nominal.values, horizons, steps=2)
@@ -303,10 +311,15 @@ def fit_parameters(
         refinement = refine_moments(signals, base, values)
         values[IS_MOMENT] = refinement.values
         covariance[np.ix_(IS_MOMENT, IS_MOMENT)] = refinement.covariance
-    equations = tuple(_make_equation(group, fit) for group, fit in fits.items())
+    equations = []
+    for group, fit in fits.items():
+        title, unit, hertz = _EQUATIONS[group]
+        correlation = correlation_samples(fit.residual) / hertz
+        flown = fit.predicted + fit.residual
+        equations.append(Equation(title, unit, hertz, flown, fit.predicted, fit.explained, correlation))
     has_current = bool(np.isfinite(signals.current).all())
     return Estimate(
-        values, covariance, (), equations, with_current=has_current, dynamics=dynamics, refinement=refinement
+        values, covariance, (), tuple(equations), with_current=has_current, dynamics=dynamics, refinement=refinement
     )
 
 
@@ -317,27 +330,3 @@ def alpha_uncertainty(fit: Fit, lift: Floats) -> AlphaUncertainty:
     """
     slope_sd, offset_sd = np.sqrt(np.diag(fit.covariance)).tolist()
     return AlphaUncertainty(float(np.hypot(offset_sd, LEVEL_SD)), slope_sd, float(lift.mean()))
-
-
-def _make_equation(group: Group, fit: Fit) -> Equation:
-    """Return the equation of a group of parameters, with its fit."""
-    title, unit, hertz = _EQUATIONS[group]
-    correlation = correlation_samples(fit.residual) / hertz
-    return Equation(title, unit, hertz, fit.predicted + fit.residual, fit.predicted, fit.explained, correlation)
-
-
-def _lift_shifts(signals: Signals, base: BaseModel, nominal: Estimate) -> dict[str, Floats]:
-    """Return the changes of all parameters if the lift curve is shifted along its principal axes.
-
-    There is one shift along each axis of the lift curve's covariance, by one standard deviation. `nominal.covariance`
-    already contains the uncertainty of the lift curve itself, so this part is subtracted from it, in place.
-    """
-    eigenvalues, axes = np.linalg.eigh(nominal.covariance[:2, :2])
-    shifts = {}
-    for k in range(2):
-        lift = nominal.values[:2] + np.sqrt(max(0.0, float(eigenvalues[k]))) * axes[:, k]
-        shifted = fit_parameters(signals, base, lift=lift, dynamics=nominal.dynamics, nominal=nominal.refinement)
-        shift = shifted.values - nominal.values
-        nominal.covariance[:2, :2] -= np.outer(shift[:2], shift[:2])
-        shifts[f"lift curve, axis {k + 1}"] = shift
-    return shifts

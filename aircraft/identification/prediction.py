@@ -362,7 +362,14 @@ def predict_log(signals: Signals, models: Mapping[str, tuple[BaseModel, Floats]]
         horizon: _measured_quantities(signals, starts + round(horizon * signals.hertz)) for horizon in HORIZONS_S
     }
     start_values = _measured_quantities(signals, starts)
-    constant_rates = {horizon: _predict_constant_rates(start_values, horizon) for horizon in HORIZONS_S}
+    # Roll and pitch after each time at constant angular rates, and at constant airspeed.
+    p, q, r, roll, pitch, _ = start_values.T
+    constant_rates = {}
+    for horizon in HORIZONS_S:
+        quantities = start_values.copy()
+        quantities[:, 3] += horizon * (p + np.tan(pitch) * (q * np.sin(roll) + r * np.cos(roll)))
+        quantities[:, 4] += horizon * (q * np.cos(roll) - r * np.sin(roll))
+        constant_rates[horizon] = quantities
     predictions = [Prediction("constant rates", _rms_errors(constant_rates, measured))]
     shown_values = constant_rates[HORIZONS_S[1]]
     for name, (base, values) in models.items():
@@ -382,15 +389,6 @@ def predict_log(signals: Signals, models: Mapping[str, tuple[BaseModel, Floats]]
 def _measured_quantities(signals: Signals, rows: Ints) -> Floats:
     """Return the measured `QUANTITIES` at some rows, in rad, rad/s and m/s, (n, 6)."""
     return np.column_stack([signals.rates[rows], signals.attitude[rows, :2], signals.airspeed[rows]])
-
-
-def _predict_constant_rates(quantities: Floats, horizon: float) -> Floats:
-    """Return the quantities (n, 6) after a time, s, at constant angular rates and airspeed."""
-    p, q, r, roll, pitch, _ = quantities.T
-    predicted = quantities.copy()
-    predicted[:, 3] += horizon * (p + np.tan(pitch) * (q * np.sin(roll) + r * np.cos(roll)))
-    predicted[:, 4] += horizon * (q * np.cos(roll) - r * np.sin(roll))
-    return predicted
 
 
 def _convert_units(quantities: Floats) -> Floats:

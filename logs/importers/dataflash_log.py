@@ -212,6 +212,16 @@ class _Reader:
         if messages.has("Name", "Value"):
             values = zip(messages.texts("Name"), messages.column("Value").tolist(), strict=True)
             parameters = {name: value for name, value in values if name and math.isfinite(value)}
+        # Altitudes in the log other than the altitude of the position.
+        heights = []
+        gps, baro = self._read_table("GPS", ("Alt",)), self._read_table("BARO", ("Alt",))
+        baro_amsl = self._read_table("BARO", ("AltAMSL",))
+        if gps is not None and series["position"].source != "GPS":
+            heights.append(HeightSource("GPS.Alt", "amsl", gps))
+        if baro_amsl is not None:
+            heights.append(HeightSource("BARO.AltAMSL", "amsl", baro_amsl))
+        elif baro is not None:
+            heights.append(HeightSource("BARO.Alt (above the power-up position)", "unstated", baro))
         modes: list[ModeChange] = []
         mode_messages = self._select_messages("MODE")
         column = "ModeNum" if mode_messages.has("ModeNum") else "Mode"
@@ -226,7 +236,7 @@ class _Reader:
             program=program,
             vehicle=vehicle,
             series=series,
-            heights=tuple(self._read_heights()),
+            heights=tuple(heights),
             datum="amsl",
             modes=tuple(modes),
             missions=tuple(
@@ -363,20 +373,6 @@ class _Reader:
             if battery is not None and len(battery.time) and np.any(battery.values[:, 1]):
                 return with_used_energy(battery)
         return None
-
-    def _read_heights(self) -> Iterable[HeightSource]:
-        """Yield the altitudes in the log other than the altitude of the position."""
-        position = self._read_position()
-        gps = self._read_table("GPS", ("Alt",))
-        if gps is not None and position is not None and position.source != "GPS":
-            yield HeightSource("GPS.Alt", "amsl", gps)
-        baro = self._read_table("BARO", ("AltAMSL",))
-        if baro is not None:
-            yield HeightSource("BARO.AltAMSL", "amsl", baro)
-        else:
-            baro = self._read_table("BARO", ("Alt",))
-            if baro is not None:
-                yield HeightSource("BARO.Alt (above the power-up position)", "unstated", baro)
 
     def _read_events(self) -> Iterable[tuple[float, str]]:
         """Yield the time (s) and the text of each MSG message."""

@@ -311,33 +311,36 @@ def chart_json(chart: Chart) -> Json:
 def panel_json(panel: Panel) -> Json:
     """Return a panel as JSON data for the page; layers without a value and NaN limits are omitted."""
     labels = [label for label in panel.labels if label.rank in ("end", "number")]
+    layers = []
+    for layer in panel.layers:
+        if not np.isfinite(layer.y).any():
+            continue
+        document: Json = {"kind": layer.kind, "name": layer.name, "role": layer.role}
+        if layer.flight is None:
+            document["x"] = numbers(layer.x, screen_decimals(layer.x))
+            document["y"] = numbers(layer.y, screen_decimals(layer.y))
+        if layer.lower_edge is not None:
+            document["low"] = numbers(layer.lower_edge, screen_decimals(layer.lower_edge))
+        optional_keys: Json = {
+            "dashed": layer.dashed,
+            "quiet": layer.quiet,
+            "legend": layer.legend,
+            "words": list(layer.hover_texts),
+        }
+        document |= {key: value for key, value in optional_keys.items() if value}
+        if layer.flight is not None:
+            document["flight"] = layer.flight
+        layers.append(document)
     return {
         "title": panel.title,
         "unit": panel.unit,
         "along": panel.along,
         "note": panel.note,
         "limits": [[label, round(value, 4)] for label, value in panel.limits if math.isfinite(value)],
-        "layers": [_layer_json(layer) for layer in panel.layers if np.isfinite(layer.y).any()],
+        "layers": layers,
         "labels": [[label.text, *numbers((label.x, label.y), 3), label.role] for label in labels],
         "span": numbers(panel.shown_span(), 4),
     }
-
-
-def _layer_json(layer: Layer) -> Json:
-    """Return a layer as JSON data for the page."""
-    document: Json = {"kind": layer.kind, "name": layer.name, "role": layer.role}
-    if layer.flight is None:
-        document |= {"x": numbers(layer.x, screen_decimals(layer.x)), "y": numbers(layer.y, screen_decimals(layer.y))}
-    if layer.lower_edge is not None:
-        document["low"] = numbers(layer.lower_edge, screen_decimals(layer.lower_edge))
-    optional_keys: Json = {
-        "dashed": layer.dashed,
-        "quiet": layer.quiet,
-        "legend": layer.legend,
-        "words": list(layer.hover_texts),
-    }
-    optional_keys = {key: value for key, value in optional_keys.items() if value}
-    return document | optional_keys | ({} if layer.flight is None else {"flight": layer.flight})
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,7 +25,7 @@ from matplotlib.ticker import MultipleLocator
 from PIL import Image
 
 from logs import theme
-from logs.views.charts import Chart, Label, Layer, LegendEntry, Panel, legend_entries, nice_step
+from logs.views.charts import Chart, Label, LegendEntry, Panel, legend_entries, nice_step
 from logs.views.labels import DPI, LabelPlacer
 from world.files import write_atomically
 
@@ -306,6 +306,7 @@ def can_share_legend(panels: Sequence[Panel]) -> bool:
 
     In all panels, each line style must have the same meaning, and each meaning the same style; some styles must repeat.
 
+    >>> from logs.views.charts import Layer
     >>> none = np.zeros(2)
     >>> flown, wanted = Layer("line", "flown", "flown", none, none), Layer("line", "command", "commanded", none, none)
     >>> can_share_legend([Panel("bank", "", (wanted, flown)), Panel("speed", "", (wanted, flown))])
@@ -337,7 +338,24 @@ def _draw_panel(axes: Any, chart: Chart, panel: Panel, *, has_leg_numbers: bool)
         axes.xaxis.set_major_locator(MultipleLocator(nice_step(float(np.ptp(axes.get_xlim())), 14)))
         _draw_marks(axes, chart.marks, has_leg_numbers=has_leg_numbers and chart.legend == "beside")
     else:
-        _set_place_ticks(axes, panel)
+        # The axis has waypoint or leg numbers; failing ones have the colour of failures.  A label that would touch
+        # another label is left out; of two failing labels, the later one.
+        positions = np.unique(np.concatenate([layer.x for layer in panel.layers]))
+        failing = {float(x) for layer in panel.layers if layer.kind == "rings" for x in layer.x}
+        digits = len(f"{positions[-1]:.0f}")
+        label_width = (_DIGIT_WIDTH_IN * digits + _LABEL_GAP_IN) / (WIDTH * axes.get_position().width)
+        min_distance = label_width * (float(np.ptp(positions)) + 2.0 * _PLACE_MARGIN)
+        label_interval = max(-(-len(positions) // _MAX_TICKS), math.ceil(min_distance))
+        ticks = list[float]()
+        for position in (*sorted(failing), *positions[::label_interval].tolist(), *positions.tolist()):
+            if all(abs(position - tick) >= min_distance for tick in ticks):
+                ticks.append(position)
+        ticks.sort()
+        axes.set_xticks(ticks, [f"{tick:.0f}" for tick in ticks])
+        for tick_label, tick in zip(axes.get_xticklabels(), ticks, strict=True):
+            if tick in failing:
+                tick_label.set(color=theme.colour("fail"), fontweight="bold")
+        axes.set_xlim(positions[0] - _PLACE_MARGIN, positions[-1] + _PLACE_MARGIN)
     axes.set_ylim(*panel.shown_span())
     if chart.legend == "below" and axes.get_ylim()[0] < 0.0 < axes.get_ylim()[1]:
         axes.axhline(0.0, color=theme.colour("rim"), linewidth=0.7, zorder=1)
@@ -393,29 +411,6 @@ def _draw_marks(axes: Any, marks: Sequence[tuple[float, str]], *, has_leg_number
         last_middle = middle
 
 
-def _set_place_ticks(axes: Any, panel: Panel) -> None:
-    """Label the horizontal axis with waypoint or leg numbers; failing ones have the colour of failures.
-
-    A label that would touch another label is left out.  Of two failing labels, the later one is left out.
-    """
-    positions = np.unique(np.concatenate([layer.x for layer in panel.layers]))
-    failing = {float(x) for layer in panel.layers if layer.kind == "rings" for x in layer.x}
-    digits = len(f"{positions[-1]:.0f}")
-    label_width = (_DIGIT_WIDTH_IN * digits + _LABEL_GAP_IN) / (WIDTH * axes.get_position().width)
-    min_distance = label_width * (float(np.ptp(positions)) + 2.0 * _PLACE_MARGIN)
-    label_interval = max(-(-len(positions) // _MAX_TICKS), math.ceil(min_distance))
-    ticks = list[float]()
-    for position in (*sorted(failing), *positions[::label_interval].tolist(), *positions.tolist()):
-        if all(abs(position - tick) >= min_distance for tick in ticks):
-            ticks.append(position)
-    ticks.sort()
-    axes.set_xticks(ticks, [f"{tick:.0f}" for tick in ticks])
-    for text, tick in zip(axes.get_xticklabels(), ticks, strict=True):
-        if tick in failing:
-            text.set(color=theme.colour("fail"), fontweight="bold")
-    axes.set_xlim(positions[0] - _PLACE_MARGIN, positions[-1] + _PLACE_MARGIN)
-
-
 # Layers.
 
 
@@ -442,9 +437,33 @@ def draw_layers(axes: Any, panel: Panel, min_zorder: float = 2.0) -> None:
         options: dict[str, Any] = {"zorder": zorder, "label": layer.legend or layer.name or None}
         match layer.kind:
             case "line":
-                _draw_line(axes, layer, role_style, **options)
+                min_extent = 0.02 * np.ptp(axes.get_xlim())
+                is_short = layer.role == "failing-leg" and np.hypot(np.ptp(layer.x), np.ptp(layer.y)) < min_extent
+                (line,) = axes.plot(
+                    layer.x,
+                    layer.y,
+                    color=role_style.light,
+                    linewidth=role_style.width,
+                    linestyle=_make_dash_pattern(role_style, layer.dashed),
+                    solid_capstyle="round" if is_short or layer.role in ("planned", "inside") else "butt",
+                    solid_joinstyle="round",
+                    **options,
+                )
+                if role_style.halo:
+                    rim_width, paper = role_style.width + 1.2, theme.colour("paper")
+                    rim = patheffects.Stroke(linewidth=rim_width, foreground=paper, alpha=0.8)
+                    line.set_path_effects([rim, patheffects.Normal()])
             case "band":
-                _draw_band(axes, layer, role_style, **options)
+                # The bands have gaps where an edge is unknown; without a lower edge they reach down to 0.
+                lower_edge = layer.lower_edge if layer.lower_edge is not None else np.zeros(len(layer.y))
+                is_known = np.isfinite(layer.x) & np.isfinite(layer.y) & np.isfinite(lower_edge)
+                edges = np.flatnonzero(np.diff(np.concatenate([[False], is_known, [False]]).astype(np.int8)))
+                polygons = []
+                for start, end in zip(edges[::2], edges[1::2], strict=True):
+                    upper = np.column_stack([layer.x[start:end], layer.y[start:end]])
+                    lower = np.column_stack([layer.x[start:end], lower_edge[start:end]])
+                    polygons.append(np.vstack([upper, lower[::-1]]))
+                axes.add_collection(PolyCollection(polygons, **_make_area_style(role_style), **options))
             case "area":
                 # The rings are one path, so that the holes of the area stay open.
                 points = np.column_stack([layer.x, layer.y])
@@ -467,47 +486,6 @@ def _make_dash_pattern(role_style: theme.RoleStyle, dashed: bool = False) -> Any
     """Return the line style of a role for matplotlib: dashes in line widths, or "-" for a solid line."""
     pattern = role_style.dash or ((8.0, 3.5) if dashed else ())
     return (0, tuple(part / max(role_style.width, 0.1) for part in pattern)) if pattern else "-"
-
-
-def _draw_line(axes: Any, layer: Layer, role_style: theme.RoleStyle, **options: Any) -> None:
-    """Draw a layer as a line, with a light rim if its style has one."""
-    is_short = layer.role == "failing-leg" and np.hypot(np.ptp(layer.x), np.ptp(layer.y)) < 0.02 * np.ptp(
-        axes.get_xlim()
-    )
-    cap = "round" if is_short or layer.role in ("planned", "inside") else "butt"
-    (line,) = axes.plot(
-        layer.x,
-        layer.y,
-        color=role_style.light,
-        linewidth=role_style.width,
-        linestyle=_make_dash_pattern(role_style, layer.dashed),
-        solid_capstyle=cap,
-        solid_joinstyle="round",
-        **options,
-    )
-    if role_style.halo:
-        rim = patheffects.Stroke(linewidth=role_style.width + 1.2, foreground=theme.colour("paper"), alpha=0.8)
-        line.set_path_effects([rim, patheffects.Normal()])
-
-
-def _draw_band(axes: Any, layer: Layer, role_style: theme.RoleStyle, **options: Any) -> None:
-    """Draw a layer as filled bands between its two edges, with gaps where an edge is unknown.
-
-    A layer without a lower edge is filled down to 0.
-    """
-    lower_edge = layer.lower_edge if layer.lower_edge is not None else np.zeros(len(layer.y))
-    is_known = np.isfinite(layer.x) & np.isfinite(layer.y) & np.isfinite(lower_edge)
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], is_known, [False]]).astype(np.int8)))
-    polygons = [
-        np.column_stack(
-            [
-                np.append(layer.x[start:end], layer.x[start:end][::-1]),
-                np.append(layer.y[start:end], lower_edge[start:end][::-1]),
-            ]
-        )
-        for start, end in zip(edges[::2], edges[1::2], strict=True)
-    ]
-    axes.add_collection(PolyCollection(polygons, **_make_area_style(role_style), **options))
 
 
 def _make_area_style(role_style: theme.RoleStyle) -> dict[str, Any]:

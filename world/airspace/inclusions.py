@@ -7,7 +7,7 @@ from functools import reduce
 import numpy as np
 import shapely
 
-from world.airspace.zones import Cylinder, Polygon, Zone, make_polygon
+from world.airspace.zones import Polygon, Zone, make_polygon
 
 # Number of corners of a circle in a union of inclusions: it leaves out 1e-4 of the radius at most.
 _CIRCLE_CORNERS = 256
@@ -27,7 +27,17 @@ def unite_inclusions(zones: Sequence[Zone]) -> tuple[Zone, ...]:
     inclusions = [zone for zone in zones if zone.kind == "inclusion"]
     if len(inclusions) < 2:
         return tuple(zones)
-    union = shapely.union_all([_zone_area(zone.shape) for zone in inclusions])
+    areas = []
+    for zone in inclusions:
+        if isinstance(zone.shape, Polygon):
+            # A position is inside if it is inside an odd number of rings.
+            areas.append(reduce(shapely.symmetric_difference, map(shapely.Polygon, zone.shape.rings)))
+        else:
+            angles = np.linspace(0.0, 2.0 * math.pi, _CIRCLE_CORNERS, endpoint=False)
+            east = zone.shape.east + zone.shape.radius * np.cos(angles)
+            north = zone.shape.north + zone.shape.radius * np.sin(angles)
+            areas.append(shapely.Polygon(np.column_stack([east, north])))
+    union = shapely.union_all(areas)
     rings = [
         [(east, north) for east, north in ring.coords]
         for part in shapely.get_parts(union)
@@ -36,13 +46,3 @@ def unite_inclusions(zones: Sequence[Zone]) -> tuple[Zone, ...]:
     name = f"{inclusions[0].name} and {len(inclusions) - 1} more"
     exclusions = [zone for zone in zones if zone.kind != "inclusion"]
     return (Zone(name, "inclusion", make_polygon(rings)), *exclusions)
-
-
-def _zone_area(shape: Polygon | Cylinder) -> shapely.Geometry:
-    """Return the area of a shape: its parts without their holes; a circle is approximated by an inscribed polygon."""
-    if isinstance(shape, Polygon):
-        # A position is inside if it is inside an odd number of rings.
-        return reduce(shapely.symmetric_difference, map(shapely.Polygon, shape.rings))
-    angles = np.linspace(0.0, 2.0 * math.pi, _CIRCLE_CORNERS, endpoint=False)
-    corners = np.column_stack([shape.east + shape.radius * np.cos(angles), shape.north + shape.radius * np.sin(angles)])
-    return shapely.Polygon(corners)

@@ -34,6 +34,11 @@ _COORDINATE = re.compile(r"(?P<lat>[\d:.]+)\s*(?P<ns>[NS])[\s,]*(?P<lon>[\d:.]+)
 _ALTITUDE = re.compile(r"(\d+(?:\.\d+)?)\s*(FT|FEET|F|M|)\s*(AMSL|MSL|ALT|AGL|AAGL|ASFC|GND|SFC|STD|)", re.IGNORECASE)
 _LEVEL = re.compile(r"FL\s*(\d+(?:\.\d+)?)", re.IGNORECASE)
 _ABOVE_GROUND = ("AGL", "AAGL", "ASFC", "GND", "SFC")
+# Texts of a lower limit on the ground, and of an upper limit that does not exist.
+_NO_LIMIT = {
+    "lowerLimit": ("GND", "SFC", "SURFACE", "0"),
+    "upperLimit": ("UNL", "UNLIM", "UNLTD", "UNLIMITED"),
+}
 
 
 @dataclass(slots=True)
@@ -151,24 +156,22 @@ def _finish_block(block: _Block, source: str) -> tuple[str, dict[str, Any] | str
     if block.circle is not None:
         (lat, lon), radius = block.circle
         return location, entries | {"lat_deg": lat, "lon_deg": lon, "radius_m": radius}
-    rings = [block.corners] if block.corners else _airway_rings(block, f"{source}: {location}")
+    rings = [block.corners]
+    if block.airway:
+        # The outline of an airway is a band of its width along its segments.
+        place = f"{source}: {location}"
+        if len(block.airway) < 2 or not block.width > 0.0:
+            message = f"{place}: DY: an airway needs at least two points, and a width (V W=) before them"
+            raise ScenarioError(message, file=place)
+        origin = GeoOrigin(*block.airway[0])
+        east, north = to_map(origin, [lat for lat, _ in block.airway], [lon for _, lon in block.airway])
+        try:
+            outline = band_outline(list(zip(east.tolist(), north.tolist(), strict=True)), block.width)
+        except ValueError as error:
+            raise ScenarioError(f"{place}: DY: {error}", file=place, field="DY", allowed=str(error)) from error
+        lats, lons = to_geo(origin, [corner[0] for corner in outline], [corner[1] for corner in outline])
+        rings = [list(zip(lats.tolist(), lons.tolist(), strict=True))]
     return location, entries | {"rings_deg": [[list(corner) for corner in ring] for ring in rings]}
-
-
-def _airway_rings(block: _Block, source: str) -> list[list[_Position]]:
-    """Return the outline of an airway as one ring (latitude, longitude): a band of its width along its segments."""
-    if len(block.airway) < 2 or not block.width > 0.0:
-        raise ScenarioError(
-            f"{source}: DY: an airway needs at least two points, and a width (V W=) before them", file=source
-        )
-    origin = GeoOrigin(*block.airway[0])
-    east, north = to_map(origin, [lat for lat, _ in block.airway], [lon for _, lon in block.airway])
-    try:
-        outline = band_outline(list(zip(east.tolist(), north.tolist(), strict=True)), block.width)
-    except ValueError as error:
-        raise ScenarioError(f"{source}: DY: {error}", file=source, field="DY", allowed=str(error)) from error
-    lat, lon = to_geo(origin, [corner[0] for corner in outline], [corner[1] for corner in outline])
-    return [list(zip(lat.tolist(), lon.tolist(), strict=True))]
 
 
 # ----------------------------------------------------------------------
@@ -189,34 +192,26 @@ def _limit_reader(key: str) -> Callable[[_Block, str], None]:
     """Return the function that reads AL or AH and stores the limit under a key, in openAIP's form."""
 
     def read(block: _Block, text: str) -> None:
-        """Store the limit under the key. Raises ValueError if it is already stored."""
+        """Store the limit under the key, unless it is the ground or no limit.
+
+        Raises ValueError if it is already stored, and for any other text.
+        """
         if key in block.limits:
             raise ValueError("an airspace has one lower limit (AL) and one upper limit (AH)")
-        if (limit := _parse_limit(text, key)) is not None:
-            block.limits[key] = limit
+        level_match, match = _LEVEL.fullmatch(text), _ALTITUDE.fullmatch(text)
+        if text.upper() in _NO_LIMIT[key]:
+            return
+        if level_match is not None:
+            block.limits[key] = {"value": float(level_match[1]), "unit": "FL", "referenceDatum": "STD"}
+        elif match is not None:
+            unit, datum = match[2].upper(), match[3].upper()
+            reference_datum = "GND" if datum in _ABOVE_GROUND else "STD" if datum == "STD" else "MSL"
+            unit = "M" if unit == "M" else "FT"
+            block.limits[key] = {"value": float(match[1]), "unit": unit, "referenceDatum": reference_datum}
+        else:
+            raise ValueError("expected a height: 2500ft AMSL, 300m AGL, FL95, GND, UNL")
 
     return read
-
-
-def _parse_limit(text: str, key: str) -> dict[str, Any] | None:
-    """Convert the text of a limit to openAIP's form; return None for the ground or no limit.
-
-    key: "lowerLimit" or "upperLimit".
-
-    Raises ValueError for any other text.
-    """
-    if text.upper() in ("GND", "SFC", "SURFACE", "0") and key == "lowerLimit":
-        return None
-    if text.upper() in ("UNL", "UNLIM", "UNLTD", "UNLIMITED") and key == "upperLimit":
-        return None
-    if (level_match := _LEVEL.fullmatch(text)) is not None:
-        return {"value": float(level_match[1]), "unit": "FL", "referenceDatum": "STD"}
-    match = _ALTITUDE.fullmatch(text)
-    if match is None:
-        raise ValueError("expected a height: 2500ft AMSL, 300m AGL, FL95, GND, UNL")
-    value, unit, datum = float(match[1]), match[2].upper(), match[3].upper()
-    reference_datum = "GND" if datum in _ABOVE_GROUND else "STD" if datum == "STD" else "MSL"
-    return {"value": value, "unit": "M" if unit == "M" else "FT", "referenceDatum": reference_datum}
 
 
 def _read_variable(block: _Block, text: str) -> None:
@@ -233,11 +228,6 @@ def _read_variable(block: _Block, text: str) -> None:
         block.clockwise = value == "+"
     elif name.upper() == "W":
         block.width = _parse_length(value)
-
-
-def _read_corner(block: _Block, text: str) -> None:
-    """Add a corner of a polygon (DP)."""
-    _add_corners(block.corners, [_parse_position(text)])
 
 
 def _read_circle(block: _Block, text: str) -> None:
@@ -265,15 +255,22 @@ def _read_arc_by_points(block: _Block, text: str) -> None:
     if len(ends) != 2:
         raise ValueError("expected two points: 39:36:40N 119:46:10W, 39:29:09N 119:36:10W")
     centre = _required_centre(block)
-    (first_bearing, first_radius), (last_bearing, last_radius) = (_bearing_and_distance(centre, end) for end in ends)
+    from_centre = [to_map(GeoOrigin(*centre), *end) for end in ends]
+    first_bearing, last_bearing = (math.degrees(math.atan2(east, north)) for east, north in from_centre)
+    radii = [math.hypot(east, north) for east, north in from_centre]
     # The end points are kept as stated, even if they do not agree with the centre.
-    arc = _arc_positions(centre, (first_radius, last_radius), first_bearing, last_bearing, block.clockwise)
+    arc = _arc_positions(centre, radii, first_bearing, last_bearing, block.clockwise)
     _add_corners(block.corners, [ends[0], *arc[1:-1], ends[1]])
 
 
-def _read_airway(block: _Block, text: str) -> None:
-    """Add a corner of an airway (DY)."""
-    _add_corners(block.airway, [_parse_position(text)])
+def _corner_reader(name: str) -> Callable[[_Block, str], None]:
+    """Return the function that reads DP or DY and adds the position to a list of the airspace."""
+
+    def read(block: _Block, text: str) -> None:
+        """Add the position to the list of the airspace."""
+        _add_corners(getattr(block, name), [_parse_position(text)])
+
+    return read
 
 
 def _add_corners(corners: list[_Position], added_corners: list[_Position]) -> None:
@@ -300,11 +297,11 @@ _COMMANDS: dict[str, Callable[[_Block, str], None]] = {
     "AL": _limit_reader("lowerLimit"),
     "AH": _limit_reader("upperLimit"),
     "V": _read_variable,
-    "DP": _read_corner,
+    "DP": _corner_reader("corners"),
     "DA": _read_arc_by_bearings,
     "DB": _read_arc_by_points,
     "DC": _read_circle,
-    "DY": _read_airway,
+    "DY": _corner_reader("airway"),
 }
 
 
@@ -357,12 +354,6 @@ def _required_centre(block: _Block) -> _Position:
     if block.centre is None:
         raise ValueError("a centre (V X=) must come before this line")
     return block.centre
-
-
-def _bearing_and_distance(centre: _Position, position: _Position) -> tuple[float, float]:
-    """Return the bearing (degrees) and the distance (m) from a centre to a position."""
-    east, north = to_map(GeoOrigin(*centre), *position)
-    return math.degrees(math.atan2(east, north)), math.hypot(east, north)
 
 
 def _arc_positions(

@@ -79,34 +79,29 @@ def ed269_zones(data: Mapping[str, Any], source: str) -> Iterator[_FoundZone]:
             {"times": times} if (times := _period_texts(feature.get("applicability"), f"{source}: {location}")) else {}
         )
         for number, volume in enumerate(volumes, 1):
+            place = f"{source}: {location}"
+            shape = volume.get("horizontalProjection") if isinstance(volume, dict) else None
+            if not isinstance(shape, dict):
+                raise _value_error(place, "", "horizontalProjection", "expected a polygon or a circle")
+            unit, limits = volume.get("uomDimensions"), {}
+            for end in ("lower", "upper"):
+                datum = volume.get(f"{end}VerticalReference")
+                limits[f"{end}Limit"] = _parse_limit(volume.get(f"{end}Limit"), unit, datum, end, place)
+            entries = published_entries(limits, place)
+            shape_type = _upper_word(shape.get("type"))
+            if shape_type == "POLYGON":
+                entries |= {"rings_deg": _parse_rings(shape.get("coordinates"), place)}
+            elif shape_type == "CIRCLE":
+                entries |= _circle_entries(shape.get("center"), shape.get("radius"), place)
+            else:
+                raise _value_error(place, "", "horizontalProjection.type", "allowed Polygon, Circle")
             label = f"{name} {number}/{len(volumes)}" if len(volumes) > 1 else name
-            yield location, {**_ed269_volume(volume, f"{source}: {location}"), "name": label, **time_entries}
+            yield location, {**entries, "name": label, **time_entries}
 
 
 def _feature_list(data: Mapping[str, Any]) -> Any:
     """Return the list of features of an ED-269 file, under either of its two names."""
     return data.get("features") if "features" in data else data.get("UASZoneList")
-
-
-def _ed269_volume(volume: Any, source: str) -> dict[str, Any]:
-    """Convert a volume of ED-269 to the entries of a [[zones]] table; the name is not included."""
-    shape = volume.get("horizontalProjection") if isinstance(volume, dict) else None
-    if not isinstance(shape, dict):
-        raise _value_error(source, "", "horizontalProjection", "expected a polygon or a circle")
-    unit = volume.get("uomDimensions")
-    limits = {
-        f"{limit_name}Limit": _parse_limit(
-            volume.get(f"{limit_name}Limit"), unit, volume.get(f"{limit_name}VerticalReference"), limit_name, source
-        )
-        for limit_name in ("lower", "upper")
-    }
-    entries = published_entries(limits, source)
-    shape_type = _upper_word(shape.get("type"))
-    if shape_type == "POLYGON":
-        return entries | {"rings_deg": _parse_rings(shape.get("coordinates"), source)}
-    if shape_type == "CIRCLE":
-        return entries | _circle_entries(shape.get("center"), shape.get("radius"), source)
-    raise _value_error(source, "", "horizontalProjection.type", "allowed Polygon, Circle")
 
 
 def ed318_zones(feature: Mapping[str, Any], location: str, index: int, source: str) -> Iterator[_FoundZone]:

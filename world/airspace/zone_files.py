@@ -1,5 +1,6 @@
 """Read files of zones, in the format of their suffix, into [[zones]] tables of a scenario file."""
 
+import functools
 import json
 import math
 from collections import Counter
@@ -205,7 +206,20 @@ def _kml_zone(placemark: _Element, source: str) -> dict[str, Any]:
 
     Raises ScenarioError if the placemark is not a zone.
     """
-    entries = zone_entries(_extended_data(placemark, source), source)
+    # ExtendedData: Data and SimpleData by name, with numbers converted.
+    texts = {str(element.get("name")): _kml_text(element, "value") for element in _find_descendants(placemark, "Data")}
+    for element in _find_descendants(placemark, "SimpleData"):
+        texts[str(element.get("name"))] = (element.text or "").strip()
+    extended_data: dict[str, Any] = {}
+    for name, value in texts.items():
+        if name in _NUMERIC_KEYS:
+            try:
+                extended_data[name] = float(value)
+            except ValueError as error:
+                raise ScenarioError.at(source, name, value, "expected a number", shown=repr(value[:40])) from error
+        elif value:
+            extended_data[name] = value
+    entries = zone_entries(extended_data, source)
     polygons, points = _find_descendants(placemark, "Polygon"), _find_descendants(placemark, "Point")
     if not polygons:
         if len(points) != 1 or "radius_m" not in entries:
@@ -270,25 +284,6 @@ def _parse_positions(element: _Element, source: str) -> list[tuple[float, float,
                 ) from error
             positions.append((lon, lat, altitudes[0] if altitudes else 0.0))
     return positions
-
-
-def _extended_data(placemark: _Element, source: str) -> dict[str, Any]:
-    """Return the values of a placemark's ExtendedData (Data and SimpleData) by name, with numbers converted."""
-    texts = {str(element.get("name")): _kml_text(element, "value") for element in _find_descendants(placemark, "Data")}
-    texts |= {
-        str(element.get("name")): (element.text or "").strip() for element in _find_descendants(placemark, "SimpleData")
-    }
-    entries: dict[str, Any] = {}
-    for key, value in texts.items():
-        if key in _NUMERIC_KEYS:
-            try:
-                entries[key] = float(value)
-            except ValueError as error:
-                shown = repr(value[:40])
-                raise ScenarioError.at(source, key, value, "expected a number", shown=shown) from error
-        elif value:
-            entries[key] = value
-    return entries
 
 
 # ----------------------------------------------------------------------
@@ -382,7 +377,17 @@ def read_zone_file(path: Path, source: str, max_zones: int = MAX_ZONES) -> FileZ
     file_zones, unrestricted_counts = FileZones(), Counter[str]()
     repaired_names: dict[str, list[str]] = {_SELF_CROSSING: [], _SWAPPED: [], _NO_BAND: [], _EMPTY: []}
     corner_count = total_crossings = 0
-    for location, entries in _read_format(path, suffix, source):
+    found_zones: Iterator[Found]
+    if suffix == GEOPACKAGE:
+        _check_size(path, source)
+        features = enumerate(geopackage_features(path, source))
+        found_zones = (_geojson_zone(feature, location, k, source) for k, (location, feature) in features)
+    else:
+        text = _read_text(path, source, openair=FORMATS[suffix] is openair_zones)
+        found_zones = FORMATS[suffix](text, source)
+        # The zones of a large file take several times its size: release the text.
+        del text
+    for location, entries in found_zones:
         if isinstance(entries, str):
             unrestricted_counts[entries] += 1
             continue
@@ -394,17 +399,26 @@ def read_zone_file(path: Path, source: str, max_zones: int = MAX_ZONES) -> FileZ
             allowed = f"at most {MAX_FILE_CORNERS:,}"
             message = f"{source}: too many corners: {allowed} are allowed in one file"
             raise ScenarioError(message, file=source, allowed=allowed)
-        outline_notes, crossing_count = _repair_outline(
-            entries, MAX_CROSSINGS - total_crossings, f"{source}: {location}"
-        )
-        total_crossings += crossing_count
-        for note in outline_notes:
+        place = f"{source}: {location}"
+        # Repair the outline of a zone from an authority's file.
+        is_published = entries.pop(PUBLISHED, False)
+        notes = [note for flag, note in ((UPSIDE_DOWN, _SWAPPED), (NO_BAND, _NO_BAND)) if entries.pop(flag, False)]
+        if is_published and "rings_deg" in entries:
+            try:
+                repaired = repair_rings(entries["rings_deg"], MAX_CROSSINGS - total_crossings)
+            except ValueError as error:
+                raise ScenarioError(f"{place}: {error}", file=place, field="rings_deg", allowed=str(error)) from error
+            if repaired is not None:
+                entries["rings_deg"], crossing_count = repaired
+                total_crossings += crossing_count
+                notes.append(_SELF_CROSSING if entries["rings_deg"] else _EMPTY)
+        for note in notes:
             repaired_names[note].append(str(entries["name"]))
-        if _EMPTY in outline_notes:
+        if _EMPTY in notes:
             continue
         if entries.get("rings_deg") == []:
-            raise ScenarioError(f"{source}: {location}: its outline encloses no area", file=source, field="rings_deg")
-        file_zones.zones.append(_zone_table(entries, f"{source}: {location}"))
+            raise ScenarioError(f"{place}: its outline encloses no area", file=source, field="rings_deg")
+        file_zones.zones.append(checked_table(functools.partial(ZoneTable.model_validate, entries), place))
     if not file_zones.zones and not unrestricted_counts and not repaired_names[_EMPTY]:
         raise ScenarioError(f"{source}: contains no zone", file=source)
     for reason, count in unrestricted_counts.items():
@@ -415,38 +429,6 @@ def read_zone_file(path: Path, source: str, max_zones: int = MAX_ZONES) -> FileZ
             remainder = f" and {len(names) - 5:,} more" if len(names) > 5 else ""
             file_zones.notes.append(f"{source}: {note_text}: {', '.join(names[:5])}{remainder}")
     return file_zones
-
-
-def _repair_outline(entries: dict[str, Any], max_crossings: int, source: str) -> tuple[list[str], int]:
-    """Repair the outline in a zone's entries, in place, if the zone comes from an authority's file.
-
-    entries: [[zones]] entries; the marks `PUBLISHED`, `UPSIDE_DOWN` and `NO_BAND` are removed.
-
-    Returns notes about the zone, and the number of crossings of its outline. Raises ScenarioError for more crossings
-    than ``max_crossings``.
-    """
-    is_published = entries.pop(PUBLISHED, False)
-    notes = [note for flag, note in ((UPSIDE_DOWN, _SWAPPED), (NO_BAND, _NO_BAND)) if entries.pop(flag, False)]
-    if not is_published or "rings_deg" not in entries:
-        return notes, 0
-    try:
-        repaired = repair_rings(entries["rings_deg"], max_crossings)
-    except ValueError as error:
-        raise ScenarioError(f"{source}: {error}", file=source, field="rings_deg", allowed=str(error)) from error
-    if repaired is None:
-        return notes, 0
-    entries["rings_deg"], crossings = repaired
-    return [*notes, _SELF_CROSSING if entries["rings_deg"] else _EMPTY], crossings
-
-
-def _read_format(path: Path, suffix: str, source: str) -> Iterator[Found]:
-    """Yield the zones of a file, read in the format of its suffix."""
-    if suffix == GEOPACKAGE:
-        _check_size(path, source)
-        for k, (location, feature) in enumerate(geopackage_features(path, source)):
-            yield _geojson_zone(feature, location, k, source)
-        return
-    yield from FORMATS[suffix](_read_text(path, source, openair=FORMATS[suffix] is openair_zones), source)
 
 
 def _check_size(path: Path, source: str) -> None:
@@ -472,8 +454,3 @@ def _read_text(path: Path, source: str, *, openair: bool) -> str:
             raise ScenarioError(f"{source}: not a text file in UTF-8 (byte {error.start})", file=source) from error
     except OSError as error:
         raise ScenarioError(f"{source}: cannot be read: {error.strerror}", file=source) from error
-
-
-def _zone_table(entries: dict[str, Any], source: str) -> ZoneTable:
-    """Return the checked [[zones]] table of some entries. Raises ScenarioError for an invalid entry."""
-    return checked_table(lambda: ZoneTable.model_validate(entries), source)

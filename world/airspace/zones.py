@@ -96,9 +96,20 @@ def make_polygon(rings: Sequence[Sequence[tuple[float, float]]]) -> Polygon:
     """
     if not rings:
         raise ValueError("no corners: at least three are needed")
-    clean_rings = [_clean_ring(ring) for ring in rings]
+    # Rings without repeated corners.
+    clean_rings: list[Ring] = []
+    for ring in rings:
+        if not all(math.isfinite(value) for corner in ring for value in corner):
+            raise ValueError("a corner is not a number")
+        corners = [(float(east), float(north)) for east, north in ring]
+        distinct = corners[:1] + [corner for previous, corner in pairwise(corners) if corner != previous]
+        if len(distinct) > 1 and distinct[-1] == distinct[0]:
+            distinct.pop()
+        if len(distinct) < 3:
+            raise ValueError(f"{len(distinct)} corners: at least three different ones are needed")
+        clean_rings.append(tuple(distinct))
     check_edges(clean_rings)
-    shapes = [shapely.Polygon(ring) for ring in clean_rings]
+    shapes = [shapely.Polygon(clean_ring) for clean_ring in clean_rings]
     for shape in shapes:
         if not shape.is_valid:
             # Shapely's reason, and its position on the map, m.
@@ -133,19 +144,6 @@ def _check_area(area: float) -> None:
     """Raise ValueError for an area below the minimum."""
     if not area >= MIN_AREA:
         raise ValueError(f"encloses only {area:.3g} m2; at least {MIN_AREA:g} m2 are needed")
-
-
-def _clean_ring(ring: Sequence[tuple[float, float]]) -> Ring:
-    """Return a ring without repeated corners. Raises ValueError for fewer than three different corners."""
-    if not all(math.isfinite(value) for corner in ring for value in corner):
-        raise ValueError("a corner is not a number")
-    corners = [(float(east), float(north)) for east, north in ring]
-    distinct = corners[:1] + [corner for previous, corner in pairwise(corners) if corner != previous]
-    if len(distinct) > 1 and distinct[-1] == distinct[0]:
-        distinct.pop()
-    if len(distinct) < 3:
-        raise ValueError(f"{len(distinct)} corners: at least three different ones are needed")
-    return tuple(distinct)
 
 
 def make_cylinder(east: float, north: float, radius: float) -> Cylinder:

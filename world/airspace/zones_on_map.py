@@ -88,7 +88,18 @@ def make_zones(tables: Sequence[ZoneTable], source: str, origin: GeoOrigin, grou
     for k, table in enumerate(tables):
         label = f"{source}: zones[{k}] ({table.name})"
         try:
-            shape = _make_shape(table, origin)
+            rings_on_map = table.rings_m if table.polygon_m is None else [table.polygon_m]
+            shape: Polygon | Cylinder
+            if table.radius_m is not None and table.east_m is not None and table.north_m is not None:
+                shape = make_cylinder(table.east_m, table.north_m, table.radius_m)
+            elif table.radius_m is not None:
+                east, north = to_map(origin, float(table.lat_deg or 0.0), float(table.lon_deg or 0.0))
+                shape = make_cylinder(float(east), float(north), table.radius_m)
+            elif rings_on_map is not None:
+                shape = make_polygon([[(east, north) for east, north in ring] for ring in rings_on_map])
+            else:
+                rings_in_degrees = (table.rings_deg or []) if table.polygon_deg is None else [table.polygon_deg]
+                shape = make_polygon([ring_on_map(origin, ring) for ring in rings_in_degrees])
             corners = add_corner_count(corners, shape)
         except ValueError as error:
             raise ScenarioError(f"{label}: {error}", file=source, field=f"zones[{k}]") from error
@@ -160,21 +171,6 @@ def _is_near_area(table: ZoneTable, origin: GeoOrigin, bounds: Floats) -> bool:
         coordinates.min() <= max_coordinate + max_distance and coordinates.max() >= min_coordinate - max_distance
         for coordinates, (min_coordinate, max_coordinate) in spans
     )
-
-
-def _make_shape(table: ZoneTable, origin: GeoOrigin) -> Polygon | Cylinder:
-    """Make the shape of a zone on the map from the table that states it. Raises ValueError if it is invalid."""
-    if table.radius_m is not None:
-        east, north = table.east_m, table.north_m
-        if east is None or north is None:
-            center = to_map(origin, float(table.lat_deg or 0.0), float(table.lon_deg or 0.0))
-            east, north = float(center[0]), float(center[1])
-        return make_cylinder(east, north, table.radius_m)
-    rings_on_map = table.rings_m if table.polygon_m is None else [table.polygon_m]
-    if rings_on_map is not None:
-        return make_polygon([[(east, north) for east, north in ring] for ring in rings_on_map])
-    rings_in_degrees = (table.rings_deg or []) if table.polygon_deg is None else [table.polygon_deg]
-    return make_polygon([ring_on_map(origin, ring) for ring in rings_in_degrees])
 
 
 def _make_level(amsl: float | None, above_ground: float | None) -> ZoneLevel | None:

@@ -111,14 +111,25 @@ def _read_place(path: Path, entry: dict[str, Any], ground_amsl: float) -> _Place
     longitude = _number(path, entry, "longitude", -180.0, 360.0)
     ground = _number(path, entry, "elevation", -500.0, 9000.0) if "elevation" in entry else ground_amsl
     times = _read_times(path, hourly, units, entry)
-    all_levels = [_find_level(path, hourly, match) for name in hourly if (match := _SPEED_NAME.match(name)) is not None]
+    # Names of the variables of each level: wind speed, wind direction, and geopotential height ("" for a level at a
+    # height above ground).
+    all_levels = []
+    for match in filter(None, map(_SPEED_NAME.match, hourly)):
+        name, level = match.group(), f"{match.group(1)}{match.group(2)}"
+        directions = [text for text in (f"wind_direction_{level}", f"winddirection_{level}") if text in hourly]
+        if not directions:
+            raise _fault(path, f"hourly.wind_direction_{level}", f"missing, although {name} is there")
+        height = "" if match.group(2) == "m" else f"geopotential_height_{level}"
+        if height and height not in hourly:
+            raise _fault(path, f"hourly.{height}", f"missing, although {name} is there")
+        all_levels.append((name, directions[0], height))
     # The values of a level that a model does not have are null at all times.
     null_names = {
         name
         for name, values in hourly.items()
         if isinstance(values, list) and values and all(value is None for value in values)
     }
-    levels = [level for level in all_levels if null_names.isdisjoint(filter(None, level))]
+    levels = [names for names in all_levels if null_names.isdisjoint(filter(None, names))]
     if not levels:
         allowed = "no wind: wind_speed_10m and wind_direction_10m, or speed and direction of other levels, are needed"
         raise _fault(path, "hourly", allowed)
@@ -145,24 +156,6 @@ def _read_place(path: Path, entry: dict[str, Any], ground_amsl: float) -> _Place
         groups.append(LevelGroup(kind, heights.reshape(-1, 1, 1, 1), winds.reshape(1, -1, 1, 1, 1, 2)))
     altitudes, velocities = merge_levels(groups, None, ground)
     return _Place(latitude, longitude, times[:count], altitudes[:, 0, 0], velocities[0, :, 0, 0])
-
-
-def _find_level(path: Path, hourly: dict[str, Any], match: re.Match[str]) -> tuple[str, str, str]:
-    """Return the names of the three variables of a level: wind speed, wind direction, geopotential height.
-
-    hourly: variables of the place.
-    match: match of `_SPEED_NAME` with the name of the speed.
-
-    The last name is "" for a level at a height above ground.
-    """
-    name, level = match.group(), f"{match.group(1)}{match.group(2)}"
-    direction = next((text for text in (f"wind_direction_{level}", f"winddirection_{level}") if text in hourly), None)
-    if direction is None:
-        raise _fault(path, f"hourly.wind_direction_{level}", f"missing, although {name} is there")
-    height = "" if match.group(2) == "m" else f"geopotential_height_{level}"
-    if height and height not in hourly:
-        raise _fault(path, f"hourly.{height}", f"missing, although {name} is there")
-    return name, direction, height
 
 
 def _read_times(path: Path, hourly: dict[str, Any], units: dict[str, Any], entry: dict[str, Any]) -> Floats:

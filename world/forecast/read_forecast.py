@@ -153,8 +153,24 @@ class _ForecastReader:
         return ForecastError(f"{self.path}: {field}: {allowed}", file=str(self.path), field=field, allowed=allowed)
 
     def read(self, datasets: Sequence[Any]) -> Forecast:
-        """Return the forecast in the datasets of a file. Raises ForecastError if it lacks a required variable."""
-        decoded = [self._decode_times(dataset) for dataset in datasets]
+        """Return the forecast in the datasets of a file.
+
+        Raises ForecastError if it lacks a required variable, and for a calendar that is not supported.
+        """
+        import xarray
+
+        # Datasets in which all times are datetime64 and all coordinates are loaded.
+        decoded = []
+        for dataset in datasets:
+            for name, variable in dataset.variables.items():
+                calendar = variable.attrs.get("calendar")
+                if calendar not in (None, "standard", "gregorian", "proleptic_gregorian"):
+                    allowed = "allowed standard, gregorian, proleptic_gregorian"
+                    raise self._error(str(name), f"calendar {calendar!r}: {allowed}")
+            decode = functools.partial(xarray.decode_cf, dataset, decode_timedelta=False)
+            decoded.append(_call_library(self.path, decode))
+            for name in decoded[-1].coords:
+                _call_library(self.path, decoded[-1].variables[name].load)
         pairs = [pair for dataset in decoded for pair in self._wind_pairs(dataset)]
         if not pairs:
             raise self._error("wind", "missing: no pair of an eastward and a northward wind was found")
@@ -189,22 +205,6 @@ class _ForecastReader:
 
     # ------------------------------------------------------------------
     # Times.
-
-    def _decode_times(self, dataset: Any) -> Any:
-        """Return a dataset in which all times are datetime64 and all coordinates are loaded.
-
-        Raises ForecastError for a calendar that is not supported.
-        """
-        import xarray
-
-        for name, variable in dataset.variables.items():
-            calendar = variable.attrs.get("calendar")
-            if calendar not in (None, "standard", "gregorian", "proleptic_gregorian"):
-                raise self._error(str(name), f"calendar {calendar!r}: allowed standard, gregorian, proleptic_gregorian")
-        decoded = _call_library(self.path, lambda: xarray.decode_cf(dataset, decode_timedelta=False))
-        for name in decoded.coords:
-            _call_library(self.path, decoded.variables[name].load)
-        return decoded
 
     def _valid_times(self, array: Any) -> tuple[str | None, Floats]:
         """Return the time dimension of a variable, and its times in s since 1970.
@@ -423,7 +423,9 @@ class _ForecastReader:
                 raise self._error(str(array.name), f"units {stated!r}: allowed {', '.join(sorted(SPEED_UNITS))}")
             components.append(self._values(array, dim) * factor)
         velocities = np.stack(components, axis=-1)
-        if self._is_grid_relative(east):
+        attributes = east.attrs
+        if attributes.get("standard_name") == "x_wind" or attributes.get("GRIB_uvRelativeToGrid") == 1:
+            # The components are along the axes of the grid, not along east and north.
             latitude, longitude = self._horizontal(east)
             # A regular grid has its axes along east and north.
             if latitude.ndim == 2:
@@ -450,12 +452,6 @@ class _ForecastReader:
             largest = float(np.abs(velocities[..., is_used, :]).max())
             raise self._error(f"{east.name}, {north.name}", f"{largest:.4g} m/s: allowed up to {MAX_WIND_MPS:g} m/s")
         return LevelGroup(kind, np.ascontiguousarray(altitudes[..., is_used]), velocities[..., is_used, :])
-
-    @staticmethod
-    def _is_grid_relative(array: Any) -> bool:
-        """Return True if the components of a wind are along the axes of the grid, not along east and north."""
-        attributes = array.attrs
-        return attributes.get("standard_name") == "x_wind" or attributes.get("GRIB_uvRelativeToGrid") == 1
 
     def _geopotential(self, datasets: Sequence[Any], wind: Any) -> Floats:
         """Return the altitudes of a wind's pressure levels, (t, y, x, k) m AMSL, from the geopotential height.

@@ -11,7 +11,7 @@ import numpy as np
 from world.airspace.zone_times import parse_span
 from world.arrays import Floats
 from world.errors import ForecastError
-from world.forecast.forecast import LONGEST_STEP, Box, Forecast, ForecastFacts
+from world.forecast.forecast import LONGEST_STEP, Box, Forecast
 from world.forecast.read_forecast import read_forecast
 from world.forecast.wind_field import (
     MAX_FIELD_NUMBERS,
@@ -148,6 +148,8 @@ def forecast_wind(
 def check_coverage(wind: Wind, file: str, latitudes: Floats, longitudes: Floats, altitudes: Floats) -> None:
     """Raise ForecastError if a position of a mission is outside the box or the levels of the forecast.
 
+    The positions must not be too far from the only place of a forecast without a grid.
+
     file: file of the forecast, for the message.
     latitudes, longitudes: (n,) deg.
     altitudes: (n,) m AMSL.
@@ -155,7 +157,24 @@ def check_coverage(wind: Wind, file: str, latitudes: Floats, longitudes: Floats,
     facts = wind.forecast
     if facts is None:
         return
-    _check_places(facts, file, latitudes, longitudes)
+    south, west, north, east = facts.box
+    center = 0.5 * (west + east)
+    near = center + (longitudes - center + 180.0) % 360.0 - 180.0
+    if not facts.grid_km:
+        east_distance = (near - west) * 111_000.0 * math.cos(math.radians(south))
+        distances = np.hypot((latitudes - south) * 111_000.0, east_distance)
+        is_outside = distances > PLACE_RADIUS_M
+        radius_text = f"{PLACE_RADIUS_M / 1000.0:.0f} km"
+        allowed = f"it must be within {radius_text} of the forecast's only place, {south:.3f}, {west:.3f}"
+    else:
+        beyond = np.maximum.reduce([south - latitudes, latitudes - north, west - near, near - east])
+        is_outside = beyond > _BOX_TOLERANCE_DEG
+        area = f"latitude {south:.3f} to {north:.3f}, longitude {west:.3f} to {east:.3f}"
+        allowed = f"outside the forecast's area, {area}"
+    if is_outside.any():
+        k = int(np.argmax(is_outside))
+        shown = f"the mission is at {latitudes[k]:.3f}, {longitudes[k]:.3f}"
+        raise ForecastError.at(file, "latitude, longitude", shown, allowed)
     lowest, highest = np.array(facts.lowest_amsl), np.array(facts.highest_amsl)
     if wind.field is not None:
         # The levels at each place: levels above ground follow the ground of the forecast's model.
@@ -179,33 +198,6 @@ def check_coverage(wind: Wind, file: str, latitudes: Floats, longitudes: Floats,
             f"the forecast's lowest level is at {bottom:.0f} m AMSL there, and applies {MAX_DEPTH_BELOW_LEVELS_M:.0f} m"
             " below itself",
         )
-
-
-def _check_places(facts: ForecastFacts, file: str, latitudes: Floats, longitudes: Floats) -> None:
-    """Raise ForecastError if positions are outside the forecast's box, or too far from its only place.
-
-    latitudes, longitudes: (n,) deg.
-    """
-    south, west, north, east = facts.box
-    center = 0.5 * (west + east)
-    near = center + (longitudes - center + 180.0) % 360.0 - 180.0
-    if not facts.grid_km:
-        east_distance = (near - west) * 111_000.0 * math.cos(math.radians(south))
-        distances = np.hypot((latitudes - south) * 111_000.0, east_distance)
-        is_outside = distances > PLACE_RADIUS_M
-        allowed = (
-            f"it must be within {PLACE_RADIUS_M / 1000.0:.0f} km of the forecast's only place, {south:.3f}, {west:.3f}"
-        )
-    else:
-        beyond = np.maximum.reduce([south - latitudes, latitudes - north, west - near, near - east])
-        is_outside = beyond > _BOX_TOLERANCE_DEG
-        allowed = (
-            f"outside the forecast's area, latitude {south:.3f} to {north:.3f}, longitude {west:.3f} to {east:.3f}"
-        )
-    if is_outside.any():
-        k = int(np.argmax(is_outside))
-        shown = f"the mission is at {latitudes[k]:.3f}, {longitudes[k]:.3f}"
-        raise ForecastError.at(file, "latitude, longitude", shown, allowed)
 
 
 def shift_wind(wind: Wind, speed: float, from_course: float, gradient: float) -> Wind:

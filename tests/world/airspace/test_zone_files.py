@@ -397,7 +397,7 @@ def test_no_more_zones_are_made_than_a_scenario_may_have(
         (tmp_path / f"{name}.{suffix}").write_text(text if suffix == "geojson" else document(*parts))
     made: list[str] = []
     monkeypatch.setattr(zone_files, "MAX_ZONES", 4)
-    monkeypatch.setattr(zone_files, "_zone_table", lambda _, where: made.append(where))
+    monkeypatch.setattr(zone_files, "checked_table", lambda _, where: made.append(where))
     files = [f"{name}.{suffix}" for name in "ab"]
     with pytest.raises(ScenarioError) as caught:
         zone_files.read_zone_files(files, "s.toml", tmp_path)
