@@ -81,9 +81,9 @@ def limit_line(limit: Limit) -> str:
     wind = f"{limit.wind:.0f} m/s from {math.degrees(limit.wind_from):4.0f}" if limit.wind else "calm"
     factor, unit = (1.0, "m") if limit.kind == "leg" else (180.0 / math.pi, "deg")
     predicted, flown = factor * limit.predicted, factor * limit.flown
-    kind = limit.kind if limit.kind != "leg" else "leg, same way" if limit.same_way else "leg, S-turn"
+    kind = limit.kind if limit.kind != "leg" else "leg, same direction" if limit.same_way else "leg, S-turn"
     return (
-        f"{kind:<14}{wind:<20} predicted {predicted:7.2f}, flown {flown:7.2f} {unit:<4}"
+        f"{kind:<20}{wind:<20} predicted {predicted:7.2f}, flown {flown:7.2f} {unit:<4}"
         f" optimistic by {factor * limit.optimistic:+6.2f}, conservative {100.0 * limit.conservative:+5.1f} %"
     )
 

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flight.simulation.simulate import Flight, fly_to_end
-from flight.simulation.track import Track
-from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
+from logs.verdict.measures.route_requirements import route_requirements
 from tests.missions import feasible
 from world.arrays import Floats
 from world.geometry import wrap
@@ -36,27 +35,19 @@ def angles(numbers: Iterable[int], margin: float) -> Angles:
         if flown.ended != "completed":
             raise RuntimeError(f"mission {number} {flown.ended}")
         shape = route_requirements(made.setup)
-        courses = []
+        track, courses = flown.track, []
         for leg in range(shape.legs):
-            line = _line(shape, flown.track, leg)
-            courses.append(np.arctan2(line[0], line[1]))
-            slopes.append(np.arctan(line[2]) - shape.slopes[leg])
+            # Fit a straight line to the part of the leg between the turns and the blends of the slopes.
+            along = (track.position - shape.points[leg])[:, :2] @ shape.leg_unit(leg)
+            low = shape.length_after[leg] + shape.blend[leg] + SETTLING
+            high = shape.runs[leg] - shape.length_before[leg + 1] - shape.blend[leg + 1]
+            use = (track.leg == leg) & (along >= low) & (along <= high)
+            # Direction of the line: east, north and up; NaN if that part is too short.
+            step = np.full(3, np.nan)
+            if use.any() and np.ptp(along[use]) >= STRETCH:
+                step = np.polyfit(along[use], track.position[use], 1)[0]
+                step = step / np.hypot(step[0], step[1])
+            courses.append(np.arctan2(step[0], step[1]))
+            slopes.append(np.arctan(step[2]) - shape.slopes[leg])
         turns += [wrap(courses[k] - courses[k - 1]) - float(shape.turns[k]) for k in range(1, shape.legs)]
     return Angles(*(np.degrees(np.abs([value for value in found if np.isfinite(value)])) for found in (turns, slopes)))
-
-
-def _line(shape: RouteRequirements, track: Track, leg: int) -> Floats:
-    """Fit a straight line to the flight on a leg, and return its direction.
-
-    The direction is east, north and up per metre over the ground, (3,).  Only the part between the turns and the blends
-    of the slopes is used; the result is NaN if that part is too short.
-    """
-    away = track.position - shape.points[leg]
-    along = away[:, :2] @ shape.leg_unit(leg)
-    low = shape.length_after[leg] + shape.blend[leg] + SETTLING
-    high = shape.runs[leg] - shape.length_before[leg + 1] - shape.blend[leg + 1]
-    use = (track.leg == leg) & (along >= low) & (along <= high)
-    if not use.any() or np.ptp(along[use]) < STRETCH:
-        return np.full(3, np.nan)
-    step = np.polyfit(along[use], track.position[use], 1)[0]
-    return np.asarray(step / np.hypot(step[0], step[1]))

@@ -130,31 +130,27 @@ def write_missions(folder: Path) -> dict[str, tuple[str, ...]]:
         mission = Mission(Home(*places[0], 300.0), tuple(items))
         (folder / name).write_text(mission_text(mission, "waypoints"), encoding="utf-8")
         found[f"{count} waypoints"] = (name, "--scenario", SCENARIO)
-    (folder / "zones.geojson").write_text(_zones(plan.waypoints[:, :2]), encoding="utf-8")
-    found["demo, 1,000 zones"] = ("demo.json", "--fence", "zones.geojson")
-    return found
-
-
-def _zones(path: np.ndarray) -> str:
-    """Make a thousand square exclusions, up to above the flight, all over the map except near its path."""
-    scenario, rng = load_scenario(SCENARIO), np.random.default_rng(38)
+    # A thousand square exclusions, up to above the flight, all over the map except near the path of the plan.
+    rng, path = np.random.default_rng(38), plan.waypoints[:, :2]
+    legs = np.diff(path, axis=0)
     features: list[dict[str, Any]] = []
     while len(features) < 1_000:
-        number = len(features)
-        east, north = rng.uniform(-10_000.0, 10_000.0, 2)
+        place = rng.uniform(-10_000.0, 10_000.0, 2)
         # Distances of the place from the legs of the path.
-        legs, place = np.diff(path, axis=0), np.array([east, north])
         shares = np.clip(((place - path[:-1]) * legs).sum(axis=1) / (legs**2).sum(axis=1), 0.0, 1.0)
         if float(np.hypot(*(path[:-1] + shares[:, None] * legs - place).T).min()) < 250.0:
             continue
-        corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1], [-1, -1]]) * 90.0 + [east, north]
+        corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1], [-1, -1]]) * 90.0 + place
         lat, lon = to_geo(scenario.origin, corners[:, 0], corners[:, 1])
         ring = np.stack([lon, lat], axis=1).tolist()
-        properties = {"name": f"zone {number}", "kind": "exclusion", "ceiling_amsl_m": 2_000.0}
+        properties = {"name": f"zone {len(features)}", "kind": "exclusion", "ceiling_amsl_m": 2_000.0}
         features.append(
             {"type": "Feature", "properties": properties, "geometry": {"type": "Polygon", "coordinates": [ring]}}
         )
-    return json.dumps({"type": "FeatureCollection", "features": features})
+    document = json.dumps({"type": "FeatureCollection", "features": features})
+    (folder / "zones.geojson").write_text(document, encoding="utf-8")
+    found["demo, 1,000 zones"] = ("demo.json", "--fence", "zones.geojson")
+    return found
 
 
 @contextlib.contextmanager

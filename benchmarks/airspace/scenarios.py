@@ -143,7 +143,13 @@ def passable(scenario: Scenario) -> bool:
     across = np.arange(-half, half + 1) * pitch
     stage = np.arange(stages + 1)[:, None] * pitch
     places = np.stack([start[0] + c * stage - s * across, start[1] + s * stage + c * across], axis=-1)
-    low, high = _band(scenario, places, pitch)
+    # Lowest and highest altitude of a path at each place, from the highest and the lowest ground within half a pitch.
+    terrain = scenario.terrain
+    assert terrain is not None
+    offsets = (-0.5 * pitch, 0.0, 0.5 * pitch)
+    grounds = [terrain.height(places[..., 0] + east, places[..., 1] + north) for east in offsets for north in offsets]
+    low = np.maximum.reduce([ground + LOWEST for ground in grounds]) + BAND_ROOM
+    high = np.minimum.reduce([ground + HIGHEST for ground in grounds]) - BAND_ROOM
     low, high = np.where(_open(scenario, places), low, np.inf), np.where(_open(scenario, places), high, -np.inf)
     layers = start[2] + np.arange(-400, 401) * LAYER
     layers = layers[
@@ -183,24 +189,6 @@ def passable(scenario: Scenario) -> bool:
         if not state.any():
             return False
     return bool(state[:, half, np.argmin(np.abs(layers - destination[2]))].any())
-
-
-def _band(scenario: Scenario, places: Floats, pitch: float) -> tuple[Floats, Floats]:
-    """Return the lowest and highest altitude of a path at each place, m AMSL, (s, y) each.
-
-    The lowest altitude is counted from the highest ground within half a pitch of the place, the highest altitude from
-    the lowest ground there.
-
-    places: east and north of the places, m, (s, y, 2): stages along the line, and places across it.
-    """
-    terrain = scenario.terrain
-    assert terrain is not None
-    low, high = np.full(places.shape[:2], -np.inf), np.full(places.shape[:2], np.inf)
-    for east in (-0.5 * pitch, 0.0, 0.5 * pitch):
-        for north in (-0.5 * pitch, 0.0, 0.5 * pitch):
-            ground = terrain.height(places[..., 0] + east, places[..., 1] + north)
-            low, high = np.maximum(low, ground + LOWEST), np.minimum(high, ground + HIGHEST)
-    return low + BAND_ROOM, high - BAND_ROOM
 
 
 def _open(scenario: Scenario, places: Floats) -> Flags:

@@ -15,7 +15,7 @@ import numpy as np
 from flight.simulation.simulate import Flight, fly_to_end
 from logs.verdict.judge_flight import judge_flight
 from planfly.workflow.open_flight import make_setup
-from planfly.workflow.uav import Uav, load_uav
+from planfly.workflow.uav import load_uav
 from tests.field_missions import FieldMission, close_mission, ordinary_mission
 from world.scenario import Scenario
 from world.wind import Wind
@@ -49,8 +49,24 @@ def compare(seed: int, aircraft: str = "aerosonde") -> StepRates:
     setup = make_setup(made.scenario, uav, made.mission, seed=1)
     flights = [fly_to_end(Flight(replace(setup, fdm_hz=hz), uav.aircraft)) for hz in STEP_RATES]
     judged = [judge_flight(setup, flown.track, flown.ended) for flown in flights]
-    failed = [{(item.rule, item.place) for item in one.findings if item.ok is False} for one in judged]
-    calm, windy = (_max_distance(made, uav, speed) for speed in (0.0, made.scenario.wind.speed))
+    failed = [{(item.rule, item.place) for item in verdict.findings if item.ok is False} for verdict in judged]
+    # Largest distance between the flights without gusts and with exact navigation, in calm air and in the wind.
+    old, distances = made.scenario.wind, []
+    for speed in (0.0, old.speed):
+        wind = Wind(speed, old.from_course, old.gradient if speed else 0.0, "none", None, old.reference_amsl)
+        table = made.scenario.spec.wind.model_copy(update={"speed_mps": speed, "turbulence": "none"})
+        spec = made.scenario.spec.model_copy(update={"wind": table})
+        scenario: Scenario = replace(made.scenario, wind=wind, spec=spec)
+        smooth_setup = replace(make_setup(scenario, load_uav(scenario), made.mission, seed=1), nav="perfect")
+        one, other = (fly_to_end(Flight(replace(smooth_setup, fdm_hz=hz), uav.aircraft)) for hz in STEP_RATES)
+        rows = min(len(one.track), len(other.track))
+        # The flights may differ by one tick in length.
+        if one.ended == other.ended and abs(len(one.track) - len(other.track)) <= 1 and rows:
+            apart = np.linalg.norm(one.track.position[:rows] - other.track.position[:rows], axis=1)
+            distances.append(float(apart.max()))
+        else:
+            distances.append(float("inf"))
+    calm, windy = distances
     return StepRates(made.name, (judged[0].flyable, judged[1].flyable), failed[0] == failed[1], calm, windy)
 
 
@@ -66,27 +82,6 @@ def _energy(made: FieldMission) -> float:
     """Return the battery energy of a mission's flight, Wh."""
     uav = load_uav(made.scenario)
     return float(fly_to_end(Flight(make_setup(made.scenario, uav, made.mission, 1), uav.aircraft)).track.energy[-1])
-
-
-def _max_distance(made: FieldMission, uav: Uav, wind_speed: float) -> float:
-    """Return the largest distance between a mission's flights at both step rates at the same time, m.
-
-    The flights have no gusts and exact navigation. The distance is infinite if the flights ended differently, or differ
-    in length by more than one tick.
-
-    wind_speed: m/s.
-    """
-    old = made.scenario.wind
-    wind = Wind(wind_speed, old.from_course, old.gradient if wind_speed else 0.0, "none", None, old.reference_amsl)
-    table = made.scenario.spec.wind.model_copy(update={"speed_mps": wind_speed, "turbulence": "none"})
-    scenario: Scenario = replace(made.scenario, wind=wind, spec=made.scenario.spec.model_copy(update={"wind": table}))
-    setup = replace(make_setup(scenario, load_uav(scenario), made.mission, seed=1), nav="perfect")
-    one, other = (fly_to_end(Flight(replace(setup, fdm_hz=hz), uav.aircraft)) for hz in STEP_RATES)
-    rows = min(len(one.track), len(other.track))
-    # The flights may differ by one tick in length.
-    if one.ended != other.ended or abs(len(one.track) - len(other.track)) > 1 or not rows:
-        return float("inf")
-    return float(np.linalg.norm(one.track.position[:rows] - other.track.position[:rows], axis=1).max())
 
 
 def compare_all(seeds: range, aircraft: str = "aerosonde", *, loud: bool = False) -> dict[str, float]:

@@ -134,7 +134,10 @@ def theirs(
 
     seeds: vectors (n, d) in its first population.
     """
+    from pymoo.algorithms.moo.moead import MOEAD
+    from pymoo.algorithms.moo.nsga2 import NSGA2
     from pymoo.core.problem import Problem as PymooProblem
+    from pymoo.util.ref_dirs import get_reference_directions
 
     task = contest.task
     # Seeds are not bound to the intervals of the encoding.
@@ -162,7 +165,12 @@ def theirs(
                 out["G"] = violations
 
     problem = Paths(n_var=low.size, n_obj=4, n_ieq_constr=0 if penalised else 5, xl=low, xu=high)
-    engine = _engine(algorithm, seeds, low, high, seed)
+    first_vectors = np.random.default_rng(seed).uniform(low, high, (POPULATION, low.size))
+    first_vectors[: min(POPULATION, len(seeds))] = seeds[:POPULATION]
+    engine: Any = NSGA2(pop_size=POPULATION, sampling=first_vectors)
+    if algorithm == "MOEA/D":
+        towards = get_reference_directions("uniform", 4, n_partitions=PARTITIONS)
+        engine = MOEAD(towards, n_neighbors=NEIGHBOUR_COUNT, sampling=first_vectors)
     began = time.process_time()
     engine.setup(problem, termination=("n_eval", 10**9), seed=seed, verbose=False)
     while (evaluations is None or spent < evaluations) and (seconds is None or time.process_time() - began < seconds):
@@ -182,20 +190,6 @@ def theirs(
     order = covering_order(path_objectives[covering], contest.reference, 5 * COUNT)
     chosen = contest.certified(np.asarray(paths[np.array(covering)[order]]))
     return Row(contest.share(chosen), len(chosen), spent, took)
-
-
-def _engine(algorithm: str, seeds: Floats, low: Floats, high: Floats, seed: int) -> Any:
-    """Make one of pymoo's algorithms, ready for its setup."""
-    from pymoo.algorithms.moo.moead import MOEAD
-    from pymoo.algorithms.moo.nsga2 import NSGA2
-    from pymoo.util.ref_dirs import get_reference_directions
-
-    first = np.random.default_rng(seed).uniform(low, high, (POPULATION, low.size))
-    first[: min(POPULATION, len(seeds))] = seeds[:POPULATION]
-    if algorithm == "MOEA/D":
-        towards = get_reference_directions("uniform", 4, n_partitions=PARTITIONS)
-        return MOEAD(towards, n_neighbors=NEIGHBOUR_COUNT, sampling=first)
-    return NSGA2(pop_size=POPULATION, sampling=first)
 
 
 def measure(name: str, seeds: range, *, whole: bool, alone: bool = True) -> dict[str, Any]:

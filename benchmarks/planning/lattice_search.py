@@ -33,7 +33,7 @@ MAX_LAYERS = 4
 # Steps on the map: to the eight neighbours, and knight's moves.
 STEPS = np.array([(i, j) for i in range(-2, 3) for j in range(-2, 3) if math.gcd(i, j) == 1])
 # Number of routes that are tightened.
-WAYS = 40
+ROUTE_COUNT = 40
 # Largest length of a route relative to the best on the lattice.
 LONGER = 1.3
 # Scale of the first move in each round of tightening a route.
@@ -202,7 +202,7 @@ def _gentlest(data: ProblemArrays) -> tuple[float, float]:
     return climb, dive
 
 
-def lattice_routes(task: Task, most: int = WAYS) -> list[Floats]:
+def lattice_routes(task: Task, most: int = ROUTE_COUNT) -> list[Floats]:
     """Return routes (n, 3), m, that pass the missiles on different sides, shortest first.
 
     Each route joins the shortest route from the start to some place and the shortest route from there to the

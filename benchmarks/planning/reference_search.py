@@ -11,6 +11,7 @@ shortest are polished by SciPy's SLSQP (`benchmarks.planning.smooth_search`), wh
 
 import math
 from dataclasses import replace
+from itertools import permutations
 
 import numpy as np
 
@@ -68,11 +69,19 @@ def _best_of_routes(task: Task, routes: list[Floats], kill_distance: float) -> t
     pool = [found for route in routes if (found := _screened(task, route, kill_distance)) is not None]
     for _ in range(ROUNDS):
         pool = _distinct(pool)[:POOL]
-        joined = [
-            found
-            for route in _joined([path for _, path in pool])
-            if (found := _screened(task, route, kill_distance)) is not None
-        ]
+        # Paths that follow one path to a place near another path, and the other path from there on.
+        joined = []
+        for one, other in permutations([path for _, path in pool], 2):
+            a, b = resample(one, 100), resample(other, 100)
+            gaps = np.sqrt(((a[:, None] - b[None]) ** 2).sum(axis=2))
+            near = gaps.min(axis=1) < NEAR
+            # Once for each stretch along which they are near each other, but not before the first or after the last
+            # one.
+            stretches = np.split(np.arange(100), np.flatnonzero(np.diff(near)) + 1)
+            for at in [int(run.mean()) for run in stretches if near[run[0]]][1:-1]:
+                route = np.concatenate([a[: at + 1], b[int(gaps[at].argmin()) + 1 :]])
+                if (found := _screened(task, route, kill_distance)) is not None:
+                    joined.append(found)
         if not joined or min(joined, key=lambda item: item[0])[0] >= pool[0][0]:
             break
         pool += joined
@@ -119,23 +128,4 @@ def _distinct(pool: list[tuple[float, Floats]]) -> list[tuple[float, Floats]]:
     for ratio, path in sorted(pool, key=lambda item: item[0]):
         if not out or ratio > (1.0 + APART) * out[-1][0]:
             out.append((ratio, path))
-    return out
-
-
-def _joined(paths: list[Floats]) -> list[Floats]:
-    """Return paths that follow one path to a place near another path, and the other path from there on."""
-    out = []
-    for one in paths:
-        for other in paths:
-            if one is other:
-                continue
-            a, b = resample(one, 100), resample(other, 100)
-            gaps = np.sqrt(((a[:, None] - b[None]) ** 2).sum(axis=2))
-            near = gaps.min(axis=1) < NEAR
-            # Once for each stretch along which they are near each other, but not before the first or after the last
-            # one.
-            middles = [
-                int(run.mean()) for run in np.split(np.arange(100), np.flatnonzero(np.diff(near)) + 1) if near[run[0]]
-            ]
-            out += [np.concatenate([a[: at + 1], b[int(gaps[at].argmin()) + 1 :]]) for at in middles[1:-1]]
     return out

@@ -49,8 +49,17 @@ def wild_scenario(number: int, autopilot: str) -> Scenario:
         },
         "planner": {"waypoints": int(rng.choice([12, 16, 20]))},
         "flight": {"aircraft": "aerosonde", "autopilot": autopilot},
-        "threats": _threats(rng, np.column_stack([ends, heights]), peaks, radii, half),
+        "threats": [],
     }
+    # Units at random places on the ground whose missiles reach neither end.
+    threats = spec["threats"]
+    while len(threats) < len(radii):
+        spot, radius = rng.uniform(-half, half, 2), float(radii[len(threats)])
+        place = np.append(spot, _ground(peaks, spot[None])[0])
+        if np.linalg.norm(np.column_stack([ends, heights]) - place, axis=1).min() >= radius + AWAY:
+            reach = {"kill_radius_m": radius, "kill_scale_m": radius / 2.0}
+            position = {"east_m": float(spot[0]), "north_m": float(spot[1])}
+            threats.append({"name": f"unit {len(threats) + 1}", **position, **reach})
     for name, end, height in zip(("start", "destination"), ends, heights, strict=True):
         spec[name] = {"east_m": float(end[0]), "north_m": float(end[1]), "amsl_m": float(height)}
     return scenario_from_spec(spec, spec["name"])
@@ -62,16 +71,3 @@ def _ground(peaks: Floats, places: Floats) -> Floats:
     for east, north, height, sigma in peaks:
         total += height * np.exp(-((places[:, 0] - east) ** 2 + (places[:, 1] - north) ** 2) / (2.0 * sigma**2))
     return total
-
-
-def _threats(rng: np.random.Generator, ends: Floats, peaks: Floats, radii: Floats, half: float) -> list[dict[str, Any]]:
-    """Draw units at random places on the ground whose missiles reach neither end."""
-    made: list[dict[str, Any]] = []
-    while len(made) < len(radii):
-        spot, radius = rng.uniform(-half, half, 2), float(radii[len(made)])
-        place = np.append(spot, _ground(peaks, spot[None])[0])
-        if np.linalg.norm(ends - place, axis=1).min() < radius + AWAY:
-            continue
-        reach = {"kill_radius_m": radius, "kill_scale_m": radius / 2.0}
-        made.append({"name": f"unit {len(made) + 1}", "east_m": float(spot[0]), "north_m": float(spot[1]), **reach})
-    return made

@@ -56,7 +56,7 @@ def shortest_on_map(scenario: Scenario) -> Floats:
     y = np.arange(start[1] - PITCH * math.floor((start[1] - south) / PITCH), north, PITCH)
     grid = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1)
     free = is_open(scenario, grid.reshape(-1, 2)).reshape(grid.shape[:2])
-    number = np.arange(free.size).reshape(free.shape)
+    number, (rows, columns) = np.arange(free.size).reshape(free.shape), free.shape
     begins, ends, lengths = [], [], []
     for i in range(-REACH, REACH + 1):
         for j in range(-REACH, REACH + 1):
@@ -64,9 +64,15 @@ def shortest_on_map(scenario: Scenario) -> Floats:
                 continue
             passes = np.ones_like(free)
             for share in np.linspace(0.0, 1.0, 2 * max(abs(i), abs(j)) + 1):
-                passes &= _shifted(free, round(share * i), round(share * j))
+                # The grid of open places, shifted; False beyond the map.
+                up, right = round(share * i), round(share * j)
+                a, b = slice(max(0, -up), min(rows, rows - up)), slice(max(0, -right), min(columns, columns - right))
+                c, d = slice(max(0, up), min(rows, rows + up)), slice(max(0, right), min(columns, columns + right))
+                shifted = np.zeros_like(free)
+                shifted[a, b] = free[c, d]
+                passes &= shifted
             begins.append(number[passes])
-            ends.append((number + i * number.shape[1] + j)[passes])
+            ends.append((number + i * columns + j)[passes])
             lengths.append(np.full(len(begins[-1]), PITCH * math.hypot(i, j)))
     table = np.concatenate(lengths), (np.concatenate(begins), np.concatenate(ends))
     first, last = (int(np.argmin(((grid - end) ** 2).sum(axis=2))) for end in (start, destination))
@@ -91,16 +97,6 @@ def shortest_on_map(scenario: Scenario) -> Floats:
             kept.append(dense[here])
         points = np.array(kept)
     return points
-
-
-def _shifted(free: Flags, i: int, j: int) -> Flags:
-    """Return the grid of flags shifted by i rows and j columns; False beyond the map."""
-    out = np.zeros_like(free)
-    rows, columns = free.shape
-    a, b = slice(max(0, -i), min(rows, rows - i)), slice(max(0, -j), min(columns, columns - j))
-    c, d = slice(max(0, i), min(rows, rows + i)), slice(max(0, j), min(columns, columns + j))
-    out[a, b] = free[c, d]
-    return out
 
 
 def map_length(points: Floats) -> float:

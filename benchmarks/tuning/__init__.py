@@ -1,1 +1,1 @@
-"""Settings of guidance laws, looked for by flights."""
+"""Settings of guidance laws, found by flights."""

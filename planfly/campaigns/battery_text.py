@@ -33,7 +33,21 @@ def answer_line(result: BatteryResult) -> str:
             f" energy to carry its own mass (the aircraft would weigh {result.mass * result.mass_factor:.3g} kg)"
         )
     if math.isnan(result.capacity):
-        return f"not judged: {_unknown_reason(result)}"
+        count, completed = len(result.rows), len(result.completed)
+        endings = [row.ended for row in result.rows if row.ended != "completed"]
+        if unknown_count := completed - len(result.known):
+            reason = (
+                f"in {unknown_count} of {count} flights a return leaves the known terrain, so its energy is unknown"
+            )
+        elif not endings:
+            reason = "the aircraft's model states no power, so the energy is unknown"
+        else:
+            most_frequent = max(set(endings), key=endings.count)
+            reason = (
+                f"{count - completed} of {count} flights do not complete the mission; most frequent reason:"
+                f" {most_frequent}"
+            )
+        return f"not judged: {reason}"
     low, high = result.interval
     confidence_text = f"at {goal.confidence:.0%} confidence"
     interval_text = f"{low:.0f} to {high:.0f} Wh {confidence_text}"
@@ -45,18 +59,6 @@ def answer_line(result: BatteryResult) -> str:
     return f"a battery of {result.capacity:.0f} Wh ({interval_text}{volts_text}) keeps {keeps_text}"
 
 
-def _unknown_reason(result: BatteryResult) -> str:
-    """Return the reason why the smallest battery is unknown."""
-    count, completed = len(result.rows), len(result.completed)
-    endings = [row.ended for row in result.rows if row.ended != "completed"]
-    if unknown_count := len(result.completed) - len(result.known):
-        return f"in {unknown_count} of {count} flights a return leaves the known terrain, so its energy is unknown"
-    if not endings:
-        return "the aircraft's model states no power, so the energy is unknown"
-    most_frequent = max(set(endings), key=endings.count)
-    return f"{count - completed} of {count} flights do not complete the mission; most frequent reason: {most_frequent}"
-
-
 def battery_lines(result: BatteryResult) -> list[str]:
     """Return the lines below the answer: own battery, what decides the capacity, energies and method.
 
@@ -64,7 +66,36 @@ def battery_lines(result: BatteryResult) -> list[str]:
     """
     if not result.completed:
         return []
-    lines, total = [_own_battery_line(result), *_mass_lines(result)], len(result.completed)
+    goal, total = result.goal, len(result.completed)
+    if result.is_guessed:
+        line = "the aircraft's battery is unknown, so it is not compared; state battery_wh in the scenario"
+    elif math.isnan(result.capacity):
+        line = (
+            f"the aircraft's battery of {result.own_capacity:.0f} Wh is not judged, because the needed one is unknown"
+        )
+    else:
+        unknown_text = (
+            "may be enough (more flights would decide)" if result.has_returns else "may not cover the returns"
+        )
+        verdict = {True: "is enough", False: "is too small", None: unknown_text}
+        low, high = result.own_probability
+        line = (
+            f"the aircraft's battery of {result.own_capacity:.0f} Wh {verdict[result.is_enough]}: it keeps the reserve"
+            f" in {result.kept} of {len(result.rows)} flights (probability {low:.2f} to {high:.2f} at 95 % confidence)"
+        )
+    lines = [line]
+    if goal.specific_energy is None:
+        lines.append(
+            "every capacity is assumed to have the same mass; for a mass that grows with the capacity, add"
+            " --specific-energy"
+        )
+    elif math.isfinite(result.capacity):
+        has_min_mass = result.mass_factor == MIN_MASS_FACTOR
+        limit_text = f"; the flights assume at least {MIN_MASS_FACTOR:g} times the present mass" if has_min_mass else ""
+        lines.append(
+            f"at {goal.specific_energy:g} Wh/kg the aircraft weighs {result.mass * result.mass_factor:.2f} kg with this"
+            f" battery, instead of {result.mass:.2f} kg{limit_text}"
+        )
     if math.isfinite(result.capacity):
         lines += [
             f"in {flights} of {total} flights {part} decides the capacity"
@@ -87,7 +118,7 @@ def battery_lines(result: BatteryResult) -> list[str]:
             " (`planfly returns` shows them)"
         )
     lines.append(
-        f"{total} of {len(result.rows)} flights complete the mission. A return starts every {result.goal.interval:g} s"
+        f"{total} of {len(result.rows)} flights complete the mission. A return starts every {goal.interval:g} s"
         " and is simulated up to its loiter; the reserve has to cover loiter and landing"
     )
     return [*lines, *return_law_lines(result.base.nominal_setup())]
@@ -129,44 +160,4 @@ def leg_rows(result: BatteryResult) -> list[tuple[str, str, str]]:
     return [
         (name, f"{energy:.1f} Wh", f"{energy / total:.0%}" if total > 0.0 else "")
         for name, energy in zip(leg_names(result), energies, strict=False)
-    ]
-
-
-def _own_battery_line(result: BatteryResult) -> str:
-    """Return a line on the aircraft's own battery: it is enough, too small, uncertain or not judged."""
-    if result.is_guessed:
-        return "the aircraft's battery is unknown, so it is not compared; state battery_wh in the scenario"
-    if math.isnan(result.capacity):
-        return (
-            f"the aircraft's battery of {result.own_capacity:.0f} Wh is not judged, because the needed one is unknown"
-        )
-    unknown_text = "may be enough (more flights would decide)" if result.has_returns else "may not cover the returns"
-    verdict = {True: "is enough", False: "is too small", None: unknown_text}
-    low, high = result.own_probability
-    return (
-        f"the aircraft's battery of {result.own_capacity:.0f} Wh {verdict[result.is_enough]}: it keeps the reserve in"
-        f" {result.kept} of {len(result.rows)} flights (probability {low:.2f} to {high:.2f} at 95 % confidence)"
-    )
-
-
-def _mass_lines(result: BatteryResult) -> list[str]:
-    """Return a line on the mass of the aircraft with the found battery; [] if no battery was found.
-
-    If the goal states no energy per mass, the line says that all capacities have the same mass.
-    """
-    if result.goal.specific_energy is None:
-        return [
-            "every capacity is assumed to have the same mass; for a mass that grows with the capacity, add"
-            " --specific-energy"
-        ]
-    if not math.isfinite(result.capacity):
-        return []
-    limit_text = (
-        f"; the flights assume at least {MIN_MASS_FACTOR:g} times the present mass"
-        if result.mass_factor == MIN_MASS_FACTOR
-        else ""
-    )
-    return [
-        f"at {result.goal.specific_energy:g} Wh/kg the aircraft weighs {result.mass * result.mass_factor:.2f} kg with"
-        f" this battery, instead of {result.mass:.2f} kg{limit_text}"
     ]

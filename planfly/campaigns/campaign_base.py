@@ -314,8 +314,20 @@ def vary_flight(base: CampaignBase, draw: Draw, wind: GivenWind | None = None) -
 
     wind: mean wind that the draw varies; None for the wind of the scenario.
     """
-    values = draw.values
-    scenario, mission, placed = _with_drawn_wind(base.scenario, values, wind), base.mission, base.placed
+    # The gusts of the drawn wind have no seed of their own.
+    values, old_wind = draw.values, base.scenario.wind
+    nominal = wind or GivenWind(old_wind.speed, math.degrees(old_wind.from_course))
+    speed = min(MAX_WIND_MPS, max(0.0, nominal.speed + values["wind_speed"]))
+    from_deg = (nominal.from_deg + values["wind_from"]) % 360.0
+    gradient = min(MAX_WIND_GRADIENT, max(-MAX_WIND_GRADIENT, old_wind.gradient + values["wind_gradient"]))
+    level = TURBULENCE_LEVELS.index(old_wind.turbulence) + round(values["turbulence"])
+    turbulence = TURBULENCE_LEVELS[min(len(TURBULENCE_LEVELS) - 1, max(0, level))]
+    drawn_wind = shift_wind(old_wind, speed, math.radians(from_deg), gradient)
+    drawn_wind = replace(drawn_wind, turbulence=turbulence, seed=None)
+    changes = {"speed_mps": speed, "from_deg": from_deg, "gradient": drawn_wind.gradient}
+    wind_table = base.scenario.spec.wind.model_copy(update=changes | {"turbulence": turbulence, "seed": None})
+    spec = base.scenario.spec.model_copy(update={"wind": wind_table})
+    scenario, mission, placed = replace(base.scenario, spec=spec, wind=drawn_wind), base.mission, base.placed
     map_terrain, plan = scenario.terrain, base.plan
     if map_terrain is not None:
         strip_error = _draw_strip_error(scenario.landing, draw.seed)
@@ -352,26 +364,6 @@ def vary_flight(base: CampaignBase, draw: Draw, wind: GivenWind | None = None) -
     )
     start_offset = (values["start_east"], values["start_north"], values["start_up"])
     return VariedFlight(setup, uav, OffNominal(variation, start_offset))
-
-
-def _with_drawn_wind(scenario: Scenario, values: dict[str, float], mean_wind: GivenWind | None) -> Scenario:
-    """Return the scenario in the drawn wind, without a seed of its own for the gusts.
-
-    values: drawn values, keyed by quantity.
-    mean_wind: mean wind that the draw varies; None for the wind of the scenario.
-    """
-    old_wind = scenario.wind
-    nominal = mean_wind or GivenWind(old_wind.speed, math.degrees(old_wind.from_course))
-    speed = min(MAX_WIND_MPS, max(0.0, nominal.speed + values["wind_speed"]))
-    from_deg = (nominal.from_deg + values["wind_from"]) % 360.0
-    gradient = min(MAX_WIND_GRADIENT, max(-MAX_WIND_GRADIENT, old_wind.gradient + values["wind_gradient"]))
-    wind = shift_wind(old_wind, speed, math.radians(from_deg), gradient)
-    level = TURBULENCE_LEVELS.index(old_wind.turbulence) + round(values["turbulence"])
-    turbulence = TURBULENCE_LEVELS[min(len(TURBULENCE_LEVELS) - 1, max(0, level))]
-    changes = {"speed_mps": speed, "from_deg": from_deg, "gradient": wind.gradient}
-    wind_table = scenario.spec.wind.model_copy(update=changes | {"turbulence": turbulence, "seed": None})
-    wind = replace(wind, turbulence=turbulence, seed=None)
-    return replace(scenario, spec=scenario.spec.model_copy(update={"wind": wind_table}), wind=wind)
 
 
 def _draw_strip_error(strip: LandingStrip | None, seed: int) -> float | None:

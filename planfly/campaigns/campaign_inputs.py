@@ -61,16 +61,13 @@ def difference_texts(stored: Mapping[str, Any], current: Mapping[str, Any]) -> l
         and math.isclose(stored[name], current[name], rel_tol=1e-12)
     }
     names = [name for name in names if name not in rounded_names] or names
-    return [_difference_text(name, stored.get(name), current.get(name)) for name in names]
-
-
-def _difference_text(name: str, stored: Any, current: Any) -> str:
-    """Describe one input that differs; only its name if the values are hashes.
-
-    stored, current: values of the input; None if it is not stated.
-    """
-    if str(stored if current is None else current).startswith(_HASH_PREFIX):
-        return name
-    if current is None:
-        return f"{name} not stated instead of {stored}"
-    return f"{name} {current} (not stated before)" if stored is None else f"{name} {current} instead of {stored}"
+    texts = []
+    for name in names:
+        old, new = stored.get(name), current.get(name)
+        if str(old if new is None else new).startswith(_HASH_PREFIX):
+            texts.append(name)
+        elif new is None:
+            texts.append(f"{name} not stated instead of {old}")
+        else:
+            texts.append(f"{name} {new} " + ("(not stated before)" if old is None else f"instead of {old}"))
+    return texts

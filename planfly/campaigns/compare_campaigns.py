@@ -106,7 +106,10 @@ def compare_tables(first: Path, second: Path) -> CampaignComparison:
     for path, table in zip((first, second), tables, strict=True):
         if not len(table["flight"]):
             raise StoreError(f"{path}: no flight of this campaign was flown", file=path)
-    pairs = _paired_rows(*tables)
+    # Flights that both campaigns have are paired, unless the draws of any of them differ.
+    _, *pairs = np.intersect1d(tables[0]["flight"], tables[1]["flight"], return_indices=True)
+    if not all(np.array_equal(tables[0][name][pairs[0]], tables[1][name][pairs[1]]) for name in ("seed", *NAMES)):
+        pairs = [np.empty(0, dtype=np.intp)] * 2
     flyable = np.column_stack([table["outcome"][rows] == "flyable" for table, rows in zip(tables, pairs, strict=True)])
     compared_rows = pairs if len(flyable) else [np.arange(len(table["flight"])) for table in tables]
     sources = zip((first, second), tables, compared_rows, settings, strict=True)
@@ -119,6 +122,20 @@ def compare_tables(first: Path, second: Path) -> CampaignComparison:
         if len(flyable)
         else independent_difference(counts[0], counts[1], DEFAULT_CONFIDENCE)
     )
+    # Remarks on the compared flights, and on assumptions of the interval that do not hold.
+    notes, pair_count = list[str](), len(flyable)
+    if pair_count and pair_count < max(len(table["flight"]) for table in tables):
+        notes.append(
+            f"the difference and the counts by rule compare only the {count_text(pair_count, 'flight')} that both"
+            " campaigns have"
+        )
+    if undecided_count := sum(table["outcome"].tolist().count("undecided") for table in tables):
+        notes.append(f"the difference counts {count_text(undecided_count, 'flight')} not judged in full as not flyable")
+    if any(setting.get("stops") or setting.get("changed") for setting in settings):
+        notes.append(
+            "the number of flights of a campaign was not fixed beforehand, so the interval of the difference is only"
+            " approximate"
+        )
     inputs = (setting.get("inputs", {}) for setting in settings)
     return CampaignComparison(
         campaigns[0],
@@ -128,7 +145,7 @@ def compare_tables(first: Path, second: Path) -> CampaignComparison:
         only_first,
         only_second,
         tuple(difference_texts(*inputs)),
-        (*_notes(tables, settings, len(flyable)), *_disagreement_notes(difference, is_paired=bool(len(flyable)))),
+        (*notes, *_disagreement_notes(difference, is_paired=bool(len(flyable)))),
     )
 
 
@@ -155,43 +172,6 @@ def _count_outcomes(
     ]
     failed_by_rule = {name: count for name in RULE_WORDS if (count := sum(name in rules for rules in failed_rules))}
     return ComparedCampaign(str(path.parent), tally, Estimator(goal).estimate(tally).interval, failed_by_rule)
-
-
-def _paired_rows(first: Mapping[str, NDArray[Any]], second: Mapping[str, NDArray[Any]]) -> list[NDArray[np.intp]]:
-    """Return the rows of the flights that both campaigns have, (n,) for each campaign.
-
-    n is 0 if the draws of any of these flights differ, because the flights are then not paired.
-
-    first, second: columns of the tables of both campaigns, by name.
-    """
-    _, first_rows, second_rows = np.intersect1d(first["flight"], second["flight"], return_indices=True)
-    for name in ("seed", *NAMES):
-        if not np.array_equal(first[name][first_rows], second[name][second_rows]):
-            return [np.empty(0, dtype=np.intp)] * 2
-    return [first_rows, second_rows]
-
-
-def _notes(tables: list[dict[str, NDArray[Any]]], settings: list[dict[str, Any]], pairs: int) -> list[str]:
-    """Return remarks on the compared flights, and on assumptions of the interval that do not hold.
-
-    tables, settings: table of flights and stored settings of both campaigns.
-    pairs: number of flights with the same draws in both campaigns.
-    """
-    notes = []
-    counts = [len(table["flight"]) for table in tables]
-    if pairs and pairs < max(counts):
-        notes.append(
-            f"the difference and the counts by rule compare only the {count_text(pairs, 'flight')} that both campaigns"
-            " have"
-        )
-    if undecided_count := sum(table["outcome"].tolist().count("undecided") for table in tables):
-        notes.append(f"the difference counts {count_text(undecided_count, 'flight')} not judged in full as not flyable")
-    if any(setting.get("stops") or setting.get("changed") for setting in settings):
-        notes.append(
-            "the number of flights of a campaign was not fixed beforehand, so the interval of the difference is only"
-            " approximate"
-        )
-    return notes
 
 
 def _disagreement_notes(difference: ProportionDifference, *, is_paired: bool) -> list[str]:
@@ -242,23 +222,14 @@ def comparison_lines(comparison: CampaignComparison) -> list[str]:
         else f"  paired  no: the draws of the campaigns differ (Fisher's exact test: p = {p_value:.2g}). Campaigns with"
         " the same --seed and --spread are compared in pairs, which shows smaller differences"
     )
-    lines += [
-        f"  fails   {RULE_WORDS[rule].title} {_change_text(first, second, comparison)}"
-        for rule, first, second in comparison.rules
-    ]
+    # Change of the percentage of flights that failed each rule.
+    first_count, second_count = comparison.compared_counts
+    for rule, first, second in comparison.rules:
+        change = 100.0 * (second / second_count - first / first_count)
+        word = "more often" if change > 0.0 else "less often" if change < 0.0 else "as often"
+        lines.append(
+            f"  fails   {RULE_WORDS[rule].title} {word} in the second campaign: {second} of {second_count} flights, and"
+            f" {first} of {first_count} in the first ({change:+.1f} percentage points)"
+        )
     lines += [f"  differs {text}" for text in comparison.inputs] or ["  differs no input; planfly's code may differ"]
     return [*lines, *(f"  note    {note}" for note in comparison.notes)]
-
-
-def _change_text(first: int, second: int, comparison: CampaignComparison) -> str:
-    """Describe how the percentage of flights that failed a rule changes from the first campaign to the second.
-
-    first, second: number of compared flights of each campaign that failed the rule.
-    """
-    first_count, second_count = comparison.compared_counts
-    change = 100.0 * (second / second_count - first / first_count)
-    word = "more often" if change > 0.0 else "less often" if change < 0.0 else "as often"
-    return (
-        f"{word} in the second campaign: {second} of {second_count} flights, and {first} of {first_count} in the first"
-        f" ({change:+.1f} percentage points)"
-    )

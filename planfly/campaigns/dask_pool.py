@@ -89,11 +89,6 @@ class DaskPool:
         with contextlib.suppress(OSError):
             self._client.unregister_worker_plugin(self._name)
 
-    def _max_parallel_flights(self) -> int:
-        """Return the number of flights that the workers can fly at the same time, at least 1."""
-        threads: dict[str, int] = self._client.nthreads()
-        return max(1, sum(threads.values()))
-
     def fly(self, next_request: Callable[[], FlightRequest | None]) -> Iterator[FinishedFlight]:
         """Fly the requests that `next_request` returns, and yield each flight when it is done, in any order.
 
@@ -115,10 +110,9 @@ class DaskPool:
 
         def send_requests() -> None:
             """Submit requests until all workers are busy or there is no further request."""
-            while (
-                len(flying) < min(_TASK_NAME_COUNT, self._max_parallel_flights())
-                and (request := next_request()) is not None
-            ):
+            while len(flying) < min(_TASK_NAME_COUNT, max(1, sum(self._client.nthreads().values()))):
+                if (request := next_request()) is None:
+                    break
                 send(request)
 
         try:

@@ -256,19 +256,41 @@ def _parse_quantity(quantity: Quantity, quantity_table: Any, name: str) -> Varyi
 
     Raises SpreadError for an invalid table.
     """
+    from scipy import stats
+
     if not isinstance(quantity_table, dict):
         allowed = "expected a table, with distribution, its parameters, and source"
         raise SpreadError.at(name, quantity.name, quantity_table, allowed, shown="")
     parameters = dict(quantity_table)
     distribution = parameters.pop("distribution", None)
     source = parameters.pop("source", None)
-    _check_distribution(quantity, distribution, name)
+    if not isinstance(distribution, str):
+        allowed = "missing; expected the name of one of scipy.stats' distributions"
+        raise SpreadError.at(name, f"{quantity.name}.distribution", distribution, allowed, shown="")
+    # A quantity of whole numbers needs a discrete distribution.
+    scipy_distribution: Any = getattr(stats, distribution, None)
+    if not isinstance(scipy_distribution, stats.rv_discrete if quantity.integer else stats.rv_continuous):
+        kind_text = "a discrete" if quantity.integer else "a continuous"
+        example = "randint" if quantity.integer else "norm"
+        allowed = f"expected {kind_text} distribution of scipy.stats, such as {example}"
+        raise SpreadError.at(name, f"{quantity.name}.distribution", distribution, allowed, shown=repr(distribution))
     if not isinstance(source, str) or not source.strip():
         allowed = "missing; state the source of the numbers"
         raise SpreadError.at(name, f"{quantity.name}.source", source, allowed, shown="")
-    _check_parameters(str(distribution), parameters, name, quantity.name)
+    shape_names = scipy_distribution.shapes.replace(",", " ").split() if scipy_distribution.shapes else []
+    parameter_names = [*shape_names, "loc", *(() if quantity.integer else ("scale",))]
+    for key, value in parameters.items():
+        if key not in parameter_names:
+            allowed = f"not a parameter of {distribution}, which has {', '.join(parameter_names)}"
+            raise SpreadError.at(name, f"{quantity.name}.{key}", value, allowed, shown="")
+        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+            raise SpreadError.at(name, f"{quantity.name}.{key}", value, "expected a finite number", shown=repr(value))
+    missing_names = [key for key in shape_names if key not in parameters]
+    if missing_names:
+        allowed = f"missing; {distribution} needs {', '.join(shape_names)}"
+        raise SpreadError.at(name, f"{quantity.name}.{missing_names[0]}", None, allowed, shown="")
     varying = VaryingQuantity(
-        quantity, str(distribution), tuple((key, float(value)) for key, value in parameters.items()), source
+        quantity, distribution, tuple((key, float(value)) for key, value in parameters.items()), source
     )
     fraction = varying.fraction_inside
     if math.isnan(fraction):
@@ -282,54 +304,6 @@ def _parse_quantity(quantity: Quantity, quantity_table: Any, name: str) -> Varyi
         )
         raise SpreadError.at(name, quantity.name, _call_text(varying), allowed)
     return varying
-
-
-def _check_distribution(quantity: Quantity, distribution: Any, name: str) -> None:
-    """Raise SpreadError unless a quantity's distribution is the name of one in scipy.stats.
-
-    A quantity of whole numbers needs a discrete distribution.
-
-    distribution: the value in the user's file.
-    name: name of that file, for messages.
-    """
-    from scipy import stats
-
-    kind = stats.rv_discrete if quantity.integer else stats.rv_continuous
-    field = f"{quantity.name}.distribution"
-    if not isinstance(distribution, str):
-        allowed = "missing; expected the name of one of scipy.stats' distributions"
-        raise SpreadError.at(name, field, distribution, allowed, shown="")
-    if not isinstance(getattr(stats, distribution, None), kind):
-        kind_text = "a discrete" if quantity.integer else "a continuous"
-        example = "randint" if quantity.integer else "norm"
-        allowed = f"expected {kind_text} distribution of scipy.stats, such as {example}"
-        raise SpreadError.at(name, field, distribution, allowed, shown=repr(distribution))
-
-
-def _check_parameters(distribution: str, entries: dict[str, Any], name: str, quantity: str) -> None:
-    """Raise SpreadError for an unknown, non-finite or missing parameter of a distribution.
-
-    name: name of the file in messages.
-    """
-    from scipy import stats
-
-    scipy_distribution: Any = getattr(stats, distribution)
-    shape_parameters = scipy_distribution.shapes.replace(",", " ").split() if scipy_distribution.shapes else []
-    allowed = (
-        [*shape_parameters, "loc"]
-        if isinstance(scipy_distribution, stats.rv_discrete)
-        else [*shape_parameters, "loc", "scale"]
-    )
-    for key, value in entries.items():
-        if key not in allowed:
-            reason = f"not a parameter of {distribution}, which has {', '.join(allowed)}"
-            raise SpreadError.at(name, f"{quantity}.{key}", value, reason, shown="")
-        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-            raise SpreadError.at(name, f"{quantity}.{key}", value, "expected a finite number", shown=repr(value))
-    missing = [key for key in shape_parameters if key not in entries]
-    if missing:
-        reason_missing = f"missing; {distribution} needs {', '.join(shape_parameters)}"
-        raise SpreadError.at(name, f"{quantity}.{missing[0]}", None, reason_missing, shown="")
 
 
 def _call_text(varying: VaryingQuantity) -> str:

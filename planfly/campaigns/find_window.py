@@ -201,7 +201,21 @@ def find_window(base: CampaignBase, goal: WindowGoal, workers: Workers, advance:
 
     If the forecast is an ensemble, flight k flies in member k modulo the number of members.
     """
-    departures = [_open_departure(base, time) for time in goal.departures]
+    departures = []
+    for time in goal.departures:
+        try:
+            # The scenario once for each member of its forecast, with the wind of that member.
+            scenario = with_flight_time(base.scenario, time.isoformat())
+            forecast = forecast_of_scenario(scenario)
+            members = (
+                (scenario,)
+                if forecast.members == 1
+                else tuple(in_forecast_member(scenario, forecast, member) for member in range(forecast.members))
+            )
+            replace(base, scenario=members[0]).nominal_setup()
+            departures.append(Departure(time, members))
+        except ForecastError as error:
+            departures.append(Departure(time, not_judged=str(error)))
     scenarios = [departure.scenarios for departure in departures if departure.scenarios]
     total = len(scenarios) * goal.flights
     indices: Iterator[int] = iter(range(total))
@@ -247,23 +261,6 @@ def fly_departure(
     departure, flight = divmod(index, flights)
     members = scenarios[departure]
     return fly_one(replace(base, scenario=members[flight % len(members)]), flight, wind)
-
-
-def _open_departure(base: CampaignBase, time: datetime) -> Departure:
-    """Return a departure that is not yet flown; it has scenarios only if the forecast covers its flight."""
-    try:
-        # The scenario once for each member of its forecast, with the wind of that member.
-        scenario = with_flight_time(base.scenario, time.isoformat())
-        forecast = forecast_of_scenario(scenario)
-        scenarios = (
-            (scenario,)
-            if forecast.members == 1
-            else tuple(in_forecast_member(scenario, forecast, member) for member in range(forecast.members))
-        )
-        replace(base, scenario=scenarios[0]).nominal_setup()
-    except ForecastError as error:
-        return Departure(time, not_judged=str(error))
-    return Departure(time, scenarios)
 
 
 def last_departure(base: CampaignBase, first: datetime) -> datetime:

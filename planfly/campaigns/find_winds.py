@@ -344,7 +344,21 @@ class _Search:
 
     def next_round(self) -> list[RequestedFlight]:
         """Return the requests of the next round; empty if the search is complete or all flights are used."""
-        self.open_directions = [number for number in self.open_directions if self._is_open(number)]
+        remaining_directions = []
+        for number in self.open_directions:
+            direction = self.directions[number]
+            count = len(direction.speeds)
+            # The boundary takes long to compute, so it is computed only at some numbers of flights; between them the
+            # direction stays open.
+            is_open = count < self._next_check[number]
+            if not is_open:
+                self._next_check[number] = math.ceil(_CHECK_GROWTH_RATIO * count)
+                is_open = needs_more_flights(
+                    direction.boundary(), count, BOUNDARY_ACCURACY_MPS, MIN_FLIGHTS_PER_DIRECTION
+                )
+            if is_open:
+                remaining_directions.append(number)
+        self.open_directions = remaining_directions
         flights_each = max(
             _MIN_FLIGHTS_EACH, min(_MAX_FLIGHTS_EACH, _FLIGHTS_PER_ROUND // max(1, len(self.open_directions)))
         )
@@ -353,19 +367,6 @@ class _Search:
             for speed, draw in next_flights(self.directions[number], flights_each):
                 requests.append(RequestedFlight(len(self.flown) + len(requests), number, speed, draw))
         return requests[: max(0, self.goal.flights - len(self.flown))]
-
-    def _is_open(self, index: int) -> bool:
-        """Return True if a direction needs more flights.
-
-        The boundary takes long to compute, so it is computed only at some numbers of flights; between them the result
-        is True.
-        """
-        direction = self.directions[index]
-        count = len(direction.speeds)
-        if count < self._next_check[index]:
-            return True
-        self._next_check[index] = math.ceil(_CHECK_GROWTH_RATIO * count)
-        return needs_more_flights(direction.boundary(), count, BOUNDARY_ACCURACY_MPS, MIN_FLIGHTS_PER_DIRECTION)
 
     def add_result(self, request: RequestedFlight, flight: FlownFlight) -> None:
         """Add the result of a flight; flights must be added in the order in which they were requested."""
@@ -404,7 +405,24 @@ class _Search:
         """Return the result of the search so far: boundaries, flights and the failures of each direction."""
         boundaries = tuple(direction.boundary() for direction in self.directions)
         conditions = replace(self._base.conditions(), wind_mps=None, wind_from_deg=None)
-        calm_failures = self._calm_failures(boundaries)
+        # Failures in the weakest flown wind of the directions whose boundary is calm air.
+        calm_failures = None
+        calm_directions = {number for number, boundary in enumerate(boundaries) if boundary.estimate < CALM_MPS}
+        numbered_speeds = [
+            (number, speed)
+            for number, (direction, speed, _) in enumerate(self.flown)
+            if direction in calm_directions and speed <= NEARLY_CALM_MPS
+        ]
+        if numbered_speeds:
+            min_speed = min(speed for _, speed in numbered_speeds)
+            numbers = [number for number, speed in numbered_speeds if speed == min_speed]
+            undecided_numbers = {number for number, _ in self.undecided}
+            failed_findings = [
+                self._failed[number]
+                for number in numbers
+                if not self.flown[number][2] and number not in undecided_numbers
+            ]
+            calm_failures = CalmFailures(min_speed, len(numbers), len(failed_findings), count_failures(failed_findings))
         # Failures of each direction in winds up to the upper bound of its boundary. If no flight failed in such a
         # wind, they are those in the weakest wind in which a flight failed.
         failures_by_direction = []
@@ -440,29 +458,6 @@ class _Search:
         failed = [row.failures for row in rows if row.outcome != "undecided"]
         calm = CalmFailures(0.0, len(rows), len(failed), count_failures(failed))
         return replace(self.result(), boundaries=boundaries, calm=calm, failures=())
-
-    def _calm_failures(self, boundaries: tuple[WindBoundary, ...]) -> CalmFailures | None:
-        """Return the failures in the weakest flown wind of the directions whose boundary is calm air.
-
-        Return None if no boundary is calm air, or if the weakest flown wind is stronger than `NEARLY_CALM_MPS`.
-
-        boundaries: boundary of each direction.
-        """
-        calm_directions = {number for number, boundary in enumerate(boundaries) if boundary.estimate < CALM_MPS}
-        numbered_flights = [
-            (number, speed)
-            for number, (direction, speed, _) in enumerate(self.flown)
-            if direction in calm_directions and speed <= NEARLY_CALM_MPS
-        ]
-        if not numbered_flights:
-            return None
-        min_speed = min(speed for _, speed in numbered_flights)
-        numbers = [number for number, speed in numbered_flights if speed == min_speed]
-        undecided_numbers = {number for number, _ in self.undecided}
-        failed_findings = [
-            self._failed[number] for number in numbers if not self.flown[number][2] and number not in undecided_numbers
-        ]
-        return CalmFailures(min_speed, len(numbers), len(failed_findings), count_failures(failed_findings))
 
 
 def _fly_in_calm_air(pool: WorkerPool, goal: WindsGoal) -> list[FlightRow]:

@@ -263,15 +263,12 @@ def scale_margin(rule: str, margin: MinimumMargin) -> float | None:
     return None if margin.value is None or scale is None else margin.value / scale
 
 
-def _column_fields() -> dict[str, Column]:
-    """Return the stored fields of `FlightRow` in order, by name, each with the `Column` that annotates it."""
-    hints = get_type_hints(FlightRow, include_extras=True)
-    hint_args = {name: get_args(hint) for name, hint in hints.items()}
-    return {name: args[-1] for name, args in hint_args.items() if args and isinstance(args[-1], Column)}
-
-
-# Fields of `FlightRow` that are columns, by name.
-COLUMN_FIELDS = _column_fields()
+# Fields of `FlightRow` that are columns, in order, by name, each with the `Column` that annotates it.
+COLUMN_FIELDS: dict[str, Column] = {
+    name: arguments[-1]
+    for name, hint in get_type_hints(FlightRow, include_extras=True).items()
+    if (arguments := get_args(hint)) and isinstance(arguments[-1], Column)
+}
 
 
 def fly_one(base: CampaignBase, index: int, wind: GivenWind | None = None, log: Path | None = None) -> FlightRow:

@@ -140,7 +140,7 @@ def table_text(result: GroundRiskResult) -> str:
 
 def table_rows(result: GroundRiskResult) -> list[tuple[str, str, str]]:
     """Return the rows of the table for an application: quantity, value and source; cells in bold begin with "**"."""
-    flown, goal = result.flown, result.goal
+    flown, formula, goal = result.flown, result.formula, result.goal
     span = result.aircraft.wing_span
     share_text = _share_text(result)
     return [
@@ -152,7 +152,30 @@ def table_rows(result: GroundRiskResult) -> list[tuple[str, str, str]]:
         ("**flight geography**", "", ""),
         ("half width", f"{result.half_width:.1f} m", f"{share_text}: {flown.deviation:.1f} m; at least 1.5 CD"),
         ("height H_FG above ground", f"{flown.height:.1f} m", share_text),
-        *_contingency_rows(result),
+        ("**contingency volume**", "", ""),
+        (
+            "flown width",
+            f"{flown.contingency_width:.1f} m",
+            "all flights and the turns of their returns, beyond flight geography",
+        ),
+        (
+            "width S_CV by formula",
+            f"{formula.width:.1f} m",
+            f"S_GPS + S_Pos + S_K + S_RZ + S_CM = {formula.width_terms} m; S_CM = v²/(g tan 30°), a turn by 180°",
+        ),
+        ("**width along the whole flight geography**", f"**{result.contingency_width:.1f} m**", "the larger one"),
+        (
+            "for comparison: reach of returns",
+            f"{flown.return_distance:.1f} m",
+            "beyond flight geography; the operational volume also contains the areas below all returns",
+        ),
+        ("flown height above ground", f"{flown.contingency_height:.1f} m", "all flights and their returns"),
+        (
+            "height H_CV by formula",
+            f"{formula.height:.1f} m",
+            f"H_FG + H_baro + H_RZ + H_CM = {formula.height_terms} m; H_CM = 0.3 v²/g",
+        ),
+        ("**height of the operational volume**", f"**{result.volume_height:.1f} m**", "the larger one"),
         ("**ground risk buffer**", "", ""),
         (
             "flown width",
@@ -181,37 +204,6 @@ def table_rows(result: GroundRiskResult) -> list[tuple[str, str, str]]:
             ", ".join(result.entered_zones) or "none of the given zones",
             f"{count_text(len(result.base.scenario.zones), 'zone')} given, compared without their heights",
         ),
-    ]
-
-
-def _contingency_rows(result: GroundRiskResult) -> list[tuple[str, str, str]]:
-    """Return the table's rows of the contingency volume."""
-    flown, formula = result.flown, result.formula
-    return [
-        ("**contingency volume**", "", ""),
-        (
-            "flown width",
-            f"{flown.contingency_width:.1f} m",
-            "all flights and the turns of their returns, beyond flight geography",
-        ),
-        (
-            "width S_CV by formula",
-            f"{formula.width:.1f} m",
-            f"S_GPS + S_Pos + S_K + S_RZ + S_CM = {formula.width_terms} m; S_CM = v²/(g tan 30°), a turn by 180°",
-        ),
-        ("**width along the whole flight geography**", f"**{result.contingency_width:.1f} m**", "the larger one"),
-        (
-            "for comparison: reach of returns",
-            f"{flown.return_distance:.1f} m",
-            "beyond flight geography; the operational volume also contains the areas below all returns",
-        ),
-        ("flown height above ground", f"{flown.contingency_height:.1f} m", "all flights and their returns"),
-        (
-            "height H_CV by formula",
-            f"{formula.height:.1f} m",
-            f"H_FG + H_baro + H_RZ + H_CM = {formula.height_terms} m; H_CM = 0.3 v²/g",
-        ),
-        ("**height of the operational volume**", f"**{result.volume_height:.1f} m**", "the larger one"),
     ]
 
 

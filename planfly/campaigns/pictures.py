@@ -198,7 +198,11 @@ def draw_probability(bins: Sequence[SpeedBin], target: float | None) -> Figure:
         axes.set_title(
             "Probability against wind speed (line: share of flyable flights; band: Wilson interval; numbers: flights)"
         )
-        _style_axes(axes)
+        # A grid behind the data, and no top and right edge of the axes.
+        axes.grid(visible=True, color=GRID_COLOUR, linewidth=0.6)
+        axes.set_axisbelow(True)
+        for spine in ("top", "right"):
+            axes.spines[spine].set_visible(False)
     return figure
 
 
@@ -237,15 +241,6 @@ def draw_tornado(bars: Sequence[Bar], rule_title: str) -> Figure:
             axes.spines[spine].set_visible(False)
         axes.tick_params(left=False)
     return figure
-
-
-def _style_axes(axes: object) -> None:
-    """Draw a grid behind the data, and remove the top and right edge of the axes."""
-    if isinstance(axes, Axes):
-        axes.grid(visible=True, color=GRID_COLOUR, linewidth=0.6)
-        axes.set_axisbelow(True)
-        for spine in ("top", "right"):
-            axes.spines[spine].set_visible(False)
 
 
 # ----------------------------------------------------------------------

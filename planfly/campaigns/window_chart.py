@@ -39,8 +39,19 @@ def draw_window(result: WindowResult) -> Figure:
         times = [_to_matplotlib_days(departure.time) for departure in departures]
         width = 0.8 * min((later - earlier for earlier, later in itertools.pairwise(times)), default=1.0 / 24.0)
         _draw_probability(probability, result, times, width)
-        for axes in (probability, wind, energy):
-            _hatch_unjudged(axes, result, times, width)
+        # Hatch the columns of the departures that are not judged.
+        for axes, (time, departure) in itertools.product(
+            (probability, wind, energy), zip(times, departures, strict=True)
+        ):
+            if not departure.rows:
+                axes.axvspan(
+                    time - 0.5 * width,
+                    time + 0.5 * width,
+                    facecolor="none",
+                    edgecolor=_GRID_COLOUR,
+                    hatch="///",
+                    linewidth=0,
+                )
         wind.plot(times, [departure.wind[0] for departure in departures], color=_WIND_COLOUR, marker="o", markersize=3)
         for time, departure in zip(times, departures, strict=True):
             speed, from_deg = departure.wind
@@ -78,24 +89,6 @@ def draw_window(result: WindowResult) -> Figure:
 def _to_matplotlib_days(time: datetime) -> float:
     """Convert a time to matplotlib's number of days since 1970."""
     return time.timestamp() / 86_400.0
-
-
-def _hatch_unjudged(axes: Axes, result: WindowResult, times: list[float], width: float) -> None:
-    """Hatch the columns of the departures that are not judged.
-
-    times: departures in days since 1970, (d,).
-    width: width of a column, days.
-    """
-    for time, departure in zip(times, result.departures, strict=True):
-        if not departure.rows:
-            axes.axvspan(
-                time - 0.5 * width,
-                time + 0.5 * width,
-                facecolor="none",
-                edgecolor=_GRID_COLOUR,
-                hatch="///",
-                linewidth=0,
-            )
 
 
 def _draw_probability(axes: Axes, result: WindowResult, times: list[float], width: float) -> None:

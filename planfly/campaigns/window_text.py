@@ -1,7 +1,6 @@
 """Describe the result of a search for a departure window in lines."""
 
 import math
-from datetime import datetime
 
 from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.wording import energy_left_text
@@ -17,7 +16,13 @@ def answer_line(result: WindowResult) -> str:
     The text for a requested departure is go, no go, or not judged. It is given with the number of flyable flights.
     """
     goal, departure = result.goal, result.asked
-    windows = ", ".join(_window_text(*window) for window in result.windows)
+    window_texts = []
+    for first, last in result.windows:
+        # The date is not repeated if the window ends on the same day.
+        end_format = "%H:%M" if first.date() == last.date() else TIME_FORMAT
+        end_text = " only" if first == last else f" to {last:{end_format}}"
+        window_texts.append(f"{first:{TIME_FORMAT}}{end_text}")
+    windows = ", ".join(window_texts)
     open_text = f"take-off windows (UTC): {windows}" if windows else "no take-off time is flyable"
     if departure is None:
         unknown_text = ", but not judged in full" if windows and result.is_go is None else ""
@@ -32,13 +37,6 @@ def answer_line(result: WindowResult) -> str:
         return f"{subject}: go, {counts}; {open_text}"
     required_text = f"less than the required {100.0 * goal.probability:g} %"
     return f"{subject}: no go, {counts}, {required_text}; {open_text}{_best_text(result)}"
-
-
-def _window_text(first: datetime, last: datetime) -> str:
-    """Return a window as text; the date is not repeated if the window ends on the same day."""
-    if first == last:
-        return f"{first:{TIME_FORMAT}} only"
-    return f"{first:{TIME_FORMAT}} to {last:{'%H:%M' if first.date() == last.date() else TIME_FORMAT}}"
 
 
 def _best_text(result: WindowResult) -> str:

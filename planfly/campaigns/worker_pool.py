@@ -91,18 +91,13 @@ def check_scheduler_address(address: str) -> str:
     if not host or not port or parts.scheme not in ("tcp", "tls"):
         allowed = "expected tcp://HOST:PORT on this machine, or tls://HOST:PORT"
         raise SchedulerError.of_argument("scheduler", address, allowed)
-    if parts.scheme == "tcp" and not _is_loopback(host):
+    is_loopback = host == "localhost"
+    with contextlib.suppress(ValueError):
+        is_loopback = is_loopback or ipaddress.ip_address(host).is_loopback
+    if parts.scheme == "tcp" and not is_loopback:
         allowed = "tcp:// is allowed only on this machine; use tls://, with certificates in dask's configuration"
         raise SchedulerError.of_argument("scheduler", address, allowed)
     return full_address
-
-
-def _is_loopback(host: str) -> bool:
-    """Return True for a loopback address and for "localhost"."""
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return host == "localhost"
 
 
 class FlightRate:

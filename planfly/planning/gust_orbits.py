@@ -60,14 +60,19 @@ def limit_waypoint_orbits(
     orbits = expected_orbits(plan, autopilot, limits)
     if not plan.safe or orbits == 0.0:
         return plan
+    turbulence = plan.scenario.wind.turbulence
     if orbits <= MAX_EXPECTED_ORBITS:
         # A plan with the usual number of waypoints has no corner that is too sharp.
-        has_usual_count = len(plan.waypoints) >= plan.scenario.planner.waypoints
-        return (
-            plan
-            if has_usual_count or _is_safe_in_gusts(plan, uav)
-            else _with_problem(plan, _corridor_problem_text(plan, uav))
+        if len(plan.waypoints) >= plan.scenario.planner.waypoints or _is_safe_in_gusts(plan, uav):
+            return plan
+        excursions = _corner_excursions(plan, uav)
+        corner, max_excursion = max(enumerate(excursions, 1), key=lambda entry: entry[1])
+        problem_text = (
+            f"in {turbulence} turbulence, {autopilot.title} is expected up to {max_excursion:.0f} m from the legs at"
+            f" the corner of waypoint {corner}, but the corridor allows only {_plan_corridor_half_width(plan, uav):.0f}"
+            " m"
         )
+        return _with_problem(plan, problem_text)
     shorter_plan = plan if keeps_waypoints else drop_waypoints(plan, limits if search_limits is None else search_limits)
     if _is_safe_in_gusts(shorter_plan, uav):
         return shorter_plan
@@ -81,7 +86,21 @@ def limit_waypoint_orbits(
         other_plan = replace(search(replace(scenario, planner=planner_table)), scenario=scenario)
         if other_plan.safe and _is_safe_in_gusts(other_plan, uav):
             return other_plan
-    return _with_problem(plan, _orbit_problem_text(plan, autopilot, limits))
+    # The remedy is a value of the autopilot's altitude parameter, or less turbulence.
+    name = autopilot.deviations.altitude_parameter
+    radius = first_that_passes(
+        _TRIED_ALTITUDE_RADII_M,
+        lambda value: (
+            expected_orbits(plan, autopilot.with_parameters(**{name: float(value)}), limits) <= MAX_EXPECTED_ORBITS
+        ),
+    )
+    remedy = "Less turbulence" if radius is None else f"{name} of {radius} m"
+    problem_text = (
+        f"in {turbulence} turbulence, {autopilot.title} circles at a waypoint if gusts push it off the waypoint's"
+        f" altitude. This is expected in {min(orbits, 1.0):.0%} of the flights over {len(plan.waypoints) - 2}"
+        f" waypoints, but only {MAX_EXPECTED_ORBITS:.0%} is accepted as safe. {remedy} would help"
+    )
+    return _with_problem(plan, problem_text)
 
 
 def _with_problem(plan: Plan, problem: str) -> Plan:
@@ -116,17 +135,6 @@ def _corner_excursions(plan: Plan, uav: Uav) -> list[float]:
         tracking.corner_excursion(float(turn), speed) + GUST_CORNER_MARGIN_M
         for turn, speed in zip(turns, speeds, strict=True)
     ]
-
-
-def _corridor_problem_text(plan: Plan, uav: Uav) -> str:
-    """Return the problem text on the corner at which gusts take the aircraft furthest from the legs."""
-    excursions = _corner_excursions(plan, uav)
-    max_excursion = max(excursions)
-    return (
-        f"in {plan.scenario.wind.turbulence} turbulence, {uav.autopilot.title} is expected up to {max_excursion:.0f} m"
-        f" from the legs at the corner of waypoint {1 + excursions.index(max_excursion)}, but the corridor allows only"
-        f" {_plan_corridor_half_width(plan, uav):.0f} m"
-    )
 
 
 def expected_orbits(plan: Plan, autopilot: Autopilot, limits: Limits) -> float:
@@ -164,24 +172,3 @@ def max_waypoints_in_gusts(plan: Plan, uav: Uav) -> int:
     if probability == 0.0:
         return count
     return max(count, min(scenario.planner.waypoints, 2 + int(MAX_EXPECTED_ORBITS / probability)))
-
-
-def _orbit_problem_text(plan: Plan, autopilot: Autopilot, limits: Limits) -> str:
-    """Return the problem text on the expected orbits of a plan, with a remedy.
-
-    The remedy is a parameter value, or less turbulence.
-    """
-    count, name = len(plan.waypoints) - 2, autopilot.deviations.altitude_parameter
-    orbits = expected_orbits(plan, autopilot, limits)
-    radius = first_that_passes(
-        _TRIED_ALTITUDE_RADII_M,
-        lambda value: (
-            expected_orbits(plan, autopilot.with_parameters(**{name: float(value)}), limits) <= MAX_EXPECTED_ORBITS
-        ),
-    )
-    remedy = "Less turbulence" if radius is None else f"{name} of {radius} m"
-    return (
-        f"in {plan.scenario.wind.turbulence} turbulence, {autopilot.title} circles at a waypoint if gusts push it off"
-        f" the waypoint's altitude. This is expected in {min(orbits, 1.0):.0%} of the flights over {count} waypoints,"
-        f" but only {MAX_EXPECTED_ORBITS:.0%} is accepted as safe. {remedy} would help"
-    )

@@ -148,17 +148,12 @@ def _ground_speed_ratio(scenario: Scenario, airspeed: float, samples: Floats, co
     """
     local_winds = scenario.wind_velocities(samples[:, :3], samples[:, 3])
     mean_winds = scenario.wind.velocities_at(np.ascontiguousarray(samples[:, 2]))
-    local_speeds, mean_speeds = (
-        _ground_speeds(airspeed, winds[:, 0], winds[:, 1], courses) for winds in (local_winds, mean_winds)
-    )
-    return max(1.0, float((local_speeds / np.maximum(mean_speeds, _MIN_GROUND_SPEED_MPS)).max()))
-
-
-def _ground_speeds(airspeed: float, wind_east: Floats, wind_north: Floats, courses: Floats) -> Floats:
-    """Return the ground speeds on courses (rad), m/s.
-
-    airspeed, wind_east, wind_north: airspeed, and wind towards east and north, m/s.
-    """
     sin, cos = np.sin(courses), np.cos(courses)
-    crosswinds = wind_east * cos - wind_north * sin
-    return np.sqrt(np.maximum(0.0, airspeed**2 - crosswinds**2)) + wind_east * sin + wind_north * cos
+    ground_speeds = []
+    for winds in (local_winds, mean_winds):
+        wind_east, wind_north = winds[:, 0], winds[:, 1]
+        crosswinds = wind_east * cos - wind_north * sin
+        speeds_on_course = np.sqrt(np.maximum(0.0, airspeed**2 - crosswinds**2))
+        ground_speeds.append(speeds_on_course + wind_east * sin + wind_north * cos)
+    local_speeds, mean_speeds = ground_speeds
+    return max(1.0, float((local_speeds / np.maximum(mean_speeds, _MIN_GROUND_SPEED_MPS)).max()))

@@ -6,7 +6,7 @@ import itertools
 import json
 import os
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import asdict, dataclass, fields
@@ -213,7 +213,7 @@ def _plan_in_processes(tasks: list[tuple[int, str, int]], count: int) -> Iterato
     try:
         # All processes are started here.
         with children_ignore_sigint(), delay_signals():
-            results = pool.map(_plan_task, tasks[1:])
+            results = pool.map(plan_once, *zip(*tasks[1:], strict=True))
         workers = active_children()
         yield from results
     except BrokenProcessPool:
@@ -230,47 +230,35 @@ def _plan_in_processes(tasks: list[tuple[int, str, int]], count: int) -> Iterato
         del pool
 
 
-def _plan_task(task: tuple[int, str, int]) -> SeededPlan:
-    """Plan once in a worker process.  task: number of threats, algorithm and seed."""
-    return plan_once(*task)
-
-
 def summarise_plans(plans: Sequence[SeededPlan]) -> list[TableRow]:
-    """Return the rows of the paper's table, one for each problem and algorithm, in the order of planning."""
+    """Return the rows of the paper's table, one for each problem and algorithm, in the order of planning.
+
+    Lengths are None if no plan is safe.
+    """
     groups: dict[tuple[int, str], list[SeededPlan]] = {}
     for seeded_plan in plans:
         groups.setdefault((seeded_plan.threats, seeded_plan.algorithm), []).append(seeded_plan)
-    return [_table_row(group) for group in groups.values()]
-
-
-def _table_row(group: list[SeededPlan]) -> TableRow:
-    """Summarise the plans of one problem and algorithm with all seeds; lengths are None if no plan is safe."""
-    lengths = [seeded_plan.objectives.length_ratio for seeded_plan in group if seeded_plan.safe]
-    kills = _seed_values(group, lambda seeded_plan: seeded_plan.objectives.kill_exposure)
-    return TableRow(
-        threats=group[0].threats,
-        algorithm=group[0].algorithm,
-        runs=len(group),
-        safe=sum(seeded_plan.safe for seeded_plan in group),
-        certified=sum(seeded_plan.certified for seeded_plan in group),
-        length_median=float(np.median(lengths)) if lengths else None,
-        length_worst=max(lengths) if lengths else None,
-        kill_median=float(np.median(kills)),
-        kill_worst=float(kills.max()),
-        kill_probability_worst=float(_seed_values(group, lambda seeded_plan: seeded_plan.kill_probability).max()),
-        detection_median=float(
-            np.median(_seed_values(group, lambda seeded_plan: seeded_plan.objectives.detection_exposure))
-        ),
-        seconds_median=float(np.median(_seed_values(group, lambda seeded_plan: seeded_plan.seconds))),
-    )
-
-
-def _seed_values(group: list[SeededPlan], value: Callable[[SeededPlan], float]) -> Floats:
-    """Return a value of each plan of a group, (n,).
-
-    value: function that computes the value of one plan.
-    """
-    return np.array([value(seeded_plan) for seeded_plan in group])
+    rows = []
+    for (threats, algorithm), group in groups.items():
+        lengths = [seeded_plan.objectives.length_ratio for seeded_plan in group if seeded_plan.safe]
+        kills = [seeded_plan.objectives.kill_exposure for seeded_plan in group]
+        rows.append(
+            TableRow(
+                threats=threats,
+                algorithm=algorithm,
+                runs=len(group),
+                safe=sum(seeded_plan.safe for seeded_plan in group),
+                certified=sum(seeded_plan.certified for seeded_plan in group),
+                length_median=float(np.median(lengths)) if lengths else None,
+                length_worst=max(lengths) if lengths else None,
+                kill_median=float(np.median(kills)),
+                kill_worst=float(max(kills)),
+                kill_probability_worst=float(max(seeded_plan.kill_probability for seeded_plan in group)),
+                detection_median=float(np.median([seeded_plan.objectives.detection_exposure for seeded_plan in group])),
+                seconds_median=float(np.median([seeded_plan.seconds for seeded_plan in group])),
+            )
+        )
+    return rows
 
 
 # ----------------------------------------------------------------------

@@ -1,6 +1,6 @@
 """Measure the judgement of returns and glides from all points of the demo, and test suggested rally points.
 
-``python -m benchmarks.ways_home [--every S] [--fresh N] [--whole N]`` plans and flies the demo, and judges its returns
+``python -m benchmarks.returns [--every S] [--fresh N] [--whole N]`` plans and flies the demo, and judges its returns
 as `planfly returns` does: alone, with the glides, and with the search for rally points.  With the suggested points it
 then returns from N places that the search has not used, with a point mass, and from N of them with the simulated
 autopilot in JSBSim, and prints the lowest clearance and the nearest sphere.  Times are measured in the second pass,
@@ -69,7 +69,7 @@ def fly_fresh(world: ReturnWorld, starts: ReturnStarts, whole: int) -> None:
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.ways_home")
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.returns")
     parser.add_argument("--every", type=float, default=3.2, help="seconds between two returns (299 with 3.2)")
     parser.add_argument("--fresh", type=int, default=100, help="places that the search has not seen")
     parser.add_argument("--whole", type=int, default=20, help="of these, flown in JSBSim")
