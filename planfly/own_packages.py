@@ -1,5 +1,6 @@
 """Detect modules of other projects that hide planfly's top-level packages."""
 
+import contextlib
 import sys
 from importlib.util import find_spec
 from pathlib import Path
@@ -39,17 +40,14 @@ def find_hidden_package(home: Path) -> HiddenPackage | None:
             spec = find_spec(name)
             file = None if spec is None else spec.origin
         package_file = home / name / "__init__.py"
-        if file is not None and file != str(package_file) and not _is_same_file(file, package_file):
-            return HiddenPackage(file, str(package_file))
+        if file is None or file == str(package_file):
+            continue
+        # Another path may name the same file.
+        with contextlib.suppress(OSError):
+            if package_file.samefile(file):
+                continue
+        return HiddenPackage(file, str(package_file))
     return None
-
-
-def _is_same_file(file: str, package_file: Path) -> bool:
-    """Return True if both paths name the same file; False if one of them does not exist."""
-    try:
-        return package_file.samefile(file)
-    except OSError:
-        return False
 
 
 def check_hidden_packages() -> None:

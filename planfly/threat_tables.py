@@ -56,28 +56,25 @@ def threat_tables(threats: Any) -> list[dict[str, Any]]:
         if isinstance(error, ArgumentError):
             raise
         raise ArgumentError.of_argument("threats", type(threats).__name__, _EXPECTED) from None
-    return [_threat_table(number, row) for number, row in enumerate(rows)]
-
-
-def _threat_table(number: int, row: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a threat as a table of a scenario file, without missing values and radii of 0.
-
-    number: number of its row, from 0.
-    """
-    values = {}
-    for key, value in row.items():
-        is_nan = isinstance(value, float | np.floating) and math.isnan(value)
-        if hasattr(value, "__len__") and not isinstance(value, str):
-            shown = type(value).__name__
-            raise ArgumentError.of_argument(f"threats row {number}: {key}", value, "expected a number", shown=shown)
-        if is_nan and key != "name":
-            raise ArgumentError.of_argument(f"threats row {number}: {key}", float(value), _NAN_ALLOWED)
-        if value is not None and not is_nan:
-            values[key] = value
-    for kind in SCALE_RATIOS:
-        radius, scale = f"{kind}_radius_m", f"{kind}_scale_m"
-        if values.get(radius) == 0.0:
-            values = {key: value for key, value in values.items() if key not in (radius, scale)}
-        elif isinstance(values.get(radius), str):
-            raise ArgumentError.of_argument(f"threats: column {radius}", values[radius], "expected numbers, not text")
-    return values
+    tables = []
+    for number, row in enumerate(rows):
+        table = {}
+        for key, value in row.items():
+            is_nan = isinstance(value, float | np.floating) and math.isnan(value)
+            if hasattr(value, "__len__") and not isinstance(value, str):
+                shown = type(value).__name__
+                raise ArgumentError.of_argument(f"threats row {number}: {key}", value, "expected a number", shown=shown)
+            if is_nan and key != "name":
+                raise ArgumentError.of_argument(f"threats row {number}: {key}", float(value), _NAN_ALLOWED)
+            if value is not None and not is_nan:
+                table[key] = value
+        for kind in SCALE_RATIOS:
+            radius, scale = f"{kind}_radius_m", f"{kind}_scale_m"
+            if table.get(radius) == 0.0:
+                table = {key: value for key, value in table.items() if key not in (radius, scale)}
+            elif isinstance(table.get(radius), str):
+                raise ArgumentError.of_argument(
+                    f"threats: column {radius}", table[radius], "expected numbers, not text"
+                )
+        tables.append(table)
+    return tables

@@ -70,7 +70,12 @@ def window(
     world.errors.ArgumentError: every now: expected a time such as 30min or 1h, from 1min to 24h
     """
     check_arguments(probability=probability, window_flights=options["flights"])
-    step = _parse_step(every)
+    match, step = _STEP.fullmatch(every.strip()), timedelta(0)
+    if match is not None:
+        number = float(match.group(1))
+        step = timedelta(minutes=number) if match.group(2) == "min" else timedelta(hours=number)
+    if not _MIN_STEP <= step <= _MAX_STEP:
+        raise ArgumentError.of_argument("every", every, "expected a time such as 30min or 1h, from 1min to 24h")
     departure, first, last = (
         None if text is None else _parse_time(name, text)
         for name, text in (("at", options["at"]), ("earliest", earliest), ("latest", latest))
@@ -128,17 +133,6 @@ def _open_base(target: Plan | str | Path, options: WindowOptions, departures: Se
             raise ArgumentError.of_argument("forecast", None, allowed, shown="")
         return base
     raise errors[0]
-
-
-def _parse_step(every: str) -> timedelta:
-    """Return the time between two departures from a text such as "30min"; raise ArgumentError for other text."""
-    match = _STEP.fullmatch(every.strip())
-    if match is not None:
-        number = float(match.group(1))
-        step = timedelta(minutes=number) if match.group(2) == "min" else timedelta(hours=number)
-        if _MIN_STEP <= step <= _MAX_STEP:
-            return step
-    raise ArgumentError.of_argument("every", every, "expected a time such as 30min or 1h, from 1min to 24h")
 
 
 def _parse_time(name: str, text: str) -> datetime:

@@ -119,7 +119,17 @@ def predict(
     name = str(options["aircraft"])
     aircraft = find_aircraft(str(Path(name).resolve()) if names_folder(name) else name)
     path = Path(log)
-    motion = None if by == "mission" or is_log(path) else _read_motion(path, required=by == "controls")
+    motion = None
+    if by != "mission" and not is_log(path):
+        try:
+            motion = read_motion(path)
+        except LogError:
+            if by == "controls":
+                raise
+    if motion is not None and (len(motion.inertial.time) < 2 or len(motion.surface_commands.time) < 2):
+        if by == "controls":
+            raise LogError(f"{path}: no inertial sensors or no controls; predict it by its mission", file=path)
+        motion = None
     if by == "controls" and motion is None:
         reason = "a flight log of planfly has no inertial sensors; predict it by its mission"
         raise LogError(f"{path}: {reason}", file=path)
@@ -151,23 +161,6 @@ def predict(
             write_atomically(page, prediction_page(predicted.heading, predicted.bands, chart).encode())
             files = page, picture
     return replace(predicted, files=files)
-
-
-def _read_motion(path: Path, *, required: bool) -> MotionLog | None:
-    """Return the motion of a log with inertial sensors and controls; None for a log without them.
-
-    required: True to raise LogError for a log without them.
-    """
-    try:
-        motion = read_motion(path)
-    except LogError:
-        if required:
-            raise
-        return None
-    has_controls = len(motion.inertial.time) > 1 and len(motion.surface_commands.time) > 1
-    if not has_controls and required:
-        raise LogError(f"{path}: no inertial sensors or no controls; predict it by its mission", file=path)
-    return motion if has_controls else None
 
 
 # ----------------------------------------------------------------------

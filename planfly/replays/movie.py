@@ -51,7 +51,13 @@ def write_movie(
         raise PlanflyError.of_argument("movie", kind, allowed, shown="", file=target)
     else:
         check_output_folder(target, overwrite)
-    program = _find_ffmpeg(target) if kind == ".mp4" else ""
+    # ffmpeg, installed or from the extra `films`.
+    program = shutil.which("ffmpeg") if kind == ".mp4" else ""
+    if program is None:
+        require_extra("films", f"{target}: an .mp4 needs ffmpeg (a .gif or a folder does not), or")
+        from imageio_ffmpeg import get_ffmpeg_exe
+
+        program = str(get_ffmpeg_exe())
     film = MovieFrames(log.setup, log.track, start, end, speed or max(1.0, (end - start) / _DEFAULT_DURATION_S))
     if len(film) > _MAX_FRAMES:
         allowed = f"{len(film):,} frames: at most {_MAX_FRAMES:,} are allowed; raise `speed`"
@@ -133,20 +139,6 @@ def _encode_gif(film: MovieFrames) -> bytes:
         transparency=_TRANSPARENT,
     )
     return data.getvalue()
-
-
-def _find_ffmpeg(target: Path) -> str:
-    """Return the path of ffmpeg, installed or from the extra `films`.
-
-    Raises MissingExtraError without either.
-    """
-    program = shutil.which("ffmpeg")
-    if program is not None:
-        return program
-    require_extra("films", f"{target}: an .mp4 needs ffmpeg (a .gif or a folder does not), or")
-    from imageio_ffmpeg import get_ffmpeg_exe
-
-    return str(get_ffmpeg_exe())
 
 
 def _encode_mp4(film: MovieFrames, program: str) -> bytes:

@@ -188,34 +188,22 @@ def choose_worst_returns(
             np.hypot(*(positions[start_index] - positions[chosen_index])) < min_distance
             for _, chosen_index in chosen_returns
         )
-        if (
-            is_near
-            or starts.is_low[start_index]
-            or not can_start_in_jsbsim(world, start_rows[start_index])
-            or not _is_lead_in_clear(world, start_rows[start_index])
-        ):
+        row, terrain = start_rows[start_index], world.scenario.terrain
+        if is_near or starts.is_low[start_index] or not can_start_in_jsbsim(world, row):
             continue
+        if terrain is not None:
+            # 26 points on the straight lead-in, from the start backwards.
+            velocity = np.array([float(row[f"velocity_{name}"]) for name in ("east", "north", "up")])
+            start_position = np.array([float(row[name]) for name in ("east", "north", "up")])
+            seconds_before = np.linspace(0.0, LEAD_IN_LENGTH_M / max(1.0, math.hypot(*velocity[:2])), 26)
+            path = start_position - seconds_before[:, None] * velocity
+            # An unknown height above the ground, NaN, must fail this comparison.
+            if not (path[:, 2] - terrain.height(path[:, 0], path[:, 1])).min() > _MIN_LEAD_IN_HEIGHT_M:
+                continue
         chosen_returns.append((candidate, start_index))
         if len(chosen_returns) == points:
             break
     return chosen_returns
-
-
-def _is_lead_in_clear(world: ReturnWorld, row: Record) -> bool:
-    """Return True if the straight lead-in to a start is high enough above the ground to be flown.
-
-    Each point must be more than `_MIN_LEAD_IN_HEIGHT_M` above the ground.  Returns True without a terrain.
-
-    row: a row of `ReturnStarts.rows`.
-    """
-    if world.scenario.terrain is None:
-        return True
-    velocity = np.array([float(row[f"velocity_{name}"]) for name in ("east", "north", "up")])
-    start_position = np.array([float(row[name]) for name in ("east", "north", "up")])
-    # 26 points on the lead-in, from the start backwards.
-    seconds_before = np.linspace(0.0, LEAD_IN_LENGTH_M / max(1.0, math.hypot(*velocity[:2])), 26)
-    path = start_position - seconds_before[:, None] * velocity
-    return bool((path[:, 2] - world.scenario.terrain.height(path[:, 0], path[:, 1])).min() > _MIN_LEAD_IN_HEIGHT_M)
 
 
 def fly_with_autopilot(

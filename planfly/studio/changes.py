@@ -90,8 +90,16 @@ def flight_results(mission: Mission, route: Route, findings: Iterable[Finding], 
     }
     for finding in findings:
         key, description = _place_key(finding.place, route.items.tolist(), order)
-        is_planned = finding.flown is None or _is_decided_by_plan(finding)
-        value, level = (finding.planned, _PLANNED) if is_planned else (finding.flown, _FLOWN)
+        planned, flown, limit = finding.planned, finding.flown, finding.limit
+        is_planned = flown is None
+        if planned is not None and flown is not None and limit is not None and finding.margin is not None:
+            # The margin at a flown place may be computed from the planned value.
+            planned_error, flown_error = (
+                abs((value - limit if finding.at_least else limit - value) - finding.margin)
+                for value in (planned, flown)
+            )
+            is_planned = planned_error < flown_error
+        value, level = (planned, _PLANNED) if is_planned else (flown, _FLOWN)
         place = finding.place
         if places_reached and place.kind in ("leg", "waypoint") and place.index is not None:
             # A leg is reached if it was begun, and a waypoint also if the leg to it was begun.
@@ -118,17 +126,6 @@ def flight_results(mission: Mission, route: Route, findings: Iterable[Finding], 
         if previous is None or _severity_key(result) < _severity_key(previous):
             results[finding.rule, key] = result
     return FlightResults(item_contents, results, seconds)
-
-
-def _is_decided_by_plan(finding: Finding) -> bool:
-    """Return True if the margin at a flown place was computed from the planned value, not the flown value."""
-    if finding.margin is None or finding.limit is None or finding.planned is None or finding.flown is None:
-        return False
-    planned_error, flown_error = (
-        abs((value - finding.limit if finding.at_least else finding.limit - value) - finding.margin)
-        for value in (finding.planned, finding.flown)
-    )
-    return planned_error < flown_error
 
 
 def _severity_key(result: PlaceResult) -> tuple[bool, int, float]:

@@ -259,17 +259,7 @@ def save_document(document: Document, context: EditContext, judged_mission: Judg
         mission = replace(mission, cruise_speed=start_airspeed)
     mission = replace(mission, autopilot=judged_mission.setup.autopilot.name)
     text = mission_text(mission, "waypoints" if kind == "waypoints" else "plan")
-    losses = (*_format_losses(context, mission, text, name, kind), *_lost_settings(document.setup, context))
-    return SavedFile(name, text.encode(), losses)
-
-
-def _format_losses(context: EditContext, mission: Mission, text: str, name: str, kind: str) -> tuple[str, ...]:
-    """Return a line for each part of the mission that a ground station's file cannot store.
-
-    text: the mission as text of this file.
-    name: name of the file.
-    kind: kind of the file, such as "waypoints".
-    """
+    # Parts of the mission that a ground station's file cannot store.
     parsed, losses = parse_mission(text, name), []
     lost_counts: Mapping[str, tuple[int, str]] = {
         "fence item": (len(mission.fences) - len(parsed.fences), "only in a .plan"),
@@ -285,7 +275,7 @@ def _format_losses(context: EditContext, mission: Mission, text: str, name: str,
     world_contents = [count_text(count, noun) for count, noun in ((threats, "threat"), (zones, "zone")) if count]
     if world_contents:
         losses.append(f"the scenario's {' and '.join(world_contents)}: planfly export writes them as a fence")
-    return tuple(losses)
+    return SavedFile(name, text.encode(), (*losses, *_lost_settings(document.setup, context)))
 
 
 def _lost_settings(opened_setup: FlightSetup, context: EditContext) -> tuple[str, ...]:
@@ -394,32 +384,20 @@ def _plan_with_ground_phases(context: EditContext, mission: Mission) -> Plan | N
         plan = replace(
             plan, certificate=replace(plan.certificate, problems=(*plan.certificate.problems, *ground_problems))
         )
-        if _have_same_items(planned_mission(plan, context.uav), mission):
-            return plan
+        # The plan must have the commands of the mission, at positions that differ only by rounding.  Commands without a
+        # position must also have the same parameters.
+        missions = (planned_mission(plan, context.uav), mission)
+        commands, other_commands = (
+            [(item.command, item.has_position or item.params) for item in one.items] for one in missions
+        )
+        if commands == other_commands:
+            positions, other_positions = (
+                np.array([(item.lat_deg, item.lon_deg, item.alt) for item in one.items]) for one in missions
+            )
+            tolerances = (_POSITION_TOLERANCE_DEG, _POSITION_TOLERANCE_DEG, _ALTITUDE_TOLERANCE_M)
+            if (np.abs(positions - other_positions) <= tolerances).all():
+                return plan
     reason = (
         "its departure or landing, or a leg next to them, differs from the opened plan: save a .plan, or plan again"
     )
     raise MissionError(f"{mission.source}: {reason}", file=mission.source)
-
-
-def _have_same_items(mission_a: Mission, mission_b: Mission) -> bool:
-    """Return True if two missions have the same commands, at positions that differ only by rounding.
-
-    Commands without a position must also have the same parameters.
-    """
-    commands = [
-        [(item.command, item.has_position or item.params) for item in mission.items]
-        for mission in (mission_a, mission_b)
-    ]
-    if commands[0] != commands[1]:
-        return False
-    positions_a, positions_b = (
-        np.array([(item.lat_deg, item.lon_deg, item.alt) for item in mission.items])
-        for mission in (mission_a, mission_b)
-    )
-    return bool(
-        (
-            np.abs(positions_a - positions_b)
-            <= (_POSITION_TOLERANCE_DEG, _POSITION_TOLERANCE_DEG, _ALTITUDE_TOLERANCE_M)
-        ).all()
-    )

@@ -1,5 +1,6 @@
 """List the files that the page may open, which are in the folder of the file that the command named."""
 
+import contextlib
 from pathlib import Path
 
 from planfly.studio.documents import DROPPED_SUFFIXES, MAP_SUFFIXES
@@ -27,29 +28,24 @@ def folder_message(folder: Path | None) -> Json:
     """
     if folder is None:
         return {"folder": "", "files": []}
+    files: list[Path] = []
     try:
         resolved_folder = folder.resolve(strict=True)
-        files = sorted(
-            file
-            for file in resolved_folder.iterdir()
-            if file.suffix.lower() in _LISTED_SUFFIXES and file.is_file() and _may_contain_mission(file)
-        )
+        for file in sorted(resolved_folder.iterdir()):
+            suffix = file.suffix.lower()
+            if suffix not in _LISTED_SUFFIXES or not file.is_file():
+                continue
+            mark = _MISSION_MARKS.get(suffix, b"")
+            # Unreadable files are left out.
+            with contextlib.suppress(OSError), file.open("rb") as stream:
+                if mark in stream.read(_SEARCHED_BYTES if mark else 0):
+                    files.append(file)
     except OSError:
         return {"folder": "", "files": []}
     return {
         "folder": home_relative_text(resolved_folder),
         "files": [file.name for file in files[:_MAX_FILES] if file.resolve().parent == resolved_folder],
     }
-
-
-def _may_contain_mission(file: Path) -> bool:
-    """Return True unless a file is unreadable, or a text or JSON document without a mission or plan."""
-    mark = _MISSION_MARKS.get(file.suffix.lower(), b"")
-    try:
-        with file.open("rb") as stream:
-            return mark in stream.read(_SEARCHED_BYTES if mark else 0)
-    except OSError:
-        return False
 
 
 def home_relative_text(path: Path) -> str:

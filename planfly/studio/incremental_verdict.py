@@ -53,8 +53,8 @@ def judge_windows(
 
     Returns the route and the judged parts (windows).
 
-    The whole route is judged as one part if it may contain surveys, or if the parts together would be as long as the
-    route.
+    The whole route is judged as one part if the move may change all of it, if it may contain surveys, or if the parts
+    together would be as long as the route.
 
     index: index of the item in the mission's list.
     previous_setup: setup before the move, if known.
@@ -71,10 +71,23 @@ def judge_windows(
         )
     if route is None:
         route = context.route(mission)
-    # The lines of a survey are found from the whole route.
+    rows = np.flatnonzero(route.items == mission.items[index].seq)
+    # The lines of a survey are found from the whole route; landing sequences and returns depend on the whole route.
     may_contain_survey = context.scenario.limits.surveys == "lines" or bool(camera_spacing(mission, route).any())
-    spans = None if may_contain_survey else _find_affected_spans(route, mission.items[index].seq)
-    if spans is None:
+    has_returns = route.rtl_start is not None or route.direct_landing_start is not None
+    is_whole = may_contain_survey or has_returns or not len(rows)
+    # First and last waypoint of each span that the move may change: a span around each run of consecutive waypoints.
+    # Overlapping spans are merged.
+    spans: list[tuple[int, int]] = []
+    if not is_whole:
+        for run in np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1):
+            span = _extend_span(route, int(run[0]), int(run[-1]))
+            if spans and span[0] <= spans[-1][1] + 2 * MOVE_REACH_LEGS:
+                span = spans.pop()[0], span[1]
+            spans.append(span)
+        judged_legs = sum(last - first + 2 * MOVE_REACH_LEGS for first, last in spans)
+        is_whole = len(spans) > _MAX_PASSES or judged_legs >= route.legs
+    if is_whole:
         return route, (_judge_window(context.part_setup(mission, route), 0, route.legs, 0),)
     windows = []
     for first, last in spans:
@@ -152,28 +165,6 @@ def _judge_window(setup: FlightSetup, first: int, last: int, start: int) -> Wind
         if is_violation or is_in_window:
             findings.append(finding)
     return Window(first, last, start, requirements, tuple(findings))
-
-
-def _find_affected_spans(route: Route, seq: int) -> list[tuple[int, int]] | None:
-    """Return the first and last waypoint of each span that a move of an item may change.
-
-    Returns None if the move may change the whole route.
-
-    seq: number of the moved item.
-    Overlapping spans are merged. Landing sequences and returns depend on the whole route.
-    """
-    rows = np.flatnonzero(route.items == seq)
-    if not len(rows) or route.rtl_start is not None or route.direct_landing_start is not None:
-        return None
-    spans: list[tuple[int, int]] = []
-    # Each run of consecutive waypoints is one span.
-    for run in np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1):
-        span = _extend_span(route, int(run[0]), int(run[-1]))
-        if spans and span[0] <= spans[-1][1] + 2 * MOVE_REACH_LEGS:
-            span = spans.pop()[0], span[1]
-        spans.append(span)
-    judged_legs = sum(last - first + 2 * MOVE_REACH_LEGS for first, last in spans)
-    return None if len(spans) > _MAX_PASSES or judged_legs >= route.legs else spans
 
 
 def _extend_span(route: Route, first: int, last: int) -> tuple[int, int]:

@@ -46,11 +46,7 @@ def update_moved_route(
         for old_item, new_item in zip(previous_mission.items, mission.items, strict=True)
         if old_item is not new_item
     ]
-    if (
-        len(pairs) > _MAX_MOVED_ITEMS
-        or not all(_is_waypoint_move(*pair) for pair in pairs)
-        or not _has_one_stop_per_item(route, mission, scenario)
-    ):
+    if len(pairs) > _MAX_MOVED_ITEMS or not _has_one_stop_per_item(route, mission, scenario):
         return None
     rows = {seq: row for row, seq in enumerate(route.items.tolist())}
     waypoint_seqs = {item.seq for item in mission.items if item.command == Command.NAV_WAYPOINT}
@@ -58,6 +54,12 @@ def update_moved_route(
     points, changed_rows = route.points.copy(), set[int]()
     positions = points["position"]
     for old_item, new_item in pairs:
+        # A move changes only the position and the acceptance radius of a waypoint.
+        params = (*old_item.params[:1], new_item.params[1], *old_item.params[2:])
+        lat, lon, alt = new_item.lat_deg, new_item.lon_deg, new_item.alt
+        is_waypoint = new_item.command == Command.NAV_WAYPOINT and old_item.has_position and new_item.has_position
+        if not is_waypoint or replace(old_item, lat_deg=lat, lon_deg=lon, alt=alt, params=params) != new_item:
+            return None
         row = rows[new_item.seq]
         old_position = _map_position(old_item, previous_mission, scenario)
         new_position = _map_position(new_item, mission, scenario)
@@ -84,16 +86,6 @@ def update_moved_route(
     must_fly_over = fly_over_waypoints(points, uav.limits, rules.turn_distance)
     points["fly_over"] = np.where(route.arc_radii > 0.0, False, scenario.flight.fly_over | must_fly_over)
     return replace(route, points=points)
-
-
-def _is_waypoint_move(old_item: MissionItem, new_item: MissionItem) -> bool:
-    """Return True if a waypoint differs only in its position and its acceptance radius."""
-    params = (*old_item.params[:1], new_item.params[1], *old_item.params[2:])
-    is_same = (
-        replace(old_item, lat_deg=new_item.lat_deg, lon_deg=new_item.lon_deg, alt=new_item.alt, params=params)
-        == new_item
-    )
-    return is_same and new_item.command == Command.NAV_WAYPOINT and old_item.has_position and new_item.has_position
 
 
 def _has_one_stop_per_item(route: Route, mission: Mission, scenario: Scenario) -> bool:

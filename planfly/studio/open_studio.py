@@ -66,7 +66,14 @@ def open_studio(
     """
     end_repeated_call()
     check_arguments(port=port)
-    listener = _open_listener(port)
+    for candidate in (DEFAULT_PORT, 0) if port is None else (port,):
+        try:
+            listener = socket.create_server((HOST, candidate))
+            break
+        except OSError as error:
+            bind_error = error
+    else:
+        raise PlanflyError.of_argument("port", port, f"{HOST}:{port} is not free: {bind_error.strerror}")
     with contextlib.closing(listener):
         target = str(what)
         autosave_file = Path(keep) / f"{_autosave_stem(target)}.json"
@@ -106,19 +113,6 @@ def _autosave_stem(target: str) -> str:
     if not path.exists():
         return path.stem
     return f"{path.stem}-{hashlib.sha256(str(path.resolve()).encode()).hexdigest()[:8]}"
-
-
-def _open_listener(port: int | None) -> socket.socket:
-    """Return a listening socket for the pages.  Raises PlanflyError if the requested port is taken.
-
-    port: requested port; None for the default port, or any free port if the default port is taken.
-    """
-    for candidate in (DEFAULT_PORT, 0) if port is None else (port,):
-        try:
-            return socket.create_server((HOST, candidate))
-        except OSError as error:
-            bind_error = error
-    raise PlanflyError.of_argument("port", port, f"{HOST}:{port} is not free: {bind_error.strerror}")
 
 
 @contextlib.contextmanager

@@ -365,7 +365,10 @@ class Session:
             raise PlanflyError("that path no longer exists: plan again", field="which")
         plan = plans[message.which]
         if item_range is None:
-            self._show_plan(plan)
+            # The certificate of the plan applies until the next edit.
+            mission = planned_mission(plan, self.context.planning_uav(self.mission))
+            self._set_mission(mission, self.context.with_plan(plan, mission))
+            self._add_to_history(mission, f"plan with seed {plan.seed}")
             return
         first, last = item_range
         mission = self.mission
@@ -401,12 +404,6 @@ class Session:
         self.context, self.judged = context, judged_mission
         self.plans = ([], None)
         self.rev += 1
-
-    def _show_plan(self, plan: Plan) -> None:
-        """Replace the current mission by the mission of a plan, whose certificate applies until the next edit."""
-        mission = planned_mission(plan, self.context.planning_uav(self.mission))
-        self._set_mission(mission, self.context.with_plan(plan, mission))
-        self._add_to_history(mission, f"plan with seed {plan.seed}")
 
     def _move_item(self, index: int, east: float | None, north: float | None, altitude: float | None) -> Mission:
         """Return the mission with an item moved to a position, m, or altitude, m AMSL.

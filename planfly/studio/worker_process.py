@@ -269,16 +269,18 @@ class WorkerProcess:
             except (EOFError, OSError, TypeError):
                 # A pipe that is closed during a wait loses its handle, which raises TypeError.
                 break
-            if answer.kind != "progress":
-                # The task has ended; the timer is stopped if it waited for this task.
-                with self._condition:
-                    if self._newest_task is not None and answer.number == self._newest_task.number:
-                        self._newest_task = None
-                    if self._pipe is pipe and answer.number in self._unanswered:
-                        oldest_number = self._unanswered[0]
-                        self._unanswered.remove(answer.number)
-                        if answer.number == oldest_number:
-                            self._cancel_timer()
+            if answer.kind == "progress":
+                self._on_answer(answer)
+                continue
+            # The task has ended; the timer is stopped if it waited for this task.
+            with self._condition:
+                if self._newest_task is not None and answer.number == self._newest_task.number:
+                    self._newest_task = None
+                if self._pipe is pipe and answer.number in self._unanswered:
+                    oldest_number = self._unanswered[0]
+                    self._unanswered.remove(answer.number)
+                    if answer.number == oldest_number:
+                        self._cancel_timer()
             self._on_answer(answer)
         reason = "the worker process has ended; try again"
         with self._condition:

@@ -15,6 +15,7 @@ from planfly.studio.jobs import FLIGHT_WORKER, LONG_WORKER, Jobs
 from planfly.studio.session import Session, open_session
 from planfly.studio.worker_process import Answer, Task
 from planfly.studio.worker_tasks import fly, try_flown_suggestions, try_planned_suggestions
+from planner.plan import Plan
 from planner.search.plan_front import FrontPlan
 from tests.planfly.studio.drafts import drawn_session, session_of, try_planned
 from world.errors import MissionError
@@ -45,6 +46,11 @@ def asked(jobs: Jobs, pilot: str) -> list[Task]:
     return jobs._workers[pilot].works  # type: ignore[attr-defined, no-any-return]
 
 
+def show_plan(session: Session, plan: Plan) -> None:
+    session.plans = ([plan], None)
+    session.replace_plan(messages.Choose(kind="choose", rev=session.rev, which=0))
+
+
 @pytest.mark.parametrize(("ends", "airspeed"), [((None, None), 22.0), ((1, 2), 22.0), ((2, 4), 28.0)])
 def test_a_path_is_planned_at_the_speed_of_the_mission(
     ends: tuple[int | None, int | None], airspeed: float, jobs: Jobs
@@ -62,7 +68,7 @@ def test_a_path_is_planned_at_the_speed_of_the_mission(
     assert request.uav.airspeed == airspeed
     # The path of the whole mission states this speed.
     plan = straight_plan(session.context.scenario, 1)
-    session._show_plan(plan)
+    show_plan(session, plan)
     assert [item.params[1] for item in session.mission.items if item.command == Command.DO_CHANGE_SPEED] == [22.0]
     assert session.judged.setup.route.leg_airspeeds.tolist() == [22.0]
 
@@ -109,7 +115,7 @@ def test_a_scenario_is_planned_first_and_not_judged_meanwhile(jobs: Jobs) -> Non
 def test_a_line_to_which_an_undo_leads_back_is_flown(jobs: Jobs, tmp_path: Path) -> None:
     """Before and after a restart, whose edits are one step."""
     session = Session.from_document(open_document("tight", MissionOptions()), MissionOptions())
-    session._show_plan(straight_plan(session.context.scenario, 1))
+    show_plan(session, straight_plan(session.context.scenario, 1))
     session.autosave(tmp_path / "kept.json")
     restarted, restored = open_session("tight", MissionOptions(), tmp_path / "kept.json")
     assert restored
