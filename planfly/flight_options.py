@@ -395,14 +395,24 @@ def apply_options(
     (8.0, 28.0)
     """
     wind, forecast = options.get("wind"), options.get("forecast")
-    if wind is not None and forecast is not None:
-        raise ArgumentError.of_argument("wind", wind, "not allowed with a forecast, which states the wind", shown="")
-    speed, from_deg = (None, None) if wind is None else _wind_numbers(wind)
-    if from_deg is not None and not is_valid_wind(0.0, from_deg):
-        raise ArgumentError.of_argument(
-            "wind", wind, "expected the direction that the wind blows from, degrees from north, -360..360"
-        )
-    from_course = None if from_deg is None else math.radians(from_deg)
+    speed: float | None = None
+    from_course: float | None = None
+    if wind is not None:
+        if forecast is not None:
+            allowed = "not allowed with a forecast, which states the wind"
+            raise ArgumentError.of_argument("wind", wind, allowed, shown="")
+        direction_text = "the direction that the wind blows from, degrees from north"
+        try:
+            speed, from_deg = wind
+            if isinstance(wind, str | bytes):
+                raise TypeError
+            speed, from_deg = float(speed), float(from_deg)
+        except (TypeError, ValueError):
+            allowed = f"expected a speed, m/s, and {direction_text}, such as (8, 270)"
+            raise ArgumentError.of_argument("wind", wind, allowed, shown=repr(wind)) from None
+        if not is_valid_wind(0.0, from_deg):
+            raise ArgumentError.of_argument("wind", wind, f"expected {direction_text}, -360..360")
+        from_course = math.radians(from_deg)
     if forecast is not None:
         # With the time of flight first, so that the file is read once, for this time.
         scenario = without_forecast(scenario)
@@ -484,23 +494,6 @@ def flight_entries(options: FlightOptions, program: Path | None = None) -> dict[
         # Absolute, so that it does not depend on the folder of the scenario.
         "params": None if params is None else absolute_path(Path(params)),
     }
-
-
-def _wind_numbers(wind: Wind) -> Wind:
-    """Return speed (m/s) and direction (degrees) of a wind as numbers.
-
-    Raises ArgumentError for other values.
-    """
-    try:
-        speed, from_deg = wind
-        if isinstance(wind, str | bytes):
-            raise TypeError
-        return float(speed), float(from_deg)
-    except (TypeError, ValueError):
-        allowed = (
-            "expected a speed, m/s, and the direction that the wind blows from, degrees from north, such as (8, 270)"
-        )
-        raise ArgumentError.of_argument("wind", wind, allowed, shown=repr(wind)) from None
 
 
 # ----------------------------------------------------------------------

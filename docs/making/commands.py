@@ -8,8 +8,7 @@ from contextlib import contextmanager
 from typing import NamedTuple
 
 from planfly.cli import build_parser
-from planfly.terminal.command_parser import CommandParser
-from planfly.terminal.exit_codes import EXIT_CODES
+from planfly.terminal.command_parser import EXIT_CODES, CommandParser
 
 # Commands.  An option with the same meaning in this many is explained once, among the common options.
 COMMON_OPTION_USES = 5

@@ -1,7 +1,6 @@
 """Convert a plan to a mission with a speed change, followed by waypoints with altitudes AMSL."""
 
 import math
-from collections.abc import Iterator
 
 import numpy as np
 
@@ -61,7 +60,14 @@ def plan_mission(
     procedures = plan.procedures or DepartureAndApproach()
     points = _mission_positions(plan, procedures)
     radii = acceptance_radii(plan.scenario, points, airspeed, max_bank, tracking)
-    home = _home_position(plan)
+    # Home is the scenario's home, or the ground below the start; the start itself if the ground is unknown.
+    scenario = plan.scenario
+    home_position = scenario.home if scenario.home is not None else plan.waypoints[0]
+    home_lat, home_lon = to_geo(scenario.origin, home_position[:1], home_position[1:2])
+    terrain = scenario.terrain
+    ground = math.nan if terrain is None else float(terrain.height(home_position[0], home_position[1]))
+    home_altitude = _round_to_thousandths(float(home_position[2]) if math.isnan(ground) else ground)
+    home = Home(round_to_grid(float(home_lat[0])), round_to_grid(float(home_lon[0])), home_altitude)
     builder = _ItemBuilder(plan.scenario.origin)
     if procedures.climb is not None:
         takeoff_position = np.append(procedures.climb.home[:2], procedures.climb.up)
@@ -76,14 +82,18 @@ def plan_mission(
         for index in (end_waypoint, end_waypoint + 1):
             builder.add(Command.NAV_WAYPOINT, (0.0, float(radii[index]), 0.0, 0.0), points[index])
         builder.add(Command.NAV_LAND, (procedures.descent.go_around, 0.0, 0.0, 0.0), procedures.descent.point)
-    return_requirements = plan.scenario.returns
-    rally = (
-        ()
-        if return_requirements is None
-        else tuple(_rally_items(plan.scenario.origin, return_requirements.rally, home))
-    )
+    # Rally points have heights above home, as ground stations write them.
+    rally = []
+    for number, (east, north, up) in enumerate([] if scenario.returns is None else scenario.returns.rally.tolist()):
+        lat, lon = (round_to_grid(float(value)) for value in to_geo(scenario.origin, east, north))
+        frame, height = int(Frame.GLOBAL_RELATIVE_ALT), _round_to_thousandths(up - home.alt)
+        rally.append(MissionItem(number, int(Command.NAV_RALLY_POINT), frame, (0.0,) * 4, lat, lon, height))
     return Mission(
-        home=home, items=tuple(builder.items), rally=rally, cruise_speed=_round_to_thousandths(airspeed), source=source
+        home=home,
+        items=tuple(builder.items),
+        rally=tuple(rally),
+        cruise_speed=_round_to_thousandths(airspeed),
+        source=source,
     )
 
 
@@ -123,27 +133,6 @@ def _mission_positions(plan: Plan, procedures: DepartureAndApproach) -> Floats:
     return np.concatenate(parts)
 
 
-def _home_position(plan: Plan) -> Home:
-    """Return the scenario's home, or the ground below the start; the start itself if the ground is unknown."""
-    scenario, start = plan.scenario, plan.waypoints[0]
-    position = scenario.home if scenario.home is not None else start
-    lat, lon = to_geo(scenario.origin, position[:1], position[1:2])
-    ground = math.nan if scenario.terrain is None else float(scenario.terrain.height(position[0], position[1]))
-    altitude = float(position[2]) if math.isnan(ground) else ground
-    return Home(round_to_grid(float(lat[0])), round_to_grid(float(lon[0])), _round_to_thousandths(altitude))
-
-
-def _rally_items(origin: GeoOrigin, points: Floats, home: Home) -> Iterator[MissionItem]:
-    """Yield a mission item for each rally point, with a height above home, as ground stations write it.
-
-    points: (n, 3) m.
-    """
-    for number, (east, north, up) in enumerate(points.tolist()):
-        lat, lon = to_geo(origin, east, north)
-        position = round_to_grid(float(lat)), round_to_grid(float(lon)), _round_to_thousandths(up - home.alt)
-        yield MissionItem(number, int(Command.NAV_RALLY_POINT), int(Frame.GLOBAL_RELATIVE_ALT), (0.0,) * 4, *position)
-
-
 def acceptance_radii(
     scenario: Scenario, points: Floats, airspeed: float, max_bank: float, tracking: TrackingError | None
 ) -> Floats:
@@ -162,7 +151,12 @@ def acceptance_radii(
     waypoint.
     """
     if tracking is not None:
-        return _acceptance_radii_for_tracking(scenario, points, airspeed, tracking)
+        # Each radius is for the highest ground speed in the turn at its waypoint.
+        radii = np.full(len(points), tracking.corner_acceptance(0.0, airspeed))
+        speeds = corner_speeds(scenario, points, airspeed)
+        for index, (turn, speed) in enumerate(zip(turning_angles(points), speeds, strict=True), 1):
+            radii[index] = tracking.corner_acceptance(float(turn), speed)
+        return np.round(radii)
     wind = max(math.hypot(*scenario.wind.velocity_at(float(amsl))) for amsl in points[:, 2])
     turns, lateral_acceleration = turning_angles(points), GRAVITY * math.tan(max_bank)
     radii = np.full(len(points), ACCEPTANCE_TOLERANCE_M)
@@ -184,20 +178,6 @@ def _fly_by_offsets(turns: Floats, radius: float) -> Floats:
     radius: radius of the arcs, m.
     """
     return np.asarray(radius * (1.0 / np.cos(turns / 2.0) - 1.0))
-
-
-def _acceptance_radii_for_tracking(
-    scenario: Scenario, points: Floats, airspeed: float, tracking: TrackingError
-) -> Floats:
-    """Return the acceptance radii with the smallest tracking error of the autopilot, (w,) whole m.
-
-    Each radius is for the highest ground speed in the turn at its waypoint.
-    """
-    radii = np.full(len(points), tracking.corner_acceptance(0.0, airspeed))
-    speeds = corner_speeds(scenario, points, airspeed)
-    for index, (turn, speed) in enumerate(zip(turning_angles(points), speeds, strict=True), 1):
-        radii[index] = tracking.corner_acceptance(float(turn), speed)
-    return np.round(radii)
 
 
 def corner_speeds(scenario: Scenario, points: Floats, airspeed: float) -> list[float]:

@@ -25,7 +25,6 @@ from flight.mission.itinerary import (
     Itinerary,
     Loiter,
     OpenItem,
-    Position,
     RoutePoint,
     make_itinerary,
     pass_by_distance,
@@ -114,8 +113,8 @@ def place_stops(
     terrain: None if unknown; heights above terrain are then an error.
     itinerary: the mission's itinerary; None to make it.
     vertical_legs: True to accept a position straight above or below the previous one. It is placed
-        `VERTICAL_LEG_LENGTH_M` away, and the leg then fails the verdict's slope rule. False to raise an error for such
-        a position.
+        `VERTICAL_LEG_LENGTH_M` away; the verdict's slope rule judges the vertical leg. False to raise an error for
+        such a position.
     resets_jump_counters: see `flight.mission.itinerary.make_itinerary`.
 
     In the result successive stops are at least `SAME_POSITION_DISTANCE_M` apart horizontally; on a vertical leg they
@@ -403,7 +402,14 @@ def _place_stops(
         ):
             is_vertical = abs(placed_stop.map_position[2] - previous_altitude) >= SAME_POSITION_DISTANCE_M
             if vertical_legs and is_vertical and stop.command not in TAKEOFFS:
-                placed_stops.append(stop.placed_at(_vertical_leg_end(placed_stops, placed_stop.map_position[2])))
+                # The end of a vertical leg lies `VERTICAL_LEG_LENGTH_M` from its start, on the course of the last leg,
+                # or to the east without a leg.
+                last_positions, course = [placed.map_position for placed in placed_stops[-2:]], math.pi / 2.0
+                if len(last_positions) > 1:
+                    course = float(leg_courses(np.array(last_positions))[0])
+                east = last_positions[-1][0] + VERTICAL_LEG_LENGTH_M * math.sin(course)
+                north = last_positions[-1][1] + VERTICAL_LEG_LENGTH_M * math.cos(course)
+                placed_stops.append(stop.placed_at((east, north, placed_stop.map_position[2])))
                 continue
             merged_stop = _merge_stops(source, placed_stops[-1], placed_stop, notes)
             placed_stops[-1] = merged_stop.placed_at(placed_stops[-1].map_position)
@@ -463,28 +469,50 @@ class _AltitudeConverter:
         elif stop.frame in OVER_HOME:
             altitude = self.home_amsl() + stop.alt
         else:
-            altitude = self._ground_below(stop, east, north) + stop.alt
+            terrain = self.terrain
+            ground = math.nan if terrain is None else float(terrain.height(east, north))
+            if math.isnan(ground):
+                position_text = f"latitude {stop.lat_deg:.5f}, longitude {stop.lon_deg:.5f}"
+                request = f"{_stop_name(stop)}: height above terrain (frame {stop.frame}) at {position_text}"
+                no_terrain_text = "requires terrain; name an elevation file (--terrain)"
+                reason = no_terrain_text if terrain is None else f"{terrain.source} has no data there"
+                message = f"{self.source}: {request}: {reason}"
+                raise MissionError(message, file=self.source, field="frame", value=stop.frame)
+            altitude = ground + stop.alt
         if not MIN_ALTITUDE_M <= altitude <= MAX_ALTITUDE_M:
             allowed = f"allowed {MIN_ALTITUDE_M:.0f}..{MAX_ALTITUDE_M:.0f}"
             raise MissionError.at(self.source, _stop_name(stop), altitude, allowed, shown=f"{altitude:.1f} m AMSL")
         return altitude
 
-    def _ground_below(self, stop: RoutePoint, east: float, north: float) -> float:
-        """Return the altitude of the ground below a stop, m. Raises MissionError if it is unknown."""
-        terrain = self.terrain
-        ground = math.nan if terrain is None else float(terrain.height(east, north))
-        if math.isnan(ground):
-            position_text = f"latitude {stop.lat_deg:.5f}, longitude {stop.lon_deg:.5f}"
-            request = f"{self.source}: {_stop_name(stop)}: height above terrain (frame {stop.frame}) at {position_text}"
-            no_terrain_text = "requires terrain; name an elevation file (--terrain)"
-            reason = no_terrain_text if terrain is None else f"{terrain.source} has no data there"
-            raise MissionError(f"{request}: {reason}", file=self.source, field="frame", value=stop.frame)
-        return ground
-
     def home_amsl(self) -> float:
-        """Return the altitude from which heights above home are measured, m AMSL; it is determined only once."""
-        if self._home_amsl is None:
-            self._home_amsl = self._find_home_amsl(self.home)
+        """Return home's altitude, m AMSL: as stated, otherwise the ground at home, otherwise 0.
+
+        Heights above home are measured from it.  It is determined only once, with a note if it is not stated, or if it
+        is far from the ground at home.
+        """
+        if self._home_amsl is not None:
+            return self._home_amsl
+        home, ground = self.home, self.ground_at_home()
+        if not math.isnan(home.alt):
+            if abs(home.alt - ground) > HOME_ALTITUDE_TOLERANCE_M:
+                hint = "" if home.alt else ". Ground stations write 0 if no home was set"
+                shift_text = f"{abs(home.alt - ground):.0f} m {'lower' if home.alt > ground else 'higher'}"
+                self.notes.add(
+                    f"home is at {home.alt:.1f} m AMSL, but the ground there is at {ground:.1f} m AMSL, {shift_text}."
+                    " Heights above home are measured from home's altitude. After arming on that ground they are"
+                    f" {shift_text} than here. For a launch from that ground, set home to {ground:.1f} m AMSL{hint}"
+                )
+        elif math.isnan(ground):
+            self.notes.add(
+                "home has no altitude, and there is no terrain, so heights above home are measured from 0 m AMSL"
+            )
+            ground = 0.0
+        else:
+            self.notes.add(
+                "home has no altitude, so the altitude of the ground there is used:"
+                f" {ground:.1f} m AMSL at {home.lat_deg:.7f}, {home.lon_deg:.7f}"
+            )
+        self._home_amsl = ground if math.isnan(home.alt) else home.alt
         return self._home_amsl
 
     def landing_altitude(self, itinerary: Itinerary) -> float | None:
@@ -515,46 +543,6 @@ class _AltitudeConverter:
     def known_home_altitude(self) -> float:
         """Return the altitude of home, or of the ground at home, m AMSL; NaN if both are unknown."""
         return self.ground_at_home() if math.isnan(self.home.alt) else self.home.alt
-
-    def _find_home_amsl(self, home: Home) -> float:
-        """Return home's altitude, m AMSL: as stated, otherwise the ground at home, otherwise 0.
-
-        Add a note if the altitude is not stated, or if it is far from the ground at home.
-        """
-        ground = self.ground_at_home()
-        if not math.isnan(home.alt):
-            if abs(home.alt - ground) > HOME_ALTITUDE_TOLERANCE_M:
-                hint = "" if home.alt else ". Ground stations write 0 if no home was set"
-                shift_text = f"{abs(home.alt - ground):.0f} m {'lower' if home.alt > ground else 'higher'}"
-                self.notes.add(
-                    f"home is at {home.alt:.1f} m AMSL, but the ground there is at {ground:.1f} m AMSL, {shift_text}."
-                    " Heights above home are measured from home's altitude. After arming on that ground they are"
-                    f" {shift_text} than here. For a launch from that ground, set home to {ground:.1f} m AMSL{hint}"
-                )
-            return home.alt
-        if math.isnan(ground):
-            self.notes.add(
-                "home has no altitude, and there is no terrain, so heights above home are measured from 0 m AMSL"
-            )
-            return 0.0
-        self.notes.add(
-            "home has no altitude, so the altitude of the ground there is used:"
-            f" {ground:.1f} m AMSL at {home.lat_deg:.7f}, {home.lon_deg:.7f}"
-        )
-        return ground
-
-
-def _vertical_leg_end(stops: list[RoutePoint], up: float) -> Position:
-    """Return the end of a vertical leg after the last stop, at an altitude ``up``, m AMSL.
-
-    The end lies `VERTICAL_LEG_LENGTH_M` from the last stop, on the course of the last leg, or to the east if there is
-    no leg.
-    """
-    course = math.pi / 2.0
-    if len(stops) > 1:
-        course = float(leg_courses(np.array([stops[-2].map_position, stops[-1].map_position]))[0])
-    east, north, _ = stops[-1].map_position
-    return east + VERTICAL_LEG_LENGTH_M * math.sin(course), north + VERTICAL_LEG_LENGTH_M * math.cos(course), up
 
 
 def _merge_stops(source: str, previous: RoutePoint, stop: RoutePoint, notes: Notes) -> RoutePoint:
@@ -640,16 +628,53 @@ def implied_scenario(
     itinerary = make_itinerary(mission)
     origin = mission_origin(mission, itinerary.stops)
     points = project_stops(mission.source, itinerary.stops, origin)
-    area = _mission_area(mission, itinerary, origin, points)
-    terrain = None
+    # The area, (2, 2) [[west, east], [south, north]].  A return flies to home or a rally point from anywhere on the
+    # route.
+    targets = [(stop.lat_deg, stop.lon_deg) for stop in rally_stops(mission)]
+    targets += [] if mission.home is None else [(mission.home.lat_deg, mission.home.lon_deg)]
+    targets_on_map = np.stack(to_map(origin, *np.reshape(targets, (-1, 2)).T), axis=1)
+    is_near = np.hypot(*(targets_on_map - points[0]).T) <= _MAX_HOME_DISTANCE_M
+    positions = np.vstack([points, targets_on_map[is_near]])
+    margin = AREA_MARGIN_M + max(0.0 if stop.loiter is None else abs(stop.loiter.radius) for stop in itinerary.stops)
+    area = np.stack([positions.min(axis=0) - margin, positions.max(axis=0) + margin], axis=1)
+    area = np.clip(area, -MAP_EXTENT, MAP_EXTENT)
+    terrain, terrain_table = None, TerrainTable(kind="none")
     if terrain_path is not None:
         raster, (lat, lon) = open_raster(terrain_path), to_geo(origin, *points.T)
         if _covers_any(raster, lat, lon):
             terrain = read_terrain(raster, origin, area, GROUND_BUFFER)
         if terrain is None or not np.isfinite(terrain.height(points[:, 0], points[:, 1])).any():
             raise _coverage_error(terrain_path, raster, lat, lon)
+        path = str(Path(terrain_path).resolve()) if Path(terrain_path).is_file() else terrain_path
+        terrain_table = TerrainTable(kind="dem", path=path, sha256=terrain.sha256)
     placed_mission = place_stops(mission, origin, terrain, itinerary=itinerary, vertical_legs=vertical_legs)
-    spec = _make_spec(placed_mission, area, terrain_path, terrain, flight)
+    stop_positions = [stop.map_position for stop in placed_mission.stops]
+    highest = max(up for _, _, up in stop_positions)
+    highest = highest if terrain is None else max(highest, float(np.nanmax(terrain.heights)))
+    start, destination = (
+        EndTable(
+            east_m=east,
+            north_m=north,
+            amsl_m=up if terrain is None else max(up, float(terrain.height(east, north)) + 1.0),
+        )
+        for east, north, up in (stop_positions[0], stop_positions[-1])
+    )
+    file_name = re.split(r"[/\\]", mission.source)[-1]
+    name = "".join(character if character.isprintable() else "?" for character in file_name)
+    spec = ScenarioFile(
+        name=name[:100] or "mission",
+        description="Made around a mission that came without a scenario",
+        origin=OriginTable(lat_deg=origin.lat_deg, lon_deg=origin.lon_deg),
+        terrain=terrain_table,
+        area=AreaTable(
+            east_m=area[0].tolist(),
+            north_m=area[1].tolist(),
+            ceiling_amsl_m=min(highest + AREA_MARGIN_M, MAX_ALTITUDE_M),
+        ),
+        start=start,
+        destination=destination,
+        flight=flight or FlightTable(aircraft_by_default=True),
+    )
     return ImpliedScenario(scenario_from_spec(spec, mission.source, ground=terrain, external=True), placed_mission)
 
 
@@ -676,24 +701,6 @@ def mission_origin(mission: Mission, stops: tuple[RoutePoint, ...]) -> GeoOrigin
     return origin
 
 
-def _mission_area(mission: Mission, itinerary: Itinerary, origin: GeoOrigin, points: Floats) -> Floats:
-    """Return the area around a mission, (2, 2) [[west, east], [south, north]], m.
-
-    points: positions of the mission's stops, (n, 2) m.
-    """
-    stops, home = itinerary.stops, mission.home
-    margin = AREA_MARGIN_M + max(abs(stop.loiter.radius) if stop.loiter is not None else 0.0 for stop in stops)
-    # A return flies to home or a rally point from anywhere on the route.
-    targets = [(stop.lat_deg, stop.lon_deg) for stop in rally_stops(mission)]
-    targets += [] if home is None else [(home.lat_deg, home.lon_deg)]
-    lats, lons = np.reshape(targets, (-1, 2)).T
-    targets_on_map = np.stack(to_map(origin, lats, lons), axis=1)
-    is_near = np.hypot(*(targets_on_map - points[0]).T) <= _MAX_HOME_DISTANCE_M
-    positions = np.vstack([points, targets_on_map[is_near]])
-    area = np.stack([positions.min(axis=0), positions.max(axis=0)], axis=1)
-    return np.clip(area + np.array([-margin, margin]), -MAP_EXTENT, MAP_EXTENT)
-
-
 def _coverage_error(path: str, raster: RasterFile, lat: Floats, lon: Floats) -> TerrainError:
     """Return the error for an elevation file without data at all positions of a mission, as in another region's file.
 
@@ -718,48 +725,3 @@ def _covers_any(raster: RasterFile, lat: Floats, lon: Floats) -> bool:
     (cols, rows), (row_count, col_count) = raster.to_pixels(lon, lat), raster.shape
     # False for a position that the file's coordinate system cannot express (NaN or inf).
     return bool(((cols >= 0.0) & (cols <= col_count - 1.0) & (rows >= 0.0) & (rows <= row_count - 1.0)).any())
-
-
-def _make_spec(
-    placed_mission: PlacedMission,
-    area: Floats,
-    terrain_path: str | None,
-    terrain: Terrain | None,
-    flight: FlightTable | None,
-) -> ScenarioFile:
-    """Return the tables of the scenario around a mission.
-
-    area: [[west, east], [south, north]], (2, 2) m.
-    terrain_path, terrain: an elevation file or a built-in name, and its terrain in the area; None for no terrain.
-    flight: the [flight] table; None for the defaults.
-    """
-    origin, stops, terrain_table = placed_mission.origin, placed_mission.stops, TerrainTable(kind="none")
-    max_altitude = max(placed_stop.map_position[2] for placed_stop in stops)
-    if terrain_path is not None and terrain is not None:
-        max_altitude = max(max_altitude, float(np.nanmax(terrain.heights)))
-        path = str(Path(terrain_path).resolve()) if Path(terrain_path).is_file() else terrain_path
-        terrain_table = TerrainTable(kind="dem", path=path, sha256=terrain.sha256)
-    file_name = re.split(r"[/\\]", placed_mission.mission.source)[-1]
-    name = "".join(character if character.isprintable() else "?" for character in file_name)
-    return ScenarioFile(
-        name=name[:100] or "mission",
-        description="Made around a mission that came without a scenario",
-        origin=OriginTable(lat_deg=origin.lat_deg, lon_deg=origin.lon_deg),
-        terrain=terrain_table,
-        area=AreaTable(
-            east_m=area[0].tolist(),
-            north_m=area[1].tolist(),
-            ceiling_amsl_m=min(max_altitude + AREA_MARGIN_M, MAX_ALTITUDE_M),
-        ),
-        start=_end_table_above_ground(stops[0].map_position, terrain),
-        destination=_end_table_above_ground(stops[-1].map_position, terrain),
-        flight=flight or FlightTable(aircraft_by_default=True),
-    )
-
-
-def _end_table_above_ground(position: Position, terrain: Terrain | None) -> EndTable:
-    """Return the scenario table of a start or destination, raised to at least 1 m above the ground."""
-    east, north, amsl = position
-    if terrain is not None:
-        amsl = max(amsl, float(terrain.height(east, north)) + 1.0)
-    return EndTable(east_m=east, north_m=north, amsl_m=amsl)

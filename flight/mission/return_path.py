@@ -350,7 +350,14 @@ def rtl_note(target: ReturnTarget, rules: ReturnRules, start_altitude: float, co
     if -altitude_gain >= 1.0 and abs(target.slope_base - altitude_gain) < rules.min_slope_height:
         altitude_text = f"descending {-altitude_gain:.0f} m at once to"
     if rules.holds_height:
-        altitude_text = _held_altitude_text(target, start_altitude)
+        # The RTL descends only at its destination; the end altitude follows the text.
+        first_climb, sink = target.transit_altitude - start_altitude, target.transit_altitude - target.position[2]
+        sink_text = f"descending {sink:.0f} m in a loiter there, to" if sink >= 1.0 else ""
+        if first_climb < 1.0:
+            altitude_text = f"level, and {sink_text}" if sink_text else "at"
+        else:
+            altitude_text = f"climbing {first_climb:.0f} m first, to"
+            altitude_text += f" {target.transit_altitude:.0f} m AMSL, and {sink_text}" if sink_text else ""
     elif abs(altitude_gain) < 1.0:
         altitude_text = "at"
     climb_text = ""
@@ -372,19 +379,6 @@ def rtl_note(target: ReturnTarget, rules: ReturnRules, start_altitude: float, co
         f" {altitude_text}"
         f" {target.position[2]:.0f} m AMSL{climb_text}; {end_text}"
     )
-
-
-def _held_altitude_text(target: ReturnTarget, start_altitude: float) -> str:
-    """Describe the altitude changes of an RTL that descends only at its destination.
-
-    The caller appends the end altitude to the text.
-    """
-    first_climb, sink = target.transit_altitude - start_altitude, target.transit_altitude - target.position[2]
-    sink_text = f"descending {sink:.0f} m in a loiter there, to"
-    if first_climb < 1.0:
-        return f"level, and {sink_text}" if sink >= 1.0 else "at"
-    climb_text = f"climbing {first_climb:.0f} m first, to"
-    return f"{climb_text} {target.transit_altitude:.0f} m AMSL, and {sink_text}" if sink >= 1.0 else climb_text
 
 
 def rtl_waypoints(
@@ -426,7 +420,20 @@ def rtl_waypoints(
     )
     if _distance(start, target.position) <= abs(radius) + _MIN_TANGENT_M:
         # The RTL starts inside its loiter: fly straight on to the circle.
-        builder.add_loiter(*_rim_point_ahead(start, course, circle))
+        offset_east, offset_north = start[0] - circle.east, start[1] - circle.north
+        distance_past_center = offset_east * math.sin(course) + offset_north * math.cos(course)
+        distance = -distance_past_center + math.sqrt(
+            max(
+                0.0,
+                distance_past_center * distance_past_center
+                + circle.arc_radius * circle.arc_radius
+                - offset_east * offset_east
+                - offset_north * offset_north,
+            )
+        )
+        east, north = start[0] + distance * math.sin(course), start[1] + distance * math.cos(course)
+        bearing = math.atan2(east - circle.east, north - circle.north)
+        builder.add_loiter(east, north, bearing + math.copysign(0.5 * math.pi, circle.arc_radius))
         return builder.points
     course = builder.add_gentle_turn(course, rules)
     builder.add_turn(course)
@@ -497,19 +504,15 @@ class _ReturnBuilder:
         end_course = course + math.copysign(sweep, node.arc_radius)
         self._add_waypoint(*point_on_circle(node, end_course), 0.0)
         if sweep == full_sweep and self._first_climb_altitude > self._circle.up:
-            self._add_climb_leg(tangent)
+            # The straight leg on which the first climb ends, or the leg to the loiter if that is nearer.
+            east, north = point_on_circle(self._circle, tangent)
+            length = (self._first_climb_altitude - self._position[2]) / self._ability.climb_slope
+            length = min(length, math.hypot(east - self._position[0], north - self._position[1]) - _MIN_TANGENT_M)
+            if length > _MIN_TANGENT_M:
+                east = self._position[0] + length * math.sin(tangent)
+                self._add_waypoint(east, self._position[1] + length * math.cos(tangent), 0.0)
         self._first_climb_altitude, self._slope_start = -math.inf, self._position
         return tangent if sweep == full_sweep else end_course
-
-    def _add_climb_leg(self, course: float) -> None:
-        """Add the straight leg on which the first climb ends, or the leg to the loiter if that is nearer."""
-        east, north = point_on_circle(self._circle, course)
-        length = (self._first_climb_altitude - self._position[2]) / self._ability.climb_slope
-        length = min(length, math.hypot(east - self._position[0], north - self._position[1]) - _MIN_TANGENT_M)
-        if length > _MIN_TANGENT_M:
-            self._add_waypoint(
-                self._position[0] + length * math.sin(course), self._position[1] + length * math.cos(course), 0.0
-            )
 
     def add_turn(self, course: float) -> None:
         """Add the turn to the target, the straight leg to the target, and the loiter there."""
@@ -526,11 +529,7 @@ class _ReturnBuilder:
                 self._add_waypoint(*point_on_circle(node, leg_course), 0.0)
             else:
                 leg_course = tangent_course(point, self._circle)
-        self._add_slope_break(leg_course)
-        self.add_loiter(*point_on_circle(self._circle, leg_course), leg_course)
-
-    def _add_slope_break(self, leg_course: float) -> None:
-        """Add a waypoint on the straight leg where a climb or altitude step ends, or where the descent starts."""
+        # A waypoint on the straight leg where a climb or altitude step ends, or where the descent starts.
         join_point = point_on_circle(self._circle, leg_course)
         leg_length = math.hypot(join_point[0] - self._position[0], join_point[1] - self._position[1])
         if self._altitude_difference > 0.0:
@@ -548,6 +547,7 @@ class _ReturnBuilder:
                 for start, end in zip(self._position[:2], join_point, strict=True)
             )
             self._add_waypoint(east, north, 0.0)
+        self.add_loiter(*join_point, leg_course)
 
     def add_loiter(self, east: float, north: float, course: float) -> None:
         """Add the leg to a point on the circle, and the loiter until its altitude and its time are reached.
@@ -655,23 +655,15 @@ class _ReturnBuilder:
         if climb_altitude >= altitude:
             altitude = min(climb_altitude, altitude + self._ability.climb_slope * distance)
         else:
-            target_altitude = self._circle.up if on_circle else self._slope_altitude(east, north)
+            target_altitude = self._circle.up
+            if not on_circle and not self._is_altitude_step:
+                # On the slope to the target.
+                remaining_fraction = 1.0 - min(1.0, max(0.0, self._slope_fraction(east, north)))
+                slope_height = self._slope_start[2] - target_altitude + self._slope_base
+                target_altitude = min(self._slope_start[2], target_altitude + remaining_fraction * slope_height)
             altitude = max(min(altitude, target_altitude), altitude - self._dive_slope * distance)
         self._position = (east, north, altitude)
         self.points.append(self._stop.placed_at(self._position, arc))
-
-    def _slope_altitude(self, east: float, north: float) -> float:
-        """Return the altitude of the slope to the target at a position, m AMSL.
-
-        If the altitude changes in a step, the result is the target's altitude.
-        """
-        start_altitude, end_altitude = self._slope_start[2], self._circle.up
-        if self._is_altitude_step:
-            return end_altitude
-        remaining_fraction = 1.0 - min(1.0, max(0.0, self._slope_fraction(east, north)))
-        return min(
-            start_altitude, end_altitude + remaining_fraction * (start_altitude - end_altitude + self._slope_base)
-        )
 
     def _slope_fraction(self, east: float, north: float) -> float:
         """Return the fraction of the slope to the target that is already flown at a position.
@@ -683,29 +675,6 @@ class _ReturnBuilder:
         return ((east - start_east) * slope_east + (north - start_north) * slope_north) / max(
             1e-6, slope_east**2 + slope_north**2
         )
-
-
-def _rim_point_ahead(position: Position, course: float, circle: RoutePoint) -> tuple[float, float, float]:
-    """Return the point at which a straight path from inside a circle meets the circle: east and north, m.
-
-    course: course of the straight path, rad.
-
-    The third value is the course along the circle at this point, rad.
-    """
-    offset_east, offset_north = position[0] - circle.east, position[1] - circle.north
-    distance_past_center = offset_east * math.sin(course) + offset_north * math.cos(course)
-    distance = -distance_past_center + math.sqrt(
-        max(
-            0.0,
-            distance_past_center * distance_past_center
-            + circle.arc_radius * circle.arc_radius
-            - offset_east * offset_east
-            - offset_north * offset_north,
-        )
-    )
-    east, north = position[0] + distance * math.sin(course), position[1] + distance * math.cos(course)
-    bearing = math.atan2(east - circle.east, north - circle.north)
-    return east, north, bearing + math.copysign(0.5 * math.pi, circle.arc_radius)
 
 
 def _course(start: Position, end: Position) -> float:

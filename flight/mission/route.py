@@ -483,12 +483,6 @@ def route_through_stops(
     """Return the route through the stops of a mission that are placed on the map; arguments as for `make_route`.
 
     Raises MissionError for fewer than two stops, or for a loiter too wide or too long to lay out.
-
-    >>> from flight.mission.items import Command, Frame, MissionItem
-    >>> items = [MissionItem(k, Command.NAV_WAYPOINT, Frame.GLOBAL, (0.0,) * 4, 36.5 + k, 8.0, 700.0) for k in (0, 1)]
-    >>> placed = place_stops(Mission(None, tuple(items)), GeoOrigin(36.5, 8.0), None)
-    >>> route_through_stops(placed, 25.0, fly_over=False).leg_airspeeds.tolist()
-    [25.0]
     """
     mission, itinerary, notes = placed_mission.mission, placed_mission.itinerary, Notes()
     return_rules, loiter_rules, reads_as_px4, turn_distance, acceptance_limit = rules
@@ -517,7 +511,21 @@ def route_through_stops(
     if len(points) < 2:
         message = f"{mission.source}: {len(points)} position to fly to: expected at least two different positions"
         raise MissionError(message, file=mission.source)
-    records = _point_records(points, acceptance_limit, placed_mission.home_up)
+    home_up = placed_mission.home_up
+    records = route_points(
+        [point.map_position for point in points],
+        [point.airspeed for point in points[1:]],
+        acceptance_radius=np.minimum([point.acceptance_radius for point in points], acceptance_limit),
+        item=[point.item for point in points],
+        arc_radius=[point.arc_radius for point in points],
+        stop=np.cumsum([False, *(point.stop != next_point.stop for point, next_point in pairwise(points))]),
+        # Only the leg to a place above terrain holds a height above ground.
+        above_ground=[
+            point.alt if point.frame in OVER_TERRAIN and point.command in PLACES else NOT_STATED for point in points
+        ],
+        min_ground_speed=[point.min_ground_speed for point in points],
+        home_up=[home_up if math.isnan(point.home_up) else point.home_up for point in points],
+    )
     is_missed = fly_over_waypoints(records, limits, turn_distance)
     records["fly_over"] = (records["arc_radius"] == 0.0) & (fly_over | is_missed)
     _note_cruise_speed(mission, default_airspeed, points[1], notes)
@@ -539,28 +547,6 @@ def route_through_stops(
         unjoined_stops=unjoined if loiter_rules.steers_to_center else (),
         open_items=open_items,
         **return_fields,
-    )
-
-
-def _point_records(points: list[RoutePoint], acceptance_limit: float, home_up: float) -> Records:
-    """Convert placed points to `ROUTE_POINT` records; the field `fly_over` is not set.
-
-    acceptance_limit: maximum acceptance radius that the autopilot accepts from an item, m.
-    home_up: altitude of home for a point that states none, m AMSL.
-    """
-    return route_points(
-        [point.map_position for point in points],
-        [point.airspeed for point in points[1:]],
-        acceptance_radius=np.minimum([point.acceptance_radius for point in points], acceptance_limit),
-        item=[point.item for point in points],
-        arc_radius=[point.arc_radius for point in points],
-        stop=np.cumsum([False, *(point.stop != next_point.stop for point, next_point in pairwise(points))]),
-        # Only the leg to a place above terrain holds a height above ground.
-        above_ground=[
-            point.alt if point.frame in OVER_TERRAIN and point.command in PLACES else NOT_STATED for point in points
-        ],
-        min_ground_speed=[point.min_ground_speed for point in points],
-        home_up=[home_up if math.isnan(point.home_up) else point.home_up for point in points],
     )
 
 
@@ -718,7 +704,10 @@ def _insert_gates(placed_mission: PlacedMission, notes: Notes) -> list[RoutePoin
                 continue
             start, end = np.array(previous.map_position), np.array(next_stop.map_position)
             gate_position = to_map(placed_mission.origin, gate.lat_deg, gate.lon_deg)
-            if gate.switches_camera and _distance_to_line(start, end, gate_position) > _MAX_GATE_DISTANCE_M:
+            (leg_east, leg_north), offset = (end - start)[:2], np.array(gate_position, dtype=float) - start[:2]
+            gate_distance = abs(float(leg_east * offset[1] - leg_north * offset[0]))
+            gate_distance /= max(math.hypot(leg_east, leg_north), 1e-9)
+            if gate.switches_camera and gate_distance > _MAX_GATE_DISTANCE_M:
                 distance_text = f"passed at more than {_MAX_GATE_DISTANCE_M:g} m"
                 notes.add(f"{distance_text}, because {GATES_ARE_NO_WAYPOINTS}", gate.item)
             # PX4 passes a gate at the vertical plane through its position, perpendicular to the line to the leg's end.
@@ -741,12 +730,6 @@ def _insert_gates(placed_mission: PlacedMission, notes: Notes) -> list[RoutePoin
                 placed_stops.append(gate_stop.placed_at((east, north, up)))
         placed_stops.append(next_stop)
     return placed_stops
-
-
-def _distance_to_line(start: Floats, end: Floats, position: tuple[Any, Any]) -> float:
-    """Return the horizontal distance of a position (east, north, m) from the line through two points, m."""
-    (east, north), (offset_east, offset_north) = (end - start)[:2], np.array(position, dtype=float) - start[:2]
-    return abs(float(east * offset_north - north * offset_east)) / max(math.hypot(east, north), 1e-9)
 
 
 def _read_stops(

@@ -281,14 +281,11 @@ def _items_with_turn_arounds(line: _Line, turn_around: float, lead_in: float, or
         exit_waypoint = _make_waypoint(point_items[-1], line.corners[-1] + turn_around * exit_direction, origin)
         return [*items, *line.items, exit_waypoint]
     # No autopilot flies to a gate: without waypoints beyond the line, its gates must become waypoints.
-    return [*items, *(_as_waypoint(item) if _is_line_point(item, line.flown) else item for item in line.items)]
-
-
-def _as_waypoint(item: MissionItem) -> MissionItem:
-    """Return a gate as a waypoint at the same position; any other item is unchanged."""
-    if item.command != Command.CONDITION_GATE:
-        return item
-    return replace(item, command=int(Command.NAV_WAYPOINT), params=(0.0, 0.0, 0.0, math.nan))
+    for item in line.items:
+        is_gate = item.command == Command.CONDITION_GATE and _is_line_point(item, line.flown)
+        params = (0.0, 0.0, 0.0, math.nan)
+        items.append(replace(item, command=int(Command.NAV_WAYPOINT), params=params) if is_gate else item)
+    return items
 
 
 def _make_waypoint(model_item: MissionItem, position: Floats, origin: GeoOrigin) -> MissionItem:

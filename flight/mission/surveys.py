@@ -234,22 +234,6 @@ def survey_plan(mission: Mission, photo_spacing: float) -> SurveyPlan | None:
     return next((plan for plan in mission.survey_plans if plan.photo is None), None)
 
 
-def _max_ground_speed(
-    route: Route, legs: Sequence[int], wind: Wind, airspeed_factor: Callable[[float], float]
-) -> float:
-    """Return the highest ground speed on legs with the mean wind, m/s; NaN if none of their courses can be held.
-
-    legs: indices of the legs.
-    airspeed_factor: function of the altitude, m AMSL, that returns the ratio of the true airspeed to the route's.
-    """
-    courses, speeds = leg_courses(route.positions), []
-    for leg in legs:
-        altitude = float(route.positions[leg : leg + 2, 2].mean())
-        tailwind, crosswind = wind.components_on_course(float(courses[leg]), altitude)
-        speeds.append(ground_speed(float(route.leg_airspeeds[leg]) * airspeed_factor(altitude), tailwind, crosswind))
-    return max((speed for speed in speeds if not math.isnan(speed)), default=math.nan)
-
-
 def camera_notes(
     mission: Mission, route: Route, wind: Wind, airspeed_factor: Callable[[float], float]
 ) -> tuple[str, ...]:
@@ -257,7 +241,7 @@ def camera_notes(
 
     airspeed_factor: function of the altitude, m AMSL, that returns the ratio of the true airspeed to the route's.
     """
-    notes, spacings = [], camera_spacing(mission, route)[:-1]
+    notes, spacings, courses = [], camera_spacing(mission, route)[:-1], leg_courses(route.positions)
     for plan in dict.fromkeys(mission.survey_plans):
         photo_spacing = plan.photo or 0.0
         legs = np.flatnonzero(np.abs(spacings - photo_spacing) <= _PHOTO_SPACING_TOLERANCE_M).tolist()
@@ -269,8 +253,14 @@ def camera_notes(
             notes.append(f"{text}, but the settings of its camera in the file state {stated_text}")
         if plan.camera is None or plan.camera.interval <= 0.0:
             continue
-        speed = _max_ground_speed(route, legs, wind, airspeed_factor)
-        # The speed is NaN if it is unknown.
+        # The highest ground speed in the mean wind; NaN if none of the courses can be held.
+        speeds = []
+        for leg in legs:
+            altitude = float(route.positions[leg : leg + 2, 2].mean())
+            tailwind, crosswind = wind.components_on_course(float(courses[leg]), altitude)
+            airspeed = float(route.leg_airspeeds[leg]) * airspeed_factor(altitude)
+            speeds.append(ground_speed(airspeed, tailwind, crosswind))
+        speed = max((speed for speed in speeds if not math.isnan(speed)), default=math.nan)
         if photo_spacing < plan.camera.interval * speed:
             notes.append(
                 f"the camera takes one photo per {plan.camera.interval:g} s; the trigger distance of"
@@ -570,7 +560,13 @@ def _make_survey(
     points, (run_start, run_end) = runs.points, runs.ends(chain[0])
     midpoints = np.array([runs.midpoint(line) for line in chain])
     _, offsets, _ = LineAxis(points[run_start : run_end + 1]).project(midpoints)
-    gaps = _line_gaps(np.sort(offsets))
+    # Gaps between lines; a line flown twice counts once.
+    all_gaps = [float(gap) for gap in np.diff(np.sort(offsets)) if gap >= _MIN_LINE_SPACING_M]
+    gaps = []
+    for k, gap in enumerate(all_gaps):
+        adjacent = [*all_gaps[max(0, k - 1) : k], *all_gaps[k + 1 : k + 2]]
+        if not adjacent or gap > _DUPLICATE_LINE_FRACTION * min(adjacent):
+            gaps.append(gap)
     if len(gaps) + 1 < (_MIN_LINES_WITH_PHOTOS if camera.any() else _MIN_LINES):
         return None
     lines = tuple(_make_photo_line(runs.ends(line), camera) for line in chain)
@@ -584,17 +580,6 @@ def _make_survey(
     first_leg = points[run_start + 1, :2] - points[run_start, :2]
     course = math.atan2(*first_leg)
     return Survey(lines, course, tuple((offsets - offsets[0]).tolist()), float(np.median(gaps)))
-
-
-def _line_gaps(positions: Floats) -> list[float]:
-    """Return the gaps between lines at sorted lateral positions (n,), m; a line flown twice counts once."""
-    gaps = [float(gap) for gap in np.diff(positions) if gap >= _MIN_LINE_SPACING_M]
-    neighbors = [[gaps[k] for k in (i - 1, i + 1) if 0 <= k < len(gaps)] for i in range(len(gaps))]
-    return [
-        gap
-        for gap, adjacent in zip(gaps, neighbors, strict=True)
-        if not adjacent or gap > _DUPLICATE_LINE_FRACTION * min(adjacent)
-    ]
 
 
 def _make_photo_line(run: tuple[int, int], camera: Floats) -> PhotoLine:

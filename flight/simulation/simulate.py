@@ -14,7 +14,7 @@ import numpy as np
 
 from aircraft.catalog import Aircraft
 from aircraft.contacts import Gear, find_contacts
-from aircraft.path_limits import Limits, ground_speed_on
+from aircraft.path_limits import ground_speed_on
 from flight.autopilots.parts import ControlLaw
 from flight.dynamics.compiled_model import PROOF_STEPS, CompiledModel
 from flight.dynamics.fdm import JSBSIM_VERSION, Fdm, Variation
@@ -265,25 +265,19 @@ class Ground:
         self.terrain = terrain
         self.heights: Heights
         if terrain is None:
-            self.heights, self.to_pixel = np.full((2, 2), np.nan, dtype=np.float32), _map_outside_raster()
+            self.heights = np.full((2, 2), np.nan, dtype=np.float32)
             # Lock it like a terrain's array, because locked arrays are a different type for compiled code.
             self.heights.setflags(write=False)
+            # Every position maps to a pixel outside any raster.
+            self.to_pixel = fit_polymap(
+                lambda x, y: (np.full_like(x, -9.0), np.full_like(y, -9.0)), [[-1.0, 1.0], [-1.0, 1.0]], 1e-6
+            )
         else:
             self.heights, self.to_pixel = terrain.heights, terrain.to_pixel
 
     def height(self, east: float, north: float) -> float:
         """Return the ground altitude at a map position, m; NaN if unknown."""
         return math.nan if self.terrain is None else float(self.terrain.height(east, north))
-
-
-def _map_outside_raster() -> PolyMap:
-    """Return a map from positions to pixels that stands for missing terrain: every pixel is outside any raster."""
-
-    def outside_pixel(x: Floats, y: Floats) -> tuple[Floats, Floats]:
-        """Return a pixel outside any raster for each position."""
-        return np.full_like(x, -9.0), np.full_like(y, -9.0)
-
-    return fit_polymap(outside_pixel, [[-1.0, 1.0], [-1.0, 1.0]], 1e-6)
 
 
 # ----------------------------------------------------------------------
@@ -528,17 +522,12 @@ class RunningFlight:
             if status:
                 end_reason = ENDS[status]
             elif remaining_ticks <= ticks:
-                end_reason = self._timeout_text()
+                end_reason = f"time limit of {self.max_ticks * self.dt:.0f} s reached"
+                route, next_waypoint = self.setup.route, min(int(self.guidance_memory.leg) + 1, self.setup.route.legs)
+                if route.arc_radii[next_waypoint] > 0.0 and route.rtl_start is None:
+                    end_reason += f" in the loiter of item {route.items[next_waypoint]}"
             count -= ticks
         return (row_blocks[0] if len(row_blocks) == 1 else join_rows(row_blocks)), end_reason
-
-    def _timeout_text(self) -> str:
-        """Return the end reason of a flight that exceeded its time limit; it names the item of a current loiter."""
-        route, next_waypoint = self.setup.route, min(int(self.guidance_memory.leg) + 1, self.setup.route.legs)
-        text = f"time limit of {self.max_ticks * self.dt:.0f} s reached"
-        if route.arc_radii[next_waypoint] > 0.0 and route.rtl_start is None:
-            return f"{text} in the loiter of item {route.items[next_waypoint]}"
-        return text
 
 
 def _time_limit(setup: FlightSetup, path: FlyByPath, waypoints: Records, airspeeds: Floats) -> float:
@@ -548,7 +537,15 @@ def _time_limit(setup: FlightSetup, path: FlyByPath, waypoints: Records, airspee
     airspeeds: airspeed on each leg, m/s.
     """
     length = path.length + _extra_loiter_length(setup, waypoints)
-    ground_speed = _min_ground_speed(setup, airspeeds)
+    # The lowest ground speed on any leg in the mean wind; a default if no leg can be flown.
+    positions, courses = setup.route.positions, leg_courses(setup.route.positions)
+    tables = {airspeed: setup.limits.performance(airspeed) for airspeed in set(airspeeds.tolist())}
+    speeds = [
+        float(ground_speed_on(tables[airspeed], courses[leg], up))
+        for leg, airspeed in enumerate(airspeeds.tolist())
+        for up in positions[leg : leg + 2, 2]
+    ]
+    ground_speed = float(np.nanmin(speeds)) if np.isfinite(speeds).any() else MIN_GROUND_SPEED_MPS
     if (wind_field := setup.scenario.wind.field) is not None:
         # Allow for the largest deviation of the forecast's wind from the mean wind around the flight.
         longest_time = TIME_LIMIT_FACTOR * length / MIN_GROUND_SPEED_MPS + TIME_LIMIT_BASE_S
@@ -600,21 +597,6 @@ def _extra_loiter_length(setup: FlightSetup, waypoints: Records) -> float:
             )
             extra_lengths[int(waypoint["item"])] = max(extra_length, extra_lengths.get(int(waypoint["item"]), 0.0))
     return sum(extra_lengths.values())
-
-
-def _min_ground_speed(setup: FlightSetup, airspeeds: Floats) -> float:
-    """Return the lowest ground speed on any leg in the mean wind, m/s; a default if no leg can be flown.
-
-    airspeeds: airspeed on each leg, m/s.
-    """
-    limits: Limits = setup.limits
-    points, courses = setup.route.positions, leg_courses(setup.route.positions)
-    tables = {airspeed: limits.performance(airspeed) for airspeed in set(airspeeds.tolist())}
-    speeds = []
-    for leg, airspeed in enumerate(airspeeds.tolist()):
-        table = tables[airspeed]
-        speeds += [float(ground_speed_on(table, courses[leg], up)) for up in points[leg : leg + 2, 2]]
-    return float(np.nanmin(speeds)) if np.isfinite(speeds).any() else MIN_GROUND_SPEED_MPS
 
 
 def _find_wind(setup: FlightSetup, position: Sequence[float], convergence: float) -> tuple[float, float, float]:

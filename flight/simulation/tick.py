@@ -3,7 +3,8 @@
 A tick converts the state to SI units and to the map, looks up the ground and adds the navigation error (`begin_tick`);
 then an autopilot's control law fills in the commands; the tick ends with the next wind, a row of the track and the
 outputs to JSBSim (`end_tick`). Every autopilot has a compiled tick of its own, which consists of these two parts and
-its control law.
+its control law, and a compiled loop of such ticks, which reads the state (`read_state`) and steps the compiled model
+(`advance_model`).
 """
 
 import math
@@ -13,13 +14,15 @@ import numpy as np
 from numba import literal_unroll
 from numpy.typing import NDArray
 
+from flight.dynamics.compiled_frame import CODE_END, READS_START, STEPS, WRITES_START, step
+from flight.dynamics.instructions import Code
 from flight.dynamics.state import COMMANDS, STATE
 from flight.guidance.equivalent_airspeed import eas_to_tas_ratio
 from flight.guidance.gains import GAINS, Gains
 from flight.guidance.inner_loops import GUIDANCE_MEMORY
 from flight.guidance.lateral_reference_laws import WAYPOINT
 from flight.guidance.navigation_error import MOTION, NAVIGATION_LAGS, estimate_motion
-from flight.guidance.path import NODE, PIECE, FlyByPath, Records
+from flight.guidance.path import NODE, PIECE, FlyByPath
 from flight.mission.itinerary import ENDLESS_LOITER_TIME_S
 from flight.simulation.track import AILERON, ELEVATOR, RUDDER, THROTTLE, TRACK_ROW
 from flight.simulation.turbulence import GUST_FILTERS, step_gusts
@@ -27,7 +30,7 @@ from world.arrays import Floats, Heights
 from world.forecast.wind_field import WindField, interpolate_field
 from world.frames import POLYMAP, polymap
 from world.geometry import wrap
-from world.kernels import Record, compiled, field_names, inner, record_dtype
+from world.kernels import Record, Records, compiled, field_names, inner, record_dtype
 from world.terrain import pixel_height
 from world.wind import mean_wind_speed
 
@@ -580,3 +583,41 @@ def _fill_wind(row: Record, state: Record, convergence_cos: float, convergence_s
     wind[0] = state.wind_east * convergence_cos + state.wind_north * convergence_sin
     wind[1] = state.wind_north * convergence_cos - state.wind_east * convergence_sin
     wind[2] = -state.wind_down
+
+
+# ----------------------------------------------------------------------
+# Exchange of the state and the commands of a tick with the compiled model, within the compiled loop of a control law.
+
+_WORKSPACE_FIELDS: Any = WORKSPACE.fields
+# Indices of the first numbers of the state and of the outputs in a workspace's block.
+_STATE_OFFSET = int(_WORKSPACE_FIELDS["state"][1]) // 8
+_OUTPUT_OFFSET = int(_WORKSPACE_FIELDS["output"][1]) // 8
+
+
+@inner
+def read_state(block: Floats, registers: Floats, code: Code) -> None:
+    """Copy the state of the compiled model to the block of a workspace, in JSBSim's units.
+
+    block: numbers of the flight's workspace.
+    registers: values of the compiled model.
+    code: program of the compiled model, which lists the registers to read.
+    """
+    first_read = code[READS_START]
+    for k in range(code[WRITES_START] - first_read):
+        block[_STATE_OFFSET + k] = registers[code[first_read + k]]
+
+
+@inner
+def advance_model(
+    block: Floats, frame: Record, registers: Floats, code: Code, contacts: Records, frictions: Records
+) -> None:
+    """Copy the autopilot's outputs to the compiled model's registers, and step the model to the next tick.
+
+    block: numbers of the flight's workspace, which contain the outputs in JSBSim's units.
+    registers, code: values and program of the compiled model.
+    """
+    first_write = code[WRITES_START]
+    for k in range(code[CODE_END] - first_write):
+        registers[code[first_write + k]] = block[_OUTPUT_OFFSET + k]
+    for _ in range(code[STEPS]):
+        step(frame, registers, code, contacts, frictions)

@@ -69,19 +69,33 @@ def judge_flight(
     findings = run_rules(air_requirements, aligned, end_reason=end_reason, log_complete=log_complete)
     complete = all(finding.ok is True for finding in findings if finding.rule == "completion")
     unjudged = undecided_text(findings)
-    flyable = complete and not unjudged and not any(finding.ok is False for finding in findings)
+    flyable = complete and not unjudged and not _has_failed(findings)
     if findings_only:
         return Verdict(findings, flyable, complete, (), "flown", unjudged=unjudged)
     findings = with_suggestions(air_requirements, aligned, findings)
-    levels: tuple[LevelAnswer, ...] = ()
+    notes, levels = setup_notes(setup, findings), list[LevelAnswer]()
     if whole_requirements.envelope:
+        # The answer by geometry alone, without the flight.
         route_findings = run_rules(whole_requirements, None, geometric=True, flight_findings=findings)
-        levels = (_geometric_level(setup, route_findings, findings),)
-    own_headline = headline(findings, flyable, setup_notes(setup, findings))
-    levels += (LevelAnswer(setup.autopilot.answer_name, flyable, own_headline, undecided=_is_undecided(findings)),)
+        route_findings = (*blocking_item_findings(setup), *route_findings)
+        has_failed, is_open = _has_failed(route_findings), bool(undecided_findings(route_findings))
+        passes = not has_failed and not is_open
+        disagreements = _disagreements("geometry", route_findings, findings)
+        route_headline = headline(route_findings, passes, notes)
+        levels.append(
+            LevelAnswer("geometry", passes, route_headline, disagreements, undecided=is_open and not has_failed)
+        )
+    is_undecided = bool(undecided_findings(findings)) and not _has_failed(findings)
+    own_headline = headline(findings, flyable, notes)
+    levels.append(LevelAnswer(setup.autopilot.answer_name, flyable, own_headline, undecided=is_undecided))
     conditions = judging_conditions(setup)
     verdict = Verdict(
-        *(findings, flyable, complete, summary_lines(findings, setup, "flown", levels, conditions), "flown", levels),
+        findings,
+        flyable,
+        complete,
+        summary_lines(findings, setup, "flown", levels, conditions),
+        "flown",
+        tuple(levels),
         notes=setup.notes,
         leg_ends=() if aligned is None else leg_ends(air_requirements, aligned),
         program=setup.autopilot.program,
@@ -110,24 +124,9 @@ def with_reference(verdict: Verdict, requirements: RouteRequirements, reference:
     return replace(verdict, findings=findings, lines=lines, levels=levels, deciding=deciding)
 
 
-def _geometric_level(
-    setup: FlightSetup, route_findings: tuple[Finding, ...], flight_findings: tuple[Finding, ...]
-) -> LevelAnswer:
-    """Return the geometric answer from the findings on the route, with its disagreements with the flight."""
-    findings = (*blocking_item_findings(setup), *route_findings)
-    passes = not any(finding.ok is False for finding in findings) and not undecided_findings(findings)
-    return LevelAnswer(
-        "geometry",
-        passes,
-        headline(findings, passes, setup_notes(setup, flight_findings)),
-        _disagreements("geometry", findings, flight_findings),
-        undecided=_is_undecided(findings),
-    )
-
-
-def _is_undecided(findings: tuple[Finding, ...]) -> bool:
-    """Return True if no finding has failed, but some leave the answer undecided."""
-    return bool(undecided_findings(findings)) and not any(finding.ok is False for finding in findings)
+def _has_failed(findings: Sequence[Finding]) -> bool:
+    """Return True if a finding has failed."""
+    return any(finding.ok is False for finding in findings)
 
 
 def _airframe_level(airframe: AirframeAnswer, flight_findings: tuple[Finding, ...]) -> LevelAnswer:

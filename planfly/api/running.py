@@ -21,7 +21,6 @@ from planfly.arguments import check_arguments
 from planfly.flight_options import RunOptions, load_scenario_with_options, option_defaults
 from planfly.kernel_units.unit_kernels import GLIDING, PLANNING_AND_FLYING
 from planfly.runtime.stages import report_replaced, stage
-from planfly.workflow.flight_limits import FlightLimits, computing_time_key, length_and_duration_text
 from planfly.workflow.make_plan import make_plan, planning_conditions
 from planfly.workflow.open_flight import make_setup, mission_of_plan
 from planfly.workflow.output_paths import (
@@ -31,7 +30,14 @@ from planfly.workflow.output_paths import (
     expand_path_pattern,
     prepare_folder,
 )
-from planfly.workflow.pipeline import ReturnSummary, autopilot_log_path, fly_and_judge, return_summary
+from planfly.workflow.pipeline import (
+    FlightLimits,
+    ReturnSummary,
+    autopilot_log_path,
+    fly_and_judge,
+    flying_stage,
+    return_summary,
+)
 from planfly.workflow.reference_flights import FlyReference
 from planfly.workflow.tighten_plan import refine as refine_rounds
 from planfly.workflow.uav import Uav, choose_seed, load_uav, with_tightened_limits
@@ -232,9 +238,15 @@ def _fly_rounds(
             on_round(flown_rounds[-1])
         return flown_rounds[-1].verdict, flown_rounds[-1].flown
 
-    _, round_entries = refine_rounds(
-        scenario, refine, plan_and_fly_round, lambda number: _move_round_results(folder, number)
-    )
+    def move_round_results(number: int) -> None:
+        """Move the results of a round to its own subfolder before the next round."""
+        round_folder = folder / f"round-{number}"
+        round_folder.mkdir(exist_ok=True)
+        for name in RUN_FILES:
+            if (folder / name).exists():
+                (folder / name).replace(round_folder / name)
+
+    _, round_entries = refine_rounds(scenario, refine, plan_and_fly_round, move_round_results)
     if refine:
         write_atomically(folder / "rounds.json", json.dumps(round_entries, indent=1) + "\n")
     *earlier_rounds, last_round = (
@@ -268,7 +280,7 @@ def _record_round(task: _RunTask, plan: Plan, number: int) -> Round:
         write_atomically(folder / "verdict.json", verdict_json(verdict))
         return Round(number, (), verdict, flown=False, folder=folder)
     setup = make_setup(task.scenario, uav, mission, task.seed, plan=plan, engine=task.engine)
-    with stage(f"flying {length_and_duration_text(setup)}", computing_time_key(setup)) as advance:
+    with flying_stage(setup) as advance:
         flight = fly_and_judge(
             setup,
             folder / "flight.mcap",
@@ -306,12 +318,3 @@ def _record_round(task: _RunTask, plan: Plan, number: int) -> Round:
         return_summary=summary,
         engine=flight.engine,
     )
-
-
-def _move_round_results(folder: Path, number: int) -> None:
-    """Move the results of a round to its own subfolder before the next round."""
-    round_folder = folder / f"round-{number}"
-    round_folder.mkdir(exist_ok=True)
-    for name in RUN_FILES:
-        if (folder / name).exists():
-            (folder / name).replace(round_folder / name)

@@ -1,1 +1,1 @@
-"""Commands of planfly, one module each, whose functions `registry` lists."""
+"""Commands of planfly, one module each, whose functions `planfly.cli` lists."""

@@ -8,17 +8,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from planfly.terminal.arguments import complete_aircraft, file_completer, number_parser, with_completer
-from planfly.terminal.command_parser import CommandParser, LineParser
-from planfly.terminal.exit_codes import FLYABLE
+from planfly.terminal.command_parser import FLYABLE, CommandParser, LineParser
 from planfly.terminal.options import add_result_options, call_api
-from planfly.terminal.output import write_json_if_requested
-from planfly.terminal.results import print_warnings
+from planfly.terminal.output import print_warnings, write_json_if_requested
 from world.errors import PlanflyError
 
 if TYPE_CHECKING:
     from aircraft.catalog import Aircraft
     from aircraft.envelope import Envelope
-    from flight.dynamics.characteristics import Mode, TrimRow
     from planfly import AircraftNumbers, IdentifiedAircraft
 
 # Bank angles of the printed turn radii, degrees.
@@ -234,6 +231,7 @@ def _identify(args: argparse.Namespace) -> int:
 
     Raises PlanflyError for a missing option, and for options that cannot be combined with --identify.
     """
+    from aircraft.identification.prediction import QUANTITIES
     from planfly.api import identifying
 
     for name in ("mass", "span", "out"):
@@ -268,29 +266,12 @@ def _identify(args: argparse.Namespace) -> int:
     _print_uncertain_properties(result)
     if "identify.waypoints" not in files_made:
         print("  identify.waypoints not written: the logs have neither home (ORGN) nor a position on the ground (POS)")
-    _print_predictions(result, args.check)
-    write_json_if_requested(args, lambda: _json_answer([new_aircraft]))
-    print(
-        f"next      `planfly aircraft {shlex.quote(args.out)}` prints the model; {args.out}/identify.html "
-        "shows each estimate with its uncertainty"
-    )
-    return FLYABLE
-
-
-def _print_predictions(result: "IdentifiedAircraft", check: str | None) -> None:
-    """Print each model's rms errors 0.5 s ahead, and the whiteness of the identified model's innovations.
-
-    Innovations are errors of predictions one step ahead.  Those of a complete model are white, which means not
-    correlated in time.
-
-    check: log that was predicted, or None for the logs of the identification.
-    """
-    from aircraft.identification.prediction import QUANTITIES
-
+    # Each model's rms errors 0.5 s ahead, and the whiteness of the identified model's innovations, which are errors of
+    # predictions one step ahead.  Those of a complete model are white, which means not correlated in time.
     predicted = result.predicted
     print(
         f"  ahead    rms errors 0.5 s ahead, {predicted.count} predictions"
-        f" {'on the same logs' if check is None else f'on {check}'} (deg/s, deg, m/s)"
+        f" {'on the same logs' if args.check is None else f'on {args.check}'} (deg/s, deg, m/s)"
     )
     for prediction in predicted.predictions:
         rms_text = ", ".join(f"{name} {rms:.2g}" for name, rms in zip(QUANTITIES, prediction.rms[0.5], strict=True))
@@ -300,6 +281,12 @@ def _print_predictions(result: "IdentifiedAircraft", check: str | None) -> None:
         f"  ahead    innovations of roll, pitch, yaw: white at {whiteness_text} % of lags to 0.5 s"
         " (95 % in a complete model)"
     )
+    write_json_if_requested(args, lambda: _json_answer([new_aircraft]))
+    print(
+        f"next      `planfly aircraft {shlex.quote(args.out)}` prints the model; {args.out}/identify.html "
+        "shows each estimate with its uncertainty"
+    )
+    return FLYABLE
 
 
 def _print_uncertain_properties(result: "IdentifiedAircraft") -> None:
@@ -352,16 +339,45 @@ def _print_data_sheet_performance(aircraft: "Aircraft") -> None:
 
 def _print_numbers(numbers: "AircraftNumbers") -> None:
     """Print limits, trims, modes, envelope and turns of an aircraft."""
+    from aircraft.envelope import turn_radius
     from flight.dynamics.characteristics import TRIM_AMSL
 
     aircraft, envelope = numbers.aircraft, numbers.envelope
     print(f"{aircraft.name}: {aircraft.title}")
     print(f"  model    {numbers.model_sha256[:16]}")
     _print_limits(aircraft, envelope)
-    _print_trims(numbers.trims, TRIM_AMSL)
-    _print_modes(numbers.cruise, aircraft.airspeed, TRIM_AMSL)
+    print(f"\nlevel flight at {TRIM_AMSL:.0f} m AMSL (endurance and range: still air, 80 % of the energy carried)")
+    print("  airspeed   alpha  elevator  aileron  rudder  throttle    power  endurance   range")
+    print("       m/s     deg       deg      deg     deg         %       kW          h      km")
+    for row in numbers.trims:
+        trim = row.trim
+        print(
+            f"  {trim.airspeed:8.1f}{math.degrees(trim.alpha):8.2f}{math.degrees(trim.elevator):10.2f}"
+            f"{math.degrees(trim.aileron):9.2f}{math.degrees(trim.rudder):8.2f}{100.0 * trim.throttle:10.1f}"
+            f"{row.power / 1000.0:9.3f}{row.endurance / 3600.0:11.2f}{row.endurance * trim.airspeed / 1000.0:8.0f}"
+        )
+    print(f"\nmodes at {aircraft.airspeed:g} m/s and {TRIM_AMSL:.0f} m AMSL, controls fixed")
+    print("  mode           root, 1/s             frequency  damping  half or double")
+    for mode in numbers.cruise:
+        root = f"{mode.root.real:+.4f}" + (f" +-{mode.root.imag:.4f}j" if mode.root.imag else "")
+        kind = "to half" if mode.root.real < 0.0 else "to DOUBLE"
+        print(f"  {mode.name:<14} {root:<20} {mode.frequency:7.3f} rad/s{mode.damping:9.2f}{mode.time:9.2f} s {kind}")
     _print_envelope(aircraft, envelope)
-    _print_turns(aircraft)
+    speeds = [aircraft.airspeed_min, aircraft.airspeed, aircraft.airspeed_max, aircraft.airspeed + _WIND_MPS]
+    print("\nturn radius, m, by ground speed and bank")
+    print("  m/s     " + "".join(f"{bank:>8.0f} deg" for bank in _BANKS_DEG))
+    for speed in speeds:
+        cells = "".join(f"{turn_radius(speed, math.radians(bank)):12.0f}" for bank in _BANKS_DEG)
+        print(f"  {speed:<8.1f}{cells}" + ("  (cruise in a 10 m/s tailwind)" if speed == speeds[-1] else ""))
+    bank = math.degrees(aircraft.max_bank)
+    print(f"\nshortest leg between two equal turns, m, at {bank:.0f} deg of bank, by ground speed and turn")
+    print("  m/s     " + "".join(f"{turn:>8.0f} deg" for turn in _TURNS_DEG))
+    for speed in speeds:
+        radius = turn_radius(speed, aircraft.max_bank)
+        print(
+            f"  {speed:<8.1f}"
+            + "".join(f"{2.0 * radius * math.tan(math.radians(turn) / 2.0):12.0f}" for turn in _TURNS_DEG)
+        )
 
 
 def _print_limits(aircraft: "Aircraft", envelope: "Envelope") -> None:
@@ -400,30 +416,6 @@ def _print_limits(aircraft: "Aircraft", envelope: "Envelope") -> None:
         )
 
 
-def _print_trims(trims: "tuple[TrimRow, ...]", amsl: float) -> None:
-    """Print a table of trims in level flight, one row for each airspeed.  amsl: altitude, m AMSL."""
-    print(f"\nlevel flight at {amsl:.0f} m AMSL (endurance and range: still air, 80 % of the energy carried)")
-    print("  airspeed   alpha  elevator  aileron  rudder  throttle    power  endurance   range")
-    print("       m/s     deg       deg      deg     deg         %       kW          h      km")
-    for row in trims:
-        trim = row.trim
-        print(
-            f"  {trim.airspeed:8.1f}{math.degrees(trim.alpha):8.2f}{math.degrees(trim.elevator):10.2f}"
-            f"{math.degrees(trim.aileron):9.2f}{math.degrees(trim.rudder):8.2f}{100.0 * trim.throttle:10.1f}"
-            f"{row.power / 1000.0:9.3f}{row.endurance / 3600.0:11.2f}{row.endurance * trim.airspeed / 1000.0:8.0f}"
-        )
-
-
-def _print_modes(modes: "tuple[Mode, ...]", airspeed: float, amsl: float) -> None:
-    """Print a table of dynamic modes at an airspeed (m/s) and an altitude (m AMSL)."""
-    print(f"\nmodes at {airspeed:g} m/s and {amsl:.0f} m AMSL, controls fixed")
-    print("  mode           root, 1/s             frequency  damping  half or double")
-    for mode in modes:
-        root = f"{mode.root.real:+.4f}" + (f" +-{mode.root.imag:.4f}j" if mode.root.imag else "")
-        kind = "to half" if mode.root.real < 0.0 else "to DOUBLE"
-        print(f"  {mode.name:<14} {root:<20} {mode.frequency:7.3f} rad/s{mode.damping:9.2f}{mode.time:9.2f} s {kind}")
-
-
 def _print_envelope(aircraft: "Aircraft", envelope: "Envelope") -> None:
     """Print the steepest climb and descent, relative to air and ground, and the speeds of level flight."""
     altitudes = [float(amsl) for amsl in envelope.amsl[::2]]
@@ -444,27 +436,6 @@ def _print_envelope(aircraft: "Aircraft", envelope: "Envelope") -> None:
         (f"{_WIND_MPS:g} m/s crosswind", 0.0, _WIND_MPS),
     ):
         print(f"  {title:<18}{_angle_pair_text(*envelope.slope_limits(aircraft.airspeed, 500.0, tailwind, crosswind))}")
-
-
-def _print_turns(aircraft: "Aircraft") -> None:
-    """Print tables of turn radii and of the shortest legs between two turns, by ground speed."""
-    from aircraft.envelope import turn_radius
-
-    speeds = [aircraft.airspeed_min, aircraft.airspeed, aircraft.airspeed_max]
-    print("\nturn radius, m, by ground speed and bank")
-    print("  m/s     " + "".join(f"{bank:>8.0f} deg" for bank in _BANKS_DEG))
-    for speed in (*speeds, aircraft.airspeed + _WIND_MPS):
-        cells = "".join(f"{turn_radius(speed, math.radians(bank)):12.0f}" for bank in _BANKS_DEG)
-        print(f"  {speed:<8.1f}{cells}" + ("  (cruise in a 10 m/s tailwind)" if speed == speeds[1] + _WIND_MPS else ""))
-    bank = math.degrees(aircraft.max_bank)
-    print(f"\nshortest leg between two equal turns, m, at {bank:.0f} deg of bank, by ground speed and turn")
-    print("  m/s     " + "".join(f"{turn:>8.0f} deg" for turn in _TURNS_DEG))
-    for speed in (*speeds, aircraft.airspeed + _WIND_MPS):
-        radius = turn_radius(speed, aircraft.max_bank)
-        print(
-            f"  {speed:<8.1f}"
-            + "".join(f"{2.0 * radius * math.tan(math.radians(turn) / 2.0):12.0f}" for turn in _TURNS_DEG)
-        )
 
 
 def _angle_pair_text(climb: float, descent: float) -> str:

@@ -5,8 +5,7 @@ from typing import TYPE_CHECKING
 
 from planfly.commands.campaigns import add_flights_options
 from planfly.terminal.arguments import number_parser
-from planfly.terminal.command_parser import LineParser, colour_text
-from planfly.terminal.exit_codes import FLYABLE, INCOMPLETE, NOT_FLYABLE
+from planfly.terminal.command_parser import FLYABLE, INCOMPLETE, NOT_FLYABLE, LineParser, colour_text
 from planfly.terminal.options import add_result_options, call_api
 from planfly.terminal.output import write_json_if_requested
 

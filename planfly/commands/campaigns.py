@@ -9,8 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from planfly.terminal.arguments import complete_mission_or_scenario, file_completer, number_parser, with_completer
-from planfly.terminal.command_parser import CommandParser, LineParser
-from planfly.terminal.exit_codes import FLYABLE, INCOMPLETE, NOT_FLYABLE
+from planfly.terminal.command_parser import FLYABLE, INCOMPLETE, NOT_FLYABLE, CommandParser, LineParser
 from planfly.terminal.options import (
     add_aircraft_and_wind_options,
     add_result_options,

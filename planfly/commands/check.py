@@ -1,7 +1,6 @@
 """``planfly check``: judge a flight by its log, or a mission by flying it."""
 
 import argparse
-from collections.abc import Mapping
 from dataclasses import fields
 from typing import TYPE_CHECKING
 
@@ -13,8 +12,7 @@ from planfly.terminal.arguments import (
     parse_autopilots,
     with_completer,
 )
-from planfly.terminal.command_parser import CommandParser, LineParser
-from planfly.terminal.exit_codes import INCOMPLETE, verdict_code
+from planfly.terminal.command_parser import INCOMPLETE, CommandParser, LineParser, verdict_code
 from planfly.terminal.options import (
     add_aircraft_and_wind_options,
     add_autopilot_options,
@@ -23,13 +21,11 @@ from planfly.terminal.options import (
     add_world_options,
     call_api,
 )
-from planfly.terminal.output import write_json_if_requested, write_junit_if_requested
-from planfly.terminal.results import print_warnings
+from planfly.terminal.output import print_warnings, write_json_if_requested, write_junit_if_requested
 from world.errors import ArgumentError
 
 if TYPE_CHECKING:
     from planfly import Verdict
-    from planfly.terminal.verdict_answers import VerdictsDocument
     from planfly.workflow.pipeline import ReturnSummary
 
 # Suffixes of logs of other programs, as the help shows them.
@@ -107,6 +103,7 @@ _SINGLE_AUTOPILOT_OPTIONS = ("params", "guidance", "autopilot", "plan", "flight"
 def _check_for_each_autopilot(args: argparse.Namespace) -> int:
     """Fly a mission by each named autopilot, and return the exit code of the worst verdict."""
     from planfly.api import flying
+    from planfly.terminal.verdict_answers import VerdictsDocument
     from planfly.terminal.verdict_lines import autopilot_lines
 
     for name in _SINGLE_AUTOPILOT_OPTIONS:
@@ -117,18 +114,17 @@ def _check_for_each_autopilot(args: argparse.Namespace) -> int:
     flights = call_api(flying.fly_by_each, args, mission=args.what)
     verdicts = {name: flight.verdict for name, flight in flights.items()}
     code = max(verdict_code(verdict) for verdict in verdicts.values())
-    write_json_if_requested(args, lambda: _answer_for_each_autopilot(verdicts, args.what, code))
+    write_json_if_requested(
+        args,
+        lambda: VerdictsDocument(
+            exit_code=code,
+            mission=args.what,
+            verdicts={name: verdict.document() for name, verdict in verdicts.items()},
+        ),
+    )
     write_junit_if_requested(args, {f"{args.what} by {name}": verdict for name, verdict in verdicts.items()})
     print("\n".join(autopilot_lines(verdicts)))
     return code
-
-
-def _answer_for_each_autopilot(verdicts: Mapping[str, "Verdict"], mission: str, code: int) -> "VerdictsDocument":
-    """Return the answer of ``planfly check`` with several autopilots for --json."""
-    from planfly.terminal.verdict_answers import VerdictsDocument
-
-    documents = {name: verdict.document() for name, verdict in verdicts.items()}
-    return VerdictsDocument(exit_code=code, mission=mission, verdicts=documents)
 
 
 def _verdict_answer(verdict: "Verdict", returns: "ReturnSummary", code: int) -> object:

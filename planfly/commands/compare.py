@@ -5,11 +5,9 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from planfly.terminal.command_parser import LineParser
-from planfly.terminal.exit_codes import FLYABLE, INCOMPLETE
+from planfly.terminal.command_parser import FLYABLE, INCOMPLETE, LineParser
 from planfly.terminal.options import add_log_argument, add_result_options
-from planfly.terminal.output import write_json_if_requested
-from planfly.terminal.results import warn_about_incomplete_log
+from planfly.terminal.output import warn_about_incomplete_log, write_json_if_requested
 from planfly.workflow.output_paths import COMPARE_FILES
 from world.errors import PlanflyError
 
@@ -39,9 +37,11 @@ def compare(args: argparse.Namespace) -> int:
     """
     from logs.recording.reader import read_log
     from planfly.api import reporting
+    from planfly.campaigns.compare_campaigns import campaign_table
 
-    if any(_is_campaign(Path(name)) for name in (args.first, args.second)):
-        return _compare_campaigns(args)
+    for path in (Path(args.first), Path(args.second)):
+        if (path.is_dir() or path.suffix == ".sqlite") and campaign_table(path) is not None:
+            return _compare_campaigns(args)
     from logs.views.report.compare import difference_lines
 
     logs = [read_log(Path(file)) for file in (args.first, args.second)]
@@ -57,13 +57,6 @@ def compare(args: argparse.Namespace) -> int:
     code = INCOMPLETE if incomplete_logs else FLYABLE
     write_json_if_requested(args, lambda: _json_answer(comparison, files, code))
     return code
-
-
-def _is_campaign(path: Path) -> bool:
-    """Return True if a path is the folder or the table of a campaign."""
-    from planfly.campaigns.compare_campaigns import campaign_table
-
-    return (path.is_dir() or path.suffix == ".sqlite") and campaign_table(path) is not None
 
 
 def _compare_campaigns(args: argparse.Namespace) -> int:

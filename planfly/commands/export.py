@@ -10,11 +10,9 @@ from planfly.terminal.arguments import (
     file_completer,
     with_completer,
 )
-from planfly.terminal.command_parser import LineParser
-from planfly.terminal.exit_codes import FLYABLE, INCOMPLETE
+from planfly.terminal.command_parser import FLYABLE, INCOMPLETE, LineParser
 from planfly.terminal.options import add_fence_option, add_result_options, add_time_option
-from planfly.terminal.output import write_json_if_requested
-from planfly.terminal.results import print_warnings
+from planfly.terminal.output import print_warnings, write_json_if_requested
 
 
 def add_export_parser(command_line: LineParser) -> None:

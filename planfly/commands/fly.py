@@ -5,8 +5,7 @@ import shlex
 from typing import TYPE_CHECKING
 
 from planfly.terminal.arguments import MISSION_SUFFIXES, file_completer, number_parser, with_completer
-from planfly.terminal.command_parser import LineParser, colour_text
-from planfly.terminal.exit_codes import verdict_code
+from planfly.terminal.command_parser import LineParser, colour_text, verdict_code
 from planfly.terminal.options import (
     add_flight_options,
     add_log_rate_option,
@@ -14,8 +13,7 @@ from planfly.terminal.options import (
     add_world_options,
     call_api,
 )
-from planfly.terminal.output import write_json_if_requested, write_junit_if_requested
-from planfly.terminal.results import print_engine, print_warnings
+from planfly.terminal.output import print_warnings, write_json_if_requested, write_junit_if_requested
 from planfly.workflow.output_paths import FLY_LOG
 
 if TYPE_CHECKING:
@@ -61,7 +59,7 @@ def fly(args: argparse.Namespace) -> int:
     if flight.log is None:
         print("log       none: nothing was flown")
     else:
-        print_engine(flight.engine)
+        print(f"model     {flight.engine}")
         print(f"log       {flight.log}")
         if flight.autopilot_log is not None:
             print(f"          {flight.autopilot_log} (the autopilot's own)")

@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 from planfly.arguments import CHOICES
 from planfly.commands.campaigns import add_flights_options
 from planfly.terminal.arguments import file_completer, number_parser, with_completer
-from planfly.terminal.command_parser import LineParser, colour_text
-from planfly.terminal.exit_codes import FLYABLE, INCOMPLETE
+from planfly.terminal.command_parser import FLYABLE, INCOMPLETE, LineParser, colour_text
 from planfly.terminal.options import add_result_options, call_api
 from planfly.terminal.output import write_json_if_requested
 

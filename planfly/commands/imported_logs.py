@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 
 from planfly.commands.check import LOGS
 from planfly.terminal.arguments import IMPORTED_LOG_SUFFIXES, complete_aircraft, file_completer, with_completer
-from planfly.terminal.command_parser import LineParser
-from planfly.terminal.exit_codes import FLYABLE, INCOMPLETE, verdict_code
+from planfly.terminal.command_parser import FLYABLE, INCOMPLETE, LineParser, verdict_code
 from planfly.terminal.options import (
     add_aircraft_and_wind_options,
     add_imported_log_options,
@@ -16,8 +15,7 @@ from planfly.terminal.options import (
     add_world_options,
     call_api,
 )
-from planfly.terminal.output import write_json_if_requested, write_junit_if_requested
-from planfly.terminal.results import warn_about_incomplete_log
+from planfly.terminal.output import warn_about_incomplete_log, write_json_if_requested, write_junit_if_requested
 from world.errors import PlanflyError
 from world.wording import count_text
 

@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 from planfly.arguments import CHOICES
 from planfly.commands.check import add_mission_or_log_argument
 from planfly.terminal.arguments import number_parser, parse_position
-from planfly.terminal.command_parser import LineParser, colour_text
-from planfly.terminal.exit_codes import FLYABLE, INCOMPLETE, NOT_FLYABLE
+from planfly.terminal.command_parser import FLYABLE, INCOMPLETE, NOT_FLYABLE, LineParser, colour_text
 from planfly.terminal.options import (
     add_aircraft_and_wind_options,
     add_imported_log_options,

@@ -5,8 +5,7 @@ import shlex
 
 from planfly.arguments import CHOICES
 from planfly.terminal.arguments import complete_aircraft, number_parser, parse_position, with_completer
-from planfly.terminal.command_parser import LineParser, colour_text
-from planfly.terminal.exit_codes import FLYABLE, NOT_FLYABLE
+from planfly.terminal.command_parser import FLYABLE, NOT_FLYABLE, LineParser, colour_text
 from planfly.terminal.options import add_result_options, add_terrain_option, call_api
 from planfly.terminal.output import write_json_if_requested
 

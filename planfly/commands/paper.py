@@ -6,8 +6,7 @@ from pathlib import Path
 
 from planfly.arguments import CHOICES
 from planfly.terminal.arguments import number_parser, parse_problems
-from planfly.terminal.command_parser import LineParser
-from planfly.terminal.exit_codes import FLYABLE
+from planfly.terminal.command_parser import FLYABLE, LineParser
 from planfly.terminal.options import add_result_options, call_api
 from planfly.terminal.output import write_json_if_requested
 from planfly.workflow.output_paths import RESULTS

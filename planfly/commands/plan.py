@@ -8,9 +8,8 @@ from types import FrameType
 from typing import TYPE_CHECKING
 
 from planfly.terminal.arguments import file_completer, number_parser, parse_budget, parse_threat, with_completer
-from planfly.terminal.command_parser import LineParser
+from planfly.terminal.command_parser import FLYABLE, NOT_FLYABLE, LineParser
 from planfly.terminal.dispersed_flights import check_flights_option, fly_dispersed
-from planfly.terminal.exit_codes import FLYABLE, NOT_FLYABLE
 from planfly.terminal.options import (
     add_aircraft_and_wind_options,
     add_autopilot_options,
@@ -19,8 +18,7 @@ from planfly.terminal.options import (
     add_scenario_argument,
     call_api,
 )
-from planfly.terminal.output import write_json_if_requested
-from planfly.terminal.results import print_warnings
+from planfly.terminal.output import print_warnings, write_json_if_requested
 from planfly.workflow.output_paths import RUN_FOLDER, expand_path_pattern
 from world.errors import ScenarioError
 from world.interruption import interrupt

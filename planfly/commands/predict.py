@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 
 from planfly.commands.check import LOGS
 from planfly.terminal.arguments import IMPORTED_LOG_SUFFIXES, file_completer, number_parser, with_completer
-from planfly.terminal.command_parser import LineParser
-from planfly.terminal.exit_codes import FLYABLE
+from planfly.terminal.command_parser import FLYABLE, LineParser
 from planfly.terminal.options import (
     add_aircraft_and_wind_options,
     add_imported_log_options,

@@ -3,11 +3,9 @@
 import argparse
 from pathlib import Path
 
-from planfly.terminal.command_parser import LineParser
-from planfly.terminal.exit_codes import FLYABLE, INCOMPLETE
+from planfly.terminal.command_parser import FLYABLE, INCOMPLETE, LineParser
 from planfly.terminal.options import add_log_argument, add_result_options, call_api
-from planfly.terminal.output import write_json_if_requested
-from planfly.terminal.results import warn_about_incomplete_log
+from planfly.terminal.output import warn_about_incomplete_log, write_json_if_requested
 from world.wording import count_text
 
 

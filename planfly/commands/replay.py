@@ -8,9 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from planfly.terminal.arguments import number_parser, parse_time_or_stations
-from planfly.terminal.command_parser import LineParser
+from planfly.terminal.command_parser import FLYABLE, INCOMPLETE, LineParser
 from planfly.terminal.control_characters import escape_controls
-from planfly.terminal.exit_codes import FLYABLE, INCOMPLETE
 from planfly.terminal.options import (
     add_log_argument,
     add_result_options,
@@ -19,8 +18,7 @@ from planfly.terminal.options import (
     print_and_flush,
     watch_stop_signals,
 )
-from planfly.terminal.output import plain_stream, write_json_if_requested
-from planfly.terminal.results import warn_about_incomplete_log
+from planfly.terminal.output import plain_stream, warn_about_incomplete_log, write_json_if_requested
 from world.errors import PlanflyError
 from world.running_clock import RunningClock
 
@@ -108,6 +106,7 @@ def replay(args: argparse.Namespace) -> int:
     The exit code is 3 for an incomplete log.
     """
     from logs.recording.reader import read_log
+    from logs.views.replay.timeline import entry_lines
     from planfly.api import replaying
 
     to_station = isinstance(args.to, str)
@@ -127,7 +126,13 @@ def replay(args: argparse.Namespace) -> int:
     elif sys.stdout.isatty() and not (args.at_once or args.quiet or args.json):
         _show_instruments(log, args)
     else:
-        _print_timeline(log, args)
+        # The timeline is printed at `--speed` times real time, or at once without it.
+        entries = call_api(replaying.timeline, args, log=log)
+        start, clock = args.start or float(log.track.time[0]), RunningClock()
+        for entry in entries:
+            while args.speed and (wait := (entry.time - start) / args.speed - clock()) > 0.0:
+                time.sleep(min(wait, 1.0 / _FRAME_RATE_HZ))
+            print("\n".join(entry_lines(entry)), flush=bool(args.speed))
     if not log.complete:
         warn_about_incomplete_log(log)
     code = FLYABLE if log.complete else INCOMPLETE
@@ -143,20 +148,6 @@ def _json_answer(args: argparse.Namespace, log: "FlightLog", code: int) -> objec
     entries = replaying.timeline(log) if isinstance(args.to, str) else call_api(replaying.timeline, args, log=log)
     events = [TimelineEvent(time_s=entry.time, kind=entry.kind, text=entry.text) for entry in entries]
     return ReplayAnswer(exit_code=code, log=args.log, complete=log.complete, end_s=log.end_time, timeline=events)
-
-
-def _print_timeline(log: "FlightLog", args: argparse.Namespace) -> None:
-    """Print the timeline at ``--speed`` times real time, or immediately without ``--speed``."""
-    from logs.views.replay.timeline import entry_lines
-    from planfly.api import replaying
-
-    speed = args.speed
-    entries = call_api(replaying.timeline, args, log=log)
-    start, clock = args.start or float(log.track.time[0]), RunningClock()
-    for entry in entries:
-        while speed and (wait := (entry.time - start) / speed - clock()) > 0.0:
-            time.sleep(min(wait, 1.0 / _FRAME_RATE_HZ))
-        print("\n".join(entry_lines(entry)), flush=bool(speed))
 
 
 def _show_instruments(log: "FlightLog", args: argparse.Namespace) -> None:

@@ -7,11 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from planfly.terminal.arguments import file_completer, with_completer
-from planfly.terminal.command_parser import LineParser
-from planfly.terminal.exit_codes import BAD_INPUT, FLYABLE, INCOMPLETE, NOT_FLYABLE, verdict_code
+from planfly.terminal.command_parser import BAD_INPUT, FLYABLE, INCOMPLETE, NOT_FLYABLE, LineParser, verdict_code
 from planfly.terminal.options import add_result_options
-from planfly.terminal.output import write_json_if_requested
-from planfly.terminal.results import warn_about_incomplete_log
+from planfly.terminal.output import warn_about_incomplete_log, write_json_if_requested
 from world.errors import PlanflyError
 
 if TYPE_CHECKING:

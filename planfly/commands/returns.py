@@ -8,8 +8,7 @@ from planfly.commands.check import add_mission_or_log_argument
 from planfly.terminal.arguments import (
     number_parser,
 )
-from planfly.terminal.command_parser import LineParser, colour_text
-from planfly.terminal.exit_codes import FLYABLE, INCOMPLETE, NOT_FLYABLE
+from planfly.terminal.command_parser import FLYABLE, INCOMPLETE, NOT_FLYABLE, LineParser, colour_text
 from planfly.terminal.options import (
     add_aircraft_and_wind_options,
     add_imported_log_options,

@@ -5,9 +5,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from planfly.terminal.arguments import number_parser
-from planfly.terminal.command_parser import LineParser
+from planfly.terminal.command_parser import NOT_FLYABLE, LineParser, verdict_code
 from planfly.terminal.dispersed_flights import check_flights_option, fly_dispersed
-from planfly.terminal.exit_codes import NOT_FLYABLE, verdict_code
 from planfly.terminal.options import (
     add_flight_options,
     add_flights_option,
@@ -18,10 +17,9 @@ from planfly.terminal.options import (
     call_api,
 )
 from planfly.terminal.output import write_json_if_requested, write_junit_if_requested
-from planfly.terminal.results import print_engine
 
 if TYPE_CHECKING:
-    from planfly import Plan, Round, RunResult
+    from planfly import Round, RunResult
     from planfly.terminal.answers import DispersedFlights
 
 
@@ -65,24 +63,25 @@ def run(args: argparse.Namespace) -> int:
     Returns the exit code of the verdict, or 4 if the plan fails in the flights of ``--flights N``.
     """
     from planfly.api import running
+    from planner.plan import read_plan
 
     check_flights_option(args, "sitl")
     result = call_api(running.run, args, on_round=_print_round)
     if args.refine:
-        _print_rounds(result)
-    dispersed = fly_dispersed(args, _last_plan(result)) if args.flights and result.rounds[-1].flown else None
+        print("rounds")
+        for one in result.rounds:
+            changes = "; ".join(one.changes) or "as given"
+            print(f"  {one.number}  {one.folder}/  {changes}: {one.verdict.headline}")
+        print(f"  {result.ended}")
+    dispersed = None
+    if args.flights and result.rounds[-1].flown:
+        # The plan of the last round, in the scenario without the limits that were tightened for it.
+        first, last = (read_plan(result.rounds[number].folder / "plan.json") for number in (0, -1))
+        dispersed = fly_dispersed(args, replace(last, scenario=first.scenario))
     code = verdict_code(result.verdict) if dispersed is None or dispersed.holds else NOT_FLYABLE
     write_json_if_requested(args, lambda: _json_answer(result, bool(args.refine), code, dispersed))
     write_junit_if_requested(args, {result.scenario: result.verdict})
     return code
-
-
-def _last_plan(result: "RunResult") -> "Plan":
-    """Read the plan of the last round, in the scenario without the limits that were tightened for it."""
-    from planner.plan import read_plan
-
-    first, last = (read_plan(shown_round.folder / "plan.json") for shown_round in (result.rounds[0], result.rounds[-1]))
-    return replace(last, scenario=first.scenario)
 
 
 def _json_answer(result: "RunResult", has_rounds: bool, code: int, dispersed: "DispersedFlights | None") -> object:
@@ -113,18 +112,10 @@ def _print_round(finished_round: "Round") -> None:
     from planfly.terminal.verdict_lines import verdict_lines
 
     print(*verdict_lines(finished_round.verdict, finished_round.notes, returns=finished_round.return_summary), sep="\n")
-    print_engine(finished_round.engine)
+    if finished_round.engine:
+        print(f"model     {finished_round.engine}")
     files = "plan.json, mission.waypoints, mission.plan, verdict.json; nothing was flown"
     if finished_round.flown:
         flight = "flight.mcap" if finished_round.has_log else "no flight"
         files = f"report.html, map.png, profile.png, {flight}, verdict.json, plan.json, missions"
     print(f"results   {finished_round.folder}/ ({files})")
-
-
-def _print_rounds(result: "RunResult") -> None:
-    """Print a line for each round, with the changed limits and the verdict, and the reason for the end."""
-    print("rounds")
-    for finished_round in result.rounds:
-        changes = "; ".join(finished_round.changes) or "as given"
-        print(f"  {finished_round.number}  {finished_round.folder}/  {changes}: {finished_round.verdict.headline}")
-    print(f"  {result.ended}")

@@ -4,8 +4,7 @@ import argparse
 import sys
 
 from planfly.terminal.arguments import SHELLS, shell_script, with_completer
-from planfly.terminal.command_parser import LineParser
-from planfly.terminal.exit_codes import BAD_INPUT, FLYABLE
+from planfly.terminal.command_parser import BAD_INPUT, FLYABLE, LineParser
 from planfly.terminal.options import add_json_and_quiet_options
 from planfly.terminal.output import write_json_if_requested
 from planfly.terminal.schemas import commands_with_json, schema_text

@@ -9,8 +9,7 @@ from planfly.terminal.arguments import (
     number_parser,
     with_completer,
 )
-from planfly.terminal.command_parser import LineParser
-from planfly.terminal.exit_codes import FLYABLE
+from planfly.terminal.command_parser import FLYABLE, LineParser
 from planfly.terminal.options import (
     add_aircraft_and_wind_options,
     add_autopilot_options,

@@ -6,8 +6,7 @@ from shlex import quote
 from typing import TYPE_CHECKING
 
 from planfly.terminal.arguments import MISSION_SUFFIXES, file_completer, number_parser, parse_camera, with_completer
-from planfly.terminal.command_parser import LineParser, colour_text
-from planfly.terminal.exit_codes import NOT_FLYABLE, verdict_code
+from planfly.terminal.command_parser import NOT_FLYABLE, LineParser, colour_text, verdict_code
 from planfly.terminal.options import (
     add_aircraft_and_wind_options,
     add_result_options,

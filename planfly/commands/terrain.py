@@ -4,11 +4,9 @@ import argparse
 import shlex
 
 from planfly.terminal.arguments import MISSION_SUFFIXES, file_completer, number_parser, parse_area, with_completer
-from planfly.terminal.command_parser import LineParser
-from planfly.terminal.exit_codes import FLYABLE
+from planfly.terminal.command_parser import FLYABLE, LineParser
 from planfly.terminal.options import add_result_options, call_api
-from planfly.terminal.output import write_json_if_requested
-from planfly.terminal.results import print_warnings
+from planfly.terminal.output import print_warnings, write_json_if_requested
 
 # Maximum number of degree cells without data that are listed.
 _MAX_LISTED_CELLS = 4

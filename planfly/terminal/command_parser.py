@@ -6,11 +6,41 @@ import re
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import Any, Literal, NoReturn, Protocol, TextIO
+from typing import TYPE_CHECKING, Any, Literal, NoReturn, Protocol, TextIO
 
-from planfly.terminal.exit_codes import BAD_INPUT, EXIT_CODES
 from world.errors import PlanflyError
 from world.files import did_you_mean
+
+if TYPE_CHECKING:
+    from planfly import Verdict
+
+# ----------------------------------------------------------------------
+# Exit codes and their meaning.
+
+# Help text on the exit codes.
+EXIT_CODES = """\
+exit codes: 0 flyable, or flown as planned
+            1 internal or system error
+            2 incorrect usage or invalid input; nothing is written, except the error in --json and --junit
+            3 finished, but part of a log is unreadable, a campaign is undecided, or a flight is not judged in full
+            4 not flyable, not flown as planned, or no feasible plan
+            130 stopped by SIGINT (Ctrl-C), 143 by SIGTERM, within a second"""
+
+FLYABLE = 0
+FAULT = 1
+BAD_INPUT = 2
+INCOMPLETE = 3
+NOT_FLYABLE = 4
+# Interrupted by Ctrl-C.  By the convention of shells, this is 128 plus the number of the signal.
+INTERRUPTED = 130
+
+
+def verdict_code(verdict: "Verdict") -> int:
+    """Return the exit code for a verdict that is flyable, not flyable, or not judged in full."""
+    if verdict.undecided:
+        return INCOMPLETE
+    return FLYABLE if verdict.flyable else NOT_FLYABLE
+
 
 # ----------------------------------------------------------------------
 # Colour text for terminals.  Colour is off if the stream is not a terminal, with NO_COLOR and with TERM=dumb, and it is

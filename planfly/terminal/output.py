@@ -10,21 +10,21 @@ import os
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple, TextIO
 
 from planfly.runtime.stages import Advance, Receiver, send_progress_to
-from planfly.terminal.command_parser import CommandParser, wants_colour
+from planfly.terminal.command_parser import BAD_INPUT, CommandParser, colour_text, wants_colour
 from planfly.terminal.control_characters import escape_controls, escape_json_controls
-from planfly.terminal.exit_codes import BAD_INPUT
 from planfly.workflow.output_paths import check_output_file
 from world.errors import PlanflyError
 from world.files import read_at_most, write_atomically
 
 if TYPE_CHECKING:
+    from logs.recording.reader import FlightLog
     from logs.verdict.junit import JunitSuite
     from logs.verdict.verdict import Verdict
 
@@ -159,6 +159,19 @@ def safe_streams() -> Iterator[None]:
             yield
         finally:
             tolerant.flush()
+
+
+def print_warnings(warnings: Iterable[str]) -> None:
+    """Print warnings on standard error."""
+    for warning in warnings:
+        print(colour_text("warning:", "warning", sys.stderr) + f" {warning}", file=sys.stderr)
+
+
+def warn_about_incomplete_log(log: "FlightLog") -> None:
+    """Print a warning on standard error about the missing part of an incomplete log."""
+    from planfly.flight_logs import loss_text
+
+    print_warnings([loss_text(log)])
 
 
 # ----------------------------------------------------------------------
@@ -573,7 +586,17 @@ def write_error_if_requested(args: argparse.Namespace, code: int, message: str) 
     # An option of another command may have the name of an argument, such as --scenario.
     names = ("what", "mission", "log", "scenario", "target")
     source = next((value for name in names if (value := getattr(args, name, None)) is not None), args.command)
-    _write_error(getattr(args, "json", None), getattr(args, "junit", None), str(source), code, message)
+    json_target, junit_target = getattr(args, "json", None), getattr(args, "junit", None)
+    if json_target is not None:
+        text = json.dumps({"schema": ERROR_SCHEMA, "exit_code": code, "error": message}, indent=1) + "\n"
+        if json_target == STANDARD_OUTPUT:
+            print(escape_json_controls(text), end="", file=_output.get() or sys.stdout)
+        else:
+            _replace_or_remove(Path(json_target), text)
+    if junit_target is not None:
+        from logs.verdict.junit import junit_error_text
+
+        _replace_or_remove(Path(junit_target), junit_error_text(str(source), message))
 
 
 def write_usage_error_if_requested(
@@ -605,20 +628,6 @@ def write_usage_error_if_requested(
         setattr(args, f"argument_{number}", argument.partition("=")[2] if argument.startswith("--") else argument)
     with contextlib.suppress(PlanflyError), redirect_output(args):
         write_error_if_requested(args, BAD_INPUT, message)
-
-
-def _write_error(json_target: str | None, junit_target: str | None, source: str, code: int, message: str) -> None:
-    """Write an error as JSON and as JUnit XML.  source: name of the mission or log."""
-    if json_target is not None:
-        text = json.dumps({"schema": ERROR_SCHEMA, "exit_code": code, "error": message}, indent=1) + "\n"
-        if json_target == STANDARD_OUTPUT:
-            print(escape_json_controls(text), end="", file=_output.get() or sys.stdout)
-        else:
-            _replace_or_remove(Path(json_target), text)
-    if junit_target is not None:
-        from logs.verdict.junit import junit_error_text
-
-        _replace_or_remove(Path(junit_target), junit_error_text(source, message))
 
 
 def _replace_or_remove(file: Path, text: str) -> None:

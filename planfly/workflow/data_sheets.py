@@ -338,7 +338,13 @@ def _make_uncertainty(sized: SizedAircraft, aircraft: Aircraft) -> tuple[Uncerta
     if sized.sheet.sink:
         spreads["zero-lift-drag"] = STATED_DRAG_LOG_SD
     climb_sd = climb_deviation(sized)
-    slopes = {name: _effect_of_factor(aircraft, estimated, name, sd) / sd for name, sd in spreads.items()}
+    # Changes for one standard deviation of each factor's logarithm.
+    slopes = {}
+    for name, sd in spreads.items():
+        increased, decreased = (
+            _performance_vector(aircraft, ((f"ident/{name}", math.exp(sign * sd)),)) for sign in (1.0, -1.0)
+        )
+        slopes[name] = factor_effect(increased, decreased, estimated) / sd
     thrust_slopes = slopes.pop("thrust")
     # Change of the logarithm of the thrust per factor that keeps the climb.
     balance = {name: -slope[0] / thrust_slopes[0] for name, slope in slopes.items()}
@@ -346,7 +352,13 @@ def _make_uncertainty(sized: SizedAircraft, aircraft: Aircraft) -> tuple[Uncerta
     effects["climb"] = climb_sd / thrust_slopes[0] * thrust_slopes
     # The propulsive efficiency gets the part of the calibrated deviation of the power that no other factor explains.
     other_power = math.hypot(*(effect[3] for name, effect in effects.items() if name != "drive-power"))
-    calibrated_power = _calibrated_power_sd(sized, math.exp(estimated[3]), spreads["zero-lift-drag"])
+    # The deviation of the logarithm of the cruise power is calibrated on real aircraft.
+    aero, sheet, propulsion = sized.numbers.aero, sized.sheet, sized.numbers.propulsion
+    lift = sheet.mass * GRAVITY / (0.5 * SHEET_DENSITY * sheet.cruise**2 * sheet.area)
+    min_drag_fraction = aero.drag_min / (aero.drag_min + aero.drag_lift * lift**2)
+    avionics = propulsion.avionics if isinstance(propulsion, ElectricMotor) else 0.0
+    avionics_fraction = avionics / math.exp(estimated[3])
+    calibrated_power = power_log_sd(min_drag_fraction, avionics_fraction, spreads["zero-lift-drag"])
     drive_power = math.sqrt(max((0.3 * calibrated_power) ** 2, calibrated_power**2 - other_power**2))
     drive_scale = abs(drive_power / effects["drive-power"][3])
     spreads["drive-power"] *= drive_scale
@@ -408,19 +420,6 @@ def _draw_with_balanced_thrust(uncertainty: Uncertainty, balance: Mapping[str, f
     return replace(draws, values=np.exp(logarithms).round(6))
 
 
-def _calibrated_power_sd(sized: SizedAircraft, power: float, min_drag_sd: float) -> float:
-    """Return the standard deviation of the logarithm of the cruise power, calibrated on real aircraft.
-
-    power: estimated power at cruise, W.
-    min_drag_sd: standard deviation of the logarithm of the minimum drag.
-    """
-    aero, sheet, propulsion = sized.numbers.aero, sized.sheet, sized.numbers.propulsion
-    lift = sheet.mass * GRAVITY / (0.5 * SHEET_DENSITY * sheet.cruise**2 * sheet.area)
-    min_drag_fraction = aero.drag_min / (aero.drag_min + aero.drag_lift * lift**2)
-    avionics_fraction = propulsion.avionics / power if isinstance(propulsion, ElectricMotor) else 0.0
-    return power_log_sd(min_drag_fraction, avionics_fraction, min_drag_sd)
-
-
 def _performance_vector(aircraft: Aircraft, properties: tuple[tuple[str, float], ...] = ()) -> Floats:
     """Compute climb angle (rad), descent angle (rad), top speed (m/s) and log of cruise power (W), (4,).
 
@@ -442,18 +441,6 @@ def _performance_vector(aircraft: Aircraft, properties: tuple[tuple[str, float],
             math.nan if level is None else math.log(float(fdm.read().power)),
         ]
     )
-
-
-def _effect_of_factor(aircraft: Aircraft, estimated: Floats, name: str, sd: float) -> Floats:
-    """Return the change (4,) of `_performance_vector` for one standard deviation of a factor.
-
-    estimated: values for the estimated aircraft, (4,).
-    sd: standard deviation of the factor's logarithm.
-    """
-    increased, decreased = (
-        _performance_vector(aircraft, ((f"ident/{name}", math.exp(sign * sd)),)) for sign in (1.0, -1.0)
-    )
-    return factor_effect(increased, decreased, estimated)
 
 
 def factor_effect(increased: Floats, decreased: Floats, estimated: Floats) -> Floats:
@@ -557,7 +544,10 @@ def _parameter_lines(stated: AircraftParameters, overridden: Sequence[str]) -> l
     used_texts = list(filter(is_used, stated.texts.values()))
     lines = []
     if used_texts:
-        lines = [f"From the parameter file: {', '.join(used_texts)}.", *_climb_lines(stated)]
+        lines = [f"From the parameter file: {', '.join(used_texts)}."]
+        if names := _climb_names(stated):
+            climb_text = f"{names[0]} is the climb rate with the throttle at {names[1]}"
+            lines.append(f"{climb_text}; the table has the climb at full throttle.")
     if overridden:
         lines.append(
             f"Not used from the parameter file, because the data sheet states these values: {', '.join(overridden)}."
@@ -589,7 +579,14 @@ def _file_texts(
     draft_fdm = Fdm(aircraft, is_tested=True)
     performance = measure_performance(draft_fdm, aircraft)
     draft_fdm.apply_trim(performance.level.vector())
-    _check_endurance(aircraft, float(draft_fdm.read().power))
+    power, volts = float(draft_fdm.read().power), aircraft.battery_voltage
+    if volts and aircraft.battery_energy < _MIN_ENDURANCE_S * power:
+        allowed = (
+            f"level flight at {aircraft.airspeed:g} m/s draws {power / volts:.0f} A and empties the battery"
+            f" in {aircraft.battery_energy / power:.0f} s; expected at least {_MIN_ENDURANCE_S:g} s"
+        )
+        watt_hours = aircraft.battery_energy / 3600.0
+        raise FlightError.of_argument("battery", watt_hours, allowed, shown=f"{volts:g} V, {watt_hours:.3g} Wh")
     # With the thrust of its propeller, the model may fly slower than the stall speed of the sheet.  The higher of the
     # two speeds is used.
     stall_speed = max(
@@ -620,21 +617,6 @@ def _file_texts(
             climb_names,
         ),
     }
-
-
-def _check_endurance(aircraft: Aircraft, power: float) -> None:
-    """Raise FlightError if level flight empties the battery within `_MIN_ENDURANCE_S`.
-
-    power: power of level flight, W.
-    """
-    if not aircraft.battery_voltage or aircraft.battery_energy >= _MIN_ENDURANCE_S * power:
-        return
-    volts, watt_hours = aircraft.battery_voltage, aircraft.battery_energy / 3600.0
-    allowed = (
-        f"level flight at {aircraft.airspeed:g} m/s draws {power / volts:.0f} A and empties the battery"
-        f" in {aircraft.battery_energy / power:.0f} s; expected at least {_MIN_ENDURANCE_S:g} s"
-    )
-    raise FlightError.of_argument("battery", watt_hours, allowed, shown=f"{volts:g} V, {watt_hours:.3g} Wh")
 
 
 def measure_performance(fdm: Simulator, aircraft: Aircraft) -> Performance:
@@ -856,28 +838,6 @@ def _climb_names(stated: AircraftParameters) -> list[str]:
     return [stated.texts[name].split()[0] for name in names] if stated.values.keys() >= set(names) else []
 
 
-def _climb_lines(stated: AircraftParameters) -> list[str]:
-    """Return a line of ``README.md`` if the file's climb rate is not at full throttle; otherwise []."""
-    if not (names := _climb_names(stated)):
-        return []
-    climb_text = f"{names[0]} is the climb rate with the throttle at {names[1]}"
-    return [f"{climb_text}; the table has the climb at full throttle."]
-
-
-def _performance_lines(aircraft: Aircraft, performance: Performance) -> list[str]:
-    """Return lines of ``README.md`` on the performance of the model and the speeds of its guidance."""
-    climb = math.degrees(performance.climb.climb)
-    sink = -math.degrees(performance.idle.climb)
-    return [
-        f"The model weighs {aircraft.mass * GRAVITY:.1f} N, flies level at {aircraft.airspeed:g} m/s with"
-        f" {100.0 * performance.level.throttle:.0f} % throttle, climbs {climb:.1f} degrees at",
-        f"full throttle and sinks {sink:.1f} degrees without (at {AMSL:g} m). Its elevator reaches its stop at"
-        f" {performance.slowest.airspeed:.1f} m/s.",
-        f"Guidance flies at {aircraft.airspeed_min:g} to {aircraft.airspeed_max:g} m/s:"
-        f" up to {100.0 * MAX_GUIDANCE_SPEED_RATIO:.0f} % of the fastest level flight.",
-    ]
-
-
 def _value_lines(sized: SizedAircraft, climb_names: str) -> list[str]:
     """Return the rows of the table in ``README.md``: the values of the sheet and their sources.
 
@@ -927,7 +887,13 @@ def _readme_text(
         *_value_lines(sized, climb_names),
         *parameter_lines,
         "",
-        *_performance_lines(aircraft, performance),
+        f"The model weighs {aircraft.mass * GRAVITY:.1f} N, flies level at {aircraft.airspeed:g} m/s with"
+        f" {100.0 * performance.level.throttle:.0f} % throttle, climbs"
+        f" {math.degrees(performance.climb.climb):.1f} degrees at",
+        f"full throttle and sinks {-math.degrees(performance.idle.climb):.1f} degrees without (at {AMSL:g} m). Its"
+        f" elevator reaches its stop at {performance.slowest.airspeed:.1f} m/s.",
+        f"Guidance flies at {aircraft.airspeed_min:g} to {aircraft.airspeed_max:g} m/s:"
+        f" up to {100.0 * MAX_GUIDANCE_SPEED_RATIO:.0f} % of the fastest level flight.",
         *missed_lines,
         "",
         "## Uncertainties",

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 
-from aircraft.path_limits import Limits
 from flight.autopilots.autopilot import Autopilot
 from flight.autopilots.catalog import autopilot_from_log
 from flight.autopilots.parameter_origin import TITLES
@@ -51,8 +50,6 @@ from world.scenario import Scenario, with_flight, with_wind
 from world.scenario_tables import FlightTable
 from world.wording import count_text
 
-# Size of the blocks in which a file is hashed, bytes.
-_BLOCK_BYTES = 2**20
 # Minimum number of items of a mission.
 _MIN_ITEMS = 2
 
@@ -113,17 +110,19 @@ def import_flight(path: Path, options: LogOptions) -> ImportedFlight:
     if (datum := options.get("datum")) is not None and heights.datum == "unstated":
         heights = replace(heights, datum=datum)
     notes = (
-        *_describe_gaps(flight),
-        *_describe_other_flights(flight),
-        *_describe_throttle(flight),
+        *_describe_log(flight),
         *autopilot_notes,
         *mission.warnings,
         *_describe_mission_change(flight, mission, options),
     )
+    sha256 = flight.raw.sha256
+    if not sha256:
+        with path.open("rb") as file:
+            sha256 = hashlib.file_digest(file, "sha256").hexdigest()
     imported_log = ImportedLog(
         missing=None if plan is not None or flight.mission is None else flight.mission.missing,
         file=path.name,
-        sha256=flight.raw.sha256 or _sha256(path),
+        sha256=sha256,
         format=flight.raw.format,
         program=flight.raw.program,
         utc_start=flight.raw.utc_start,
@@ -145,7 +144,9 @@ def import_flight(path: Path, options: LogOptions) -> ImportedFlight:
     if plan is not None and (mismatch := plan_mismatch(setup, track)) is not None:
         raise MissionError(f"{path}: not a flight of {plan}: {mismatch.text}", file=path)
     verdict = judge_flight(setup, track, "")
-    end_reason = "completed" if verdict.complete else _completion_text(verdict)
+    end_reason = "completed"
+    if not verdict.complete:
+        end_reason = next((found.brief for found in verdict.findings if found.rule == "completion"), "not judged")
     return ImportedFlight(setup, track, _vehicle_events(flight), verdict, end_reason)
 
 
@@ -238,9 +239,22 @@ def _flight_setup(
     """Return the setup for judging an imported flight.
 
     placed: the mission placed on the map of the scenario.
+
+    The cruise airspeed is (in order) the autopilot's parameter, the scenario's airspeed, the median airspeed of the
+    log, or the aircraft's cruise airspeed.  The bank limit is the autopilot's parameter; without it, the lower one of
+    the scenario's and the autopilot's usual limit.
     """
     aircraft = scenario_aircraft(scenario)
-    limits = _path_limits(scenario, autopilot, flight, aircraft.airspeed)
+    envelope = load_envelope(aircraft, motor_braking=scenario.flight.motor_braking)
+    airspeed = scenario.flight.airspeed_mps or aircraft.airspeed
+    stated_airspeed = autopilot.stated_value(autopilot.speeds.cruise_parameter)
+    if stated_airspeed is not None:
+        airspeed = stated_airspeed
+    elif scenario.flight.airspeed_mps is None and np.isfinite(flight.columns["airspeed"]).any():
+        airspeed = float(np.nanmedian(flight.columns["airspeed"]))
+    is_bank_stated = autopilot.stated_value(autopilot.turns.bank_parameter) is not None
+    bank = autopilot.turns.max_bank if is_bank_stated else max_turn_bank(scenario, autopilot)
+    limits = make_limits(scenario, envelope, max(5.0, airspeed), bank)
     return FlightSetup(
         scenario=scenario,
         mission=mission,
@@ -255,37 +269,8 @@ def _flight_setup(
     )
 
 
-def _path_limits(scenario: Scenario, autopilot: Autopilot, flight: LoggedFlight, default_airspeed: float) -> Limits:
-    """Return the limits on path and speed at the cruise airspeed of the logged flight.
-
-    The cruise airspeed is (in order) the autopilot's parameter, the scenario's airspeed, the median airspeed of the
-    log, or `default_airspeed` (m/s).  The bank limit is the autopilot's parameter; without it, the lower one of the
-    scenario's and the autopilot's usual limit.
-    """
-    aircraft = scenario_aircraft(scenario)
-    envelope = load_envelope(aircraft, motor_braking=scenario.flight.motor_braking)
-    airspeed = scenario.flight.airspeed_mps or default_airspeed
-    stated_airspeed = autopilot.stated_value(autopilot.speeds.cruise_parameter)
-    if stated_airspeed is not None:
-        airspeed = stated_airspeed
-    elif scenario.flight.airspeed_mps is None and np.isfinite(flight.columns["airspeed"]).any():
-        airspeed = float(np.nanmedian(flight.columns["airspeed"]))
-    is_bank_stated = autopilot.stated_value(autopilot.turns.bank_parameter) is not None
-    bank = autopilot.turns.max_bank if is_bank_stated else max_turn_bank(scenario, autopilot)
-    return make_limits(scenario, envelope, max(5.0, airspeed), bank)
-
-
-def _sha256(path: Path) -> str:
-    """Return the SHA-256 of a file as hexadecimal text."""
-    digest = hashlib.sha256()
-    with path.open("rb") as file:
-        while block := file.read(_BLOCK_BYTES):
-            digest.update(block)
-    return digest.hexdigest()
-
-
-def _describe_gaps(flight: LoggedFlight) -> tuple[str, ...]:
-    """Return notes on the parts that a log lacks: its start, its end, or positions; () for a complete log."""
+def _describe_log(flight: LoggedFlight) -> tuple[str, ...]:
+    """Return notes on a log that is incomplete, has other flights, or has a constant throttle, as that of a glider."""
     notes = []
     if flight.begins_in_flight:
         notes.append(f"the log begins in flight, at {flight.time[0]:.1f} s")
@@ -296,28 +281,18 @@ def _describe_gaps(flight: LoggedFlight) -> tuple[str, ...]:
         notes.append(
             f"the log has a position only every {usual_step:.1f} s; the flight between the positions is unknown"
         )
-    return tuple(notes)
-
-
-def _describe_throttle(flight: LoggedFlight) -> tuple[str, ...]:
-    """Return a note if the throttle is the same in all rows, as in the log of a glider; () if it varies."""
+    if flight.count > 1:
+        other_flights = ", ".join(
+            f"at {start:.0f} s (followed a mission for {mission_time:.0f} s)" for start, mission_time in flight.others
+        )
+        notes.append(
+            f"flight {flight.number} of {flight.count} is judged; the others began {other_flights}. --flight N judges"
+            " another flight"
+        )
     throttle = flight.raw.series.get("throttle")
-    if throttle is None or len(throttle.values) < 2 or np.ptp(throttle.values) > 0.0:
-        return ()
-    return (f"the throttle never moves: {abs(float(throttle.values.flat[0])):.3g} in all rows",)
-
-
-def _describe_other_flights(flight: LoggedFlight) -> tuple[str, ...]:
-    """Return a note on the other flights in the log; () if there are none."""
-    if flight.count == 1:
-        return ()
-    other_flights = ", ".join(
-        f"at {start:.0f} s (followed a mission for {mission_time:.0f} s)" for start, mission_time in flight.others
-    )
-    return (
-        f"flight {flight.number} of {flight.count} is judged; the others began {other_flights}. --flight N judges"
-        " another flight",
-    )
+    if throttle is not None and len(throttle.values) > 1 and not np.ptp(throttle.values) > 0.0:
+        notes.append(f"the throttle never moves: {abs(float(throttle.values.flat[0])):.3g} in all rows")
+    return tuple(notes)
 
 
 def _describe_mission_change(flight: LoggedFlight, mission: Mission, options: LogOptions) -> tuple[str, ...]:
@@ -366,12 +341,6 @@ def _vehicle_events(flight: LoggedFlight) -> tuple[LogEvent, ...]:
         if start_time - 60.0 <= time <= end_time
     ]
     return tuple(sorted(events_in_flight, key=lambda event: event.time))
-
-
-def _completion_text(verdict: Verdict) -> str:
-    """Return the text of the finding on completion, or "not judged" without this finding."""
-    finding = next((candidate for candidate in verdict.findings if candidate.rule == "completion"), None)
-    return "not judged" if finding is None else finding.brief
 
 
 # ----------------------------------------------------------------------

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Literal
@@ -32,7 +33,6 @@ from planfly.flight_options import (
 from planfly.workflow.uav import Uav, choose_seed, load_uav
 from planner.plan import Plan, parse_plan, plan_json, read_plan
 from world.airfield import STEEPEST_STRIP_SLOPE, LandingStrip
-from world.arrays import Floats
 from world.errors import ForecastError, MissionError, ScenarioError, TerrainError
 from world.files import did_you_mean, missing_text
 from world.forecast.scenario_wind import check_coverage
@@ -148,19 +148,17 @@ def check_mission_exists(path: Path) -> Path:
         text = "a scenario, which has to be planned first: `planfly run` or planfly.plan_then_fly plan and fly it"
         raise MissionError(f"{path}: {text}; expected a plan.json, .waypoints or .plan file", file=path)
     if not path.is_file():
-        hint = "" if path.exists() else did_you_mean(path.name, _mission_file_names(path.parent), path.parent)
+        names: list[str] = []
+        # A folder that cannot be read has no names to suggest.
+        with suppress(OSError):
+            names = sorted(
+                file.name for file in path.parent.iterdir() if file.suffix in (".json", ".waypoints", ".plan", ".txt")
+            )
+        hint = "" if path.exists() else did_you_mean(path.name, names, path.parent)
         expected = "expected a plan.json, .waypoints or .plan file"
         one_text = ", one at a time" if path.is_dir() else ""
         raise MissionError(f"{path}: {missing_text(path)}; {expected}{one_text}{hint}", file=path)
     return path
-
-
-def _mission_file_names(folder: Path) -> list[str]:
-    """List the names of a folder's possible mission files; empty if the folder cannot be read."""
-    try:
-        return sorted(file.name for file in folder.iterdir() if file.suffix in (".json", ".waypoints", ".plan", ".txt"))
-    except OSError:
-        return []
 
 
 def mission_of_plan(plan: Plan, uav: Uav, source: str = PLAN_FILE) -> Mission:
@@ -392,46 +390,41 @@ def preflight_notes(
     except MissionError as error:
         # The rally points belong to another airfield: only an RTL would fly to them, and that RTL is refused elsewhere.
         return_targets, rally_problems = (), (str(error),)
-    return (
-        *rally_problems,
-        *_note_tail_winds(route, scenario),
-        *_note_distant_home(mission, scenario),
-        *_note_misread_altitudes(mission, scenario),
-        *_note_rally_points(return_targets[1:], route, scenario, rules),
-        *_note_low_return(return_targets[:1], scenario, rules),
-        *_note_autoland(mission, scenario, parameters, assumed_parameters),
-        *_note_landing_ground(mission, route, scenario),
-    )
-
-
-def _note_tail_winds(route: Route, scenario: Scenario) -> Iterator[str]:
-    """Yield a note on the tailwind at the scenario's launch, and one on the tailwind at its landing."""
-    courses = leg_courses(route.positions)
-    launch, landing = scenario.launch, scenario.landing
-    ends = []
+    notes = list(rally_problems)
+    # Tailwind at the scenario's launch and landing.
+    courses, launch, ends = leg_courses(route.positions), scenario.launch, []
     if launch is not None and route.takeoff_ground is not None:
-        stated_course = launch.course
-        ends.append(("launch", float(courses[0]) if stated_course is None else stated_course, route.takeoff_ground))
-    if landing is not None and route.landing_ground is not None:
+        course = float(courses[0]) if launch.course is None else launch.course
+        ends.append(("launch", course, route.takeoff_ground))
+    if scenario.landing is not None and route.landing_ground is not None:
         ends.append(("landing", float(courses[-1]), route.landing_ground))
     for name, course, altitude in ends:
         tail_wind = scenario.wind.components_on_course(course, altitude)[0]
         if tail_wind > MIN_NOTED_WIND_MPS:
-            yield f"{name}: {tail_wind:.1f} m/s of tailwind on course {round(math.degrees(course)) % 360}°"
-
-
-def _note_distant_home(mission: Mission, scenario: Scenario) -> Iterator[str]:
-    """Yield a note if the mission's home is far from the scenario's home."""
+            notes.append(f"{name}: {tail_wind:.1f} m/s of tailwind on course {round(math.degrees(course)) % 360}°")
     home, scenario_home = mission.home, scenario.home
-    if home is None or scenario_home is None:
-        return
-    east, north = to_map(scenario.origin, home.lat_deg, home.lon_deg)
-    distance = math.dist((float(east), float(north)), scenario_home[:2])
-    if distance > MAX_HOME_DISTANCE_M:
-        yield (
-            f"the mission's home is {distance:.0f} m from the scenario's home: after a launch at the scenario's home, "
-            "heights are relative to the scenario's home"
+    if home is not None and scenario_home is not None:
+        east, north = to_map(scenario.origin, home.lat_deg, home.lon_deg)
+        distance = math.dist((float(east), float(north)), scenario_home[:2])
+        if distance > MAX_HOME_DISTANCE_M:
+            notes.append(
+                f"the mission's home is {distance:.0f} m from the scenario's home: after a launch at the scenario's"
+                " home, heights are relative to the scenario's home"
+            )
+    notes += _note_misread_altitudes(mission, scenario)
+    notes += _note_rally_points(return_targets[1:], route, scenario, rules)
+    notes += _note_low_return(return_targets[:1], scenario, rules)
+    # ArduPlane refuses to arm with a landing sequence and RTL_AUTOLAND 0 (AP_Arming.cpp).  An assumed value is noted
+    # only without a landing of the scenario, because planfly writes RTL_AUTOLAND for its plan.
+    start_numbers = [item.seq for item in mission.items if item.command == Command.DO_LAND_START]
+    if start_numbers and parameters.get("RTL_AUTOLAND") == 0.0:
+        notes.append(f"item {start_numbers[0]}: ArduPlane does not arm with DO_LAND_START and RTL_AUTOLAND 0")
+    elif start_numbers and scenario.landing is None and "RTL_AUTOLAND" in assumed_parameters:
+        notes.append(
+            f"item {start_numbers[0]}: RTL_AUTOLAND {assumed_parameters['RTL_AUTOLAND']:g} is assumed for"
+            " DO_LAND_START, because ArduPlane does not arm with the default 0"
         )
+    return (*notes, *_note_landing_ground(mission, route, scenario))
 
 
 def _note_misread_altitudes(mission: Mission, scenario: Scenario) -> Iterator[str]:
@@ -472,6 +465,7 @@ def _note_rally_points(
     points: the rally points on the map.
     rules: RTL rules of the autopilot.
     """
+    leg_starts, leg_vectors = route.positions[:-1, :2], np.diff(route.positions[:, :2], axis=0)
     for point in points:
         name = f"rally point {point.number}"
         ground = math.nan if scenario.terrain is None else float(scenario.terrain.height(point.east, point.north))
@@ -482,21 +476,17 @@ def _note_rally_points(
                 f"{name} is {ground - point.up:.0f} m below the ground"
                 f" ({point.up:.0f} m AMSL; the ground there is at {ground:.0f} m AMSL)"
             )
-        distance = _distance_from_path(route.positions, (point.east, point.north))
+        # The minimum horizontal distance from the legs.
+        squared_lengths = np.maximum(1e-12, (leg_vectors**2).sum(axis=1))
+        offsets = np.array((point.east, point.north)) - leg_starts
+        fractions = np.clip((offsets * leg_vectors).sum(axis=1) / squared_lengths, 0.0, 1.0)
+        distance = float(np.hypot(*(leg_starts + fractions[:, None] * leg_vectors - (point.east, point.north)).T).min())
         if 0.0 < rules.rally_limit < distance:
             limit = f"RALLY_LIMIT_KM {rules.rally_limit / 1000.0:g}"
             yield (
                 f"no RTL flies to {name}, because it is at least {distance / 1000.0:.1f} km from the mission,"
                 f" beyond {limit}"
             )
-
-
-def _distance_from_path(waypoints: Floats, point: tuple[float, float]) -> float:
-    """Return the minimum horizontal distance of a point from a path (w, 3), m."""
-    leg_starts, leg_vectors = waypoints[:-1, :2], np.diff(waypoints[:, :2], axis=0)
-    squared_lengths = np.maximum(1e-12, (leg_vectors**2).sum(axis=1))
-    fractions = np.clip(((np.array(point) - leg_starts) * leg_vectors).sum(axis=1) / squared_lengths, 0.0, 1.0)
-    return float(np.hypot(*(leg_starts + fractions[:, None] * leg_vectors - np.array(point)).T).min())
 
 
 def _note_low_return(home_points: tuple[ReturnPoint, ...], scenario: Scenario, rules: ReturnRules) -> Iterator[str]:
@@ -520,36 +510,8 @@ def _note_low_return(home_points: tuple[ReturnPoint, ...], scenario: Scenario, r
         )
 
 
-def _note_autoland(
-    mission: Mission, scenario: Scenario, parameters: Mapping[str, float], assumed_parameters: Mapping[str, float]
-) -> Iterator[str]:
-    """Yield a note on a landing sequence if RTL_AUTOLAND is 0, because ArduPlane then refuses to arm.
-
-    parameters: stated parameters of the autopilot, by name.
-    assumed_parameters: parameters that are assumed for the mission's landing, by name.
-
-    Arming is checked in AP_Arming.cpp. There is no note on an assumed value if the scenario has a landing, because
-    planfly writes RTL_AUTOLAND for its plan.
-    """
-    start_numbers = [item.seq for item in mission.items if item.command == Command.DO_LAND_START]
-    if start_numbers and parameters.get("RTL_AUTOLAND") == 0.0:
-        yield f"item {start_numbers[0]}: ArduPlane does not arm with DO_LAND_START and RTL_AUTOLAND 0"
-    elif start_numbers and scenario.landing is None and "RTL_AUTOLAND" in assumed_parameters:
-        value = assumed_parameters["RTL_AUTOLAND"]
-        yield (
-            f"item {start_numbers[0]}: RTL_AUTOLAND {value:g} is assumed for DO_LAND_START, because ArduPlane does not"
-            " arm with the default 0"
-        )
-
-
 # Text for level ground.
 _LEVEL_TEXT = "is level"
-
-
-def _slope_text(slope: float) -> str:
-    """Describe a slope of the ground (m per m, positive uphill) as the end of a sentence: "rises by 2.0%"."""
-    percent_text = f"{abs(slope):.1%}"
-    return _LEVEL_TEXT if percent_text == "0.0%" else f"{'rises' if slope > 0.0 else 'falls'} by {percent_text}"
 
 
 def _note_landing_ground(mission: Mission, route: Route, scenario: Scenario) -> Iterator[str]:
@@ -567,7 +529,12 @@ def _note_landing_ground(mission: Mission, route: Route, scenario: Scenario) -> 
     ground = "The terrain there is unknown"
     length = LandingStrip(0.0, 0.0).length
     if not any(math.isnan(slope) for slope in slopes):
-        along, across = (_slope_text(slope) for slope in slopes)
+        along, across = (
+            _LEVEL_TEXT
+            if f"{abs(slope):.1%}" == "0.0%"
+            else f"{'rises' if slope > 0.0 else 'falls'} by {abs(slope):.1%}"
+            for slope in slopes
+        )
         ground = (
             f"Over {length:.0f} m around the landing point the ground {along} in the landing direction and {across} to"
             " the right"

@@ -1,6 +1,6 @@
 """Plan, fly, record and judge a mission and returns from it, with one function for each stage."""
 
-from contextlib import ExitStack
+from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -23,12 +23,14 @@ from logs.verdict.returns.judge_returns import Returns, ReturnWorld, judge_retur
 from logs.verdict.returns.return_starts import ReturnStarts, return_starts
 from logs.verdict.returns.returns_text import headline
 from logs.verdict.verdict import Verdict
-from planfly.workflow.flight_limits import FlightLimits
-from planfly.workflow.make_plan import Advance, make_plan, planning_conditions
+from planfly.flight_options import MAX_HOURS, MAX_MEGABYTES
+from planfly.runtime.stages import Advance, stage
+from planfly.workflow.make_plan import make_plan, planning_conditions
 from planfly.workflow.mission_context import JudgedMission
 from planfly.workflow.open_flight import make_setup, mission_of_plan
 from planfly.workflow.reference_flights import FlyReference, explain_verdict
 from planfly.workflow.suggestion_trials import with_tried_suggestions
+from planfly.workflow.trial_flight import length_and_duration_text
 from planfly.workflow.uav import choose_seed, load_uav
 from planner.plan import Plan
 from world.errors import FlightError, PlanflyError, StartError
@@ -38,6 +40,20 @@ from world.scenario import Scenario
 BATCH_S = 60
 # Number of returns in a flight's summary of returns and in its pictures.
 _SUMMARY_RETURN_COUNT = 50
+
+
+@dataclass(frozen=True, slots=True)
+class FlightLimits:
+    """Limits of simulated time and log size, at which a flight is ended.
+
+    hours: maximum simulated time, h.
+    megabytes: maximum size of the log, 10^6 bytes.
+    """
+
+    hours: float = MAX_HOURS
+    megabytes: float = MAX_MEGABYTES
+
+
 # Limits of a flight unless others are given.
 _DEFAULT_LIMITS = FlightLimits()
 
@@ -195,6 +211,14 @@ def plan_then_fly(scenario: Scenario, *, seed: int | None = None, log: Path | No
     return PlanThenFly(plan, mission, flight.track, flight.verdict)
 
 
+def flying_stage(setup: FlightSetup, kind: str = "") -> AbstractContextManager[Advance]:
+    """Return the context of the stage in which a setup is flown, which yields a function to report its progress.
+
+    kind: common name of stages that take a similar time per km; "" for flights by the setup's autopilot.
+    """
+    return stage(f"flying {length_and_duration_text(setup)}", kind or f"flying by {setup.autopilot.name}")
+
+
 def fly_and_judge(
     setup: FlightSetup,
     log: Path | None = None,
@@ -235,7 +259,14 @@ def fly_and_judge(
         flight = Flight(setup, aircraft, off_nominal_flight.variation, start_offset=off_nominal_flight.start_offset)
         return _record_and_judge(task, requirements, flight)
     except StartError as error:
-        return _judge_unflown(requirements, log, f"not started: {error.reason}", reference)
+        end_reason, track = f"not started: {error.reason}", join_tracks([])
+        if log is not None:
+            # The log of an earlier flight.
+            log.unlink(missing_ok=True)
+        verdict = judge_flight(setup, track, end_reason, requirements=requirements)
+        if reference != "never":
+            verdict = with_tried_suggestions(JudgedMission(setup.mission, setup, requirements, verdict))
+        return FlownMission(setup, track, verdict, end_reason)
 
 
 @dataclass(frozen=True, slots=True)
@@ -286,7 +317,8 @@ def _record_and_judge(task: _FlightTask, requirements: RouteRequirements, flight
 
     If the task asks for it, the verdict is explained by reference flights, and the log also gets returns.
     """
-    flight.max_ticks = min(flight.max_ticks, task.limits.max_ticks(flight.dt))
+    limits = task.limits
+    flight.max_ticks = min(flight.max_ticks, round(3600.0 * limits.hours / flight.dt))
     builder, end_reason, length = TrackBuilder(), "", flight.path.length
     with ExitStack() as open_logs:
         recorder = None
@@ -300,12 +332,16 @@ def _record_and_judge(task: _FlightTask, requirements: RouteRequirements, flight
             builder.add(rows)
             if recorder is not None and len(rows):
                 recorder.write_rows(rows)
-                end_reason = end_reason or task.limits.log_limit_reason(recorder.size)
+                if not end_reason and recorder.size > 1e6 * limits.megabytes:
+                    size_text = f"{limits.megabytes:g} MB"
+                    end_reason = f"log limit: the log has reached {size_text}; --max-log raises the limit"
             if task.advance is not None:
                 task.advance(flight.distance, length, f"{flight.distance / 1000:.1f} of {length / 1000:.1f} km")
         track = builder.track()
         if recorder is not None:
-            recorder.end_reason, track = end_reason, thin_track(track, task.every)
+            recorder.end_reason = end_reason
+            if task.every > 1:
+                track = thin_track(track, task.every)
         reference_flights, summary = None, None
         verdict = judge_flight(
             requirements.setup, track, end_reason, requirements=requirements, findings_only=task.findings_only
@@ -337,19 +373,6 @@ def _record_and_judge(task: _FlightTask, requirements: RouteRequirements, flight
         engine=flight.engine if len(track) else "",
         reference=reference_flights,
     )
-
-
-def _judge_unflown(
-    requirements: RouteRequirements, log: Path | None, end_reason: str, reference: FlyReference
-) -> FlownMission:
-    """Judge a flight that did not start, and remove an earlier flight's log at the path `log`."""
-    if log is not None:
-        log.unlink(missing_ok=True)
-    setup, track = requirements.setup, join_tracks([])
-    verdict = judge_flight(setup, track, end_reason, requirements=requirements)
-    if reference != "never":
-        verdict = with_tried_suggestions(JudgedMission(setup.mission, setup, requirements, verdict))
-    return FlownMission(setup, track, verdict, end_reason)
 
 
 def return_summary(

@@ -1,4 +1,4 @@
-"""Judge a setup by its geometry and by a trial flight."""
+"""Judge a setup by its geometry and by a trial flight, and predict the duration of a flight."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -10,10 +10,15 @@ from flight.simulation.simulate import BLOCK_DURATION_S, Flight
 from flight.simulation.track import Track, TrackBuilder, join_tracks
 from logs.verdict.judge_flight import judge_flight
 from logs.verdict.judge_geometry import judge_geometry
-from logs.verdict.measures.route_requirements import RouteRequirements, check_energy, route_requirements
+from logs.verdict.measures.route_requirements import (
+    RouteRequirements,
+    check_energy,
+    route_requirements,
+    true_airspeed_route,
+)
 from logs.verdict.verdict import Verdict
-from planfly.workflow.flight_limits import predicted_seconds
 from world.errors import StartError
+from world.geometry import leg_runs
 
 # Altitude error of a simulated autopilot against the real one, m.  The minimum clearances of 20 ArduPlane climbs are
 # within this error.
@@ -86,3 +91,27 @@ def max_explaining_flights(setup: FlightSetup) -> int:
     True
     """
     return int(MAX_EXPLAINING_TIME_S / predicted_seconds(setup))
+
+
+def predicted_seconds(setup: FlightSetup) -> float:
+    """Predict the duration of a flight in still air, s.
+
+    It is the path length divided by the mean of the legs' demanded true airspeeds, weighted by the time on each leg.
+
+    >>> from logs.recording.example_log import example_log
+    >>> flown = example_log()
+    >>> bool(abs(predicted_seconds(flown.setup) - flown.track.time[-1]) < 5.0)
+    True
+    """
+    leg_lengths = leg_runs(setup.route.positions)
+    speed = leg_lengths.sum() / (leg_lengths / true_airspeed_route(setup).leg_airspeeds).sum()
+    return float(setup.path.length / speed)
+
+
+def length_and_duration_text(setup: FlightSetup) -> str:
+    """Return the length and the predicted duration of a flight, such as "12.3 km, about 500 s in the air"."""
+    seconds = predicted_seconds(setup)
+    time = f"{seconds:.0f} s" if seconds < 120.0 else f"{seconds / 60.0:.0f} min"
+    if seconds >= 2.0 * 3600.0:
+        time = f"{seconds / 3600.0:.1f} h"
+    return f"{setup.path.length / 1000.0:.1f} km, about {time} in the air"

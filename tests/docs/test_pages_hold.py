@@ -19,7 +19,7 @@ from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.rules.registry import RULES
 from planfly.campaigns.flight_row import SPHERE_SCALE_M
 from planfly.cli import build_parser, main
-from planfly.terminal.exit_codes import EXIT_CODES
+from planfly.terminal.command_parser import EXIT_CODES
 from tests.docs.page_blocks import PAGES, ROOT
 from tests.planfly.made_plans import default_run
 from world.elevation_formats import SUFFIXES

@@ -12,8 +12,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from planfly.cli import main
-from planfly.commands.registry import COMMANDS_BY_NAME
+from planfly.cli import COMMANDS_BY_NAME, main
 from planfly.terminal import output
 from planfly.terminal.command_parser import UsageExit
 from world.errors import ScenarioError

@@ -14,8 +14,7 @@ from typing import NamedTuple
 import pytest
 
 from logs.recording.example_log import write_example_log
-from planfly.cli import main
-from planfly.commands.registry import COMMANDS
+from planfly.cli import COMMANDS, main
 from tests.logs.importers.written_logs import dataflash, gpx, telemetry
 from tests.world.made.elevation_files import write_geotiff
 from world.extras import EXTRAS

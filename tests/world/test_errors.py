@@ -7,8 +7,7 @@ from pathlib import Path
 import pytest
 
 import world.errors
-from planfly.cli import main
-from planfly.commands.registry import COMMANDS_BY_NAME
+from planfly.cli import COMMANDS_BY_NAME, main
 from world.errors import (
     ArgumentError,
     CrashError,

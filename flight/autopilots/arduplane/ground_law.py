@@ -40,7 +40,6 @@ from flight.dynamics.instructions import Code
 from flight.guidance.equivalent_airspeed import eas_to_tas_ratio
 from flight.guidance.lateral_reference_laws import l1_acceleration, l1_angles, l1_integrate, l1_length
 from flight.guidance.path import find_on_path
-from flight.simulation.compiled_loop import advance_model, read_state
 from flight.simulation.tick import (
     COMPLETED,
     END_BATTERY_EMPTY,
@@ -54,9 +53,11 @@ from flight.simulation.tick import (
     STALLED,
     WORKSPACE,
     WORKSPACE_NUMBERS,
+    advance_model,
     airborne_end_code,
     begin_tick,
     fill_tick,
+    read_state,
 )
 from world.arrays import Floats, Heights
 from world.geometry import wrap

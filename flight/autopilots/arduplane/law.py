@@ -13,15 +13,16 @@ from flight.guidance.equivalent_airspeed import eas_to_tas_ratio
 from flight.guidance.inner_loops import follow_roll, steer_elevator
 from flight.guidance.path import find_on_path, leave_sharp_corners, profile_at
 from flight.mission.itinerary import ENDLESS_LOITER_TIME_S
-from flight.simulation.compiled_loop import advance_model, read_state
 from flight.simulation.tick import (
     MISSED_ROUTE_DISTANCE_M,
     NOT_A_NUMBER,
     PATH_ROW,
     WORKSPACE,
     WORKSPACE_NUMBERS,
+    advance_model,
     begin_tick,
     end_tick,
+    read_state,
     update_rtl_loiter,
 )
 from world.arrays import Floats, Heights

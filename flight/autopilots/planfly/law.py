@@ -24,8 +24,16 @@ from flight.guidance.lateral_reference_laws import (
     l1_length,
 )
 from flight.guidance.path import find_on_path, max_curvature, mean_curvature, profile_at
-from flight.simulation.compiled_loop import advance_model, read_state
-from flight.simulation.tick import NOT_A_NUMBER, PATH_ROW, WORKSPACE, WORKSPACE_NUMBERS, begin_tick, end_tick
+from flight.simulation.tick import (
+    NOT_A_NUMBER,
+    PATH_ROW,
+    WORKSPACE,
+    WORKSPACE_NUMBERS,
+    advance_model,
+    begin_tick,
+    end_tick,
+    read_state,
+)
 from world.arrays import Floats, Heights
 from world.geometry import wrap
 from world.kernels import Record, Records, compiled, inner

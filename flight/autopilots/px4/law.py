@@ -16,14 +16,15 @@ from flight.dynamics.instructions import Code
 from flight.guidance.equivalent_airspeed import eas_to_tas_ratio
 from flight.guidance.inner_loops import follow_roll, steer_elevator
 from flight.guidance.path import find_on_path, leave_sharp_corners, profile_at
-from flight.simulation.compiled_loop import advance_model, read_state
 from flight.simulation.tick import (
     NOT_A_NUMBER,
     PATH_ROW,
     WORKSPACE,
     WORKSPACE_NUMBERS,
+    advance_model,
     begin_tick,
     end_tick,
+    read_state,
     update_end_loiter,
     update_rtl_loiter,
 )

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from logs.recording.reader import read_log
-from planfly.commands.registry import COMMANDS
+from planfly.cli import COMMANDS
 from tests.planfly.commands.imported_log_files import FLIGHTS
 from tests.planfly.commands.test_survey import FIELD_SURVEY
 from tests.planfly.conftest import FIELD

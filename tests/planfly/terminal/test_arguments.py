@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from planfly.commands.registry import COMMANDS
+from planfly.cli import COMMANDS
 from planfly.terminal import arguments
 from planfly.terminal.arguments import (
     SHELLS,

@@ -6,8 +6,7 @@ import sys
 
 import pytest
 
-from planfly.cli import build_parser
-from planfly.commands.registry import COMMANDS
+from planfly.cli import COMMANDS, build_parser
 
 NAMES = [command.name for command in COMMANDS]
 

@@ -14,7 +14,7 @@ from logs.verdict.places import FLIGHT, Change, Place
 from logs.verdict.verdict import Verdict
 from planfly.cli import build_parser, main
 from planfly.terminal.command_parser import error_text
-from planfly.terminal.results import print_warnings
+from planfly.terminal.output import print_warnings
 from planfly.terminal.verdict_lines import verdict_lines
 from planfly.workflow.pipeline import ReturnSummary
 from tests.logs.made_flight import make_setup

@@ -12,9 +12,9 @@ from flight.simulation.setup import FlightSetup
 from logs.recording.example_log import example_log
 from logs.recording.reader import read_log
 from planfly.cli import main
-from planfly.workflow.flight_limits import FlightLimits, length_and_duration_text, predicted_seconds
 from planfly.workflow.open_flight import open_flight
 from planfly.workflow.pipeline import fly_and_judge
+from planfly.workflow.trial_flight import length_and_duration_text, predicted_seconds
 from tests.planfly.conftest import FIELD
 from tests.planfly.misuse.test_interruptions import LONG
 from tests.synthetic import make_setup
@@ -86,15 +86,6 @@ def test_energy_ends_a_flight(long: Path) -> None:
 def opened_calm(path: Path) -> FlightSetup:
     """Opened for planfly's own guidance in still air."""
     return open_flight(path, {"scenario": "field.toml", "guidance": "path", "wind": (0.0, 0.0), "turbulence": "none"})
-
-
-@pytest.mark.parametrize(("size", "full"), [(20_000_000, False), (20_000_001, True)])
-def test_a_log_is_full_beyond_its_limit(size: int, full: bool) -> None:
-    assert bool(FlightLimits(megabytes=20.0).log_limit_reason(size)) is full
-
-
-def test_the_limit_of_time_is_in_ticks() -> None:
-    assert FlightLimits(hours=0.5).max_ticks(1.0 / 60.0) == 1800 * 60
 
 
 def test_a_short_flight_is_told_in_seconds() -> None:

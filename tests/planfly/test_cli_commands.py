@@ -6,14 +6,13 @@ from pathlib import Path
 import pytest
 
 import planfly.commands
-from planfly.cli import build_parser
-from planfly.commands.registry import COMMANDS, COMMANDS_BY_NAME
+from planfly.cli import COMMANDS, COMMANDS_BY_NAME, build_parser
 from planfly.terminal.schemas import answer_schema, commands_with_json
 
 
 def test_each_command_is_a_parser_and_a_function_of_one_module() -> None:
     assert list(build_parser().commands) == [command.name for command in COMMANDS]
-    modules = {path.stem for path in Path(planfly.commands.__path__[0]).glob("*.py")} - {"__init__", "registry"}
+    modules = {path.stem for path in Path(planfly.commands.__path__[0]).glob("*.py")} - {"__init__"}
     assert {f"planfly.commands.{module}" for module in modules} == {command.run.__module__ for command in COMMANDS}
     for command in COMMANDS:
         assert command.run.__module__ == command.add_parser.__module__
@@ -21,7 +20,7 @@ def test_each_command_is_a_parser_and_a_function_of_one_module() -> None:
 
 
 def test_what_is_no_command_is_none() -> None:
-    for name in ("registry", "os", ""):
+    for name in ("cli", "os", ""):
         with pytest.raises(KeyError):
             COMMANDS_BY_NAME[name]
     for name in ("serve", "land"):
