@@ -180,11 +180,16 @@ def parameter_origin(text: str, entries: Mapping[str, Entry]) -> ParameterOrigin
     evidence = ", ".join(names[winner][:_SHOWN_NAMES])
     if winner == header:
         evidence = f'"# Stack: {stack[1][:40]}"' if stack is not None else program[1] if program is not None else ""
-    vehicle = (
-        _px4_vehicle(text, entries)
-        if winner == PX4
-        else _vehicle_by_majority(text, entries, _ARDUPLANE_NAMES, _ARDUPILOT_VEHICLES)
-    )
+    if winner == ARDUPILOT:
+        vehicle = _vehicle_by_majority(text, entries, _ARDUPLANE_NAMES, _ARDUPILOT_VEHICLES)
+    else:
+        # The first of the type parameters, the header and the names that shows another vehicle than an aeroplane
+        # decides. A header comes before the names, because QGroundControl writes the vehicle that PX4 reports.
+        types = (kinds.get(round(entries[name].value)) for name, kinds in _PX4_TYPES.items() if name in entries)
+        vehicle = next(filter(None, types), "") or _header_vehicle(text) or ""
+        if not vehicle and _select_names(entries, _PX4_VTOL.fullmatch):
+            vehicle = _VTOL
+        vehicle = vehicle or _vehicle_by_majority(text, entries, _PX4_PLANE, _PX4_VEHICLES)
     return ParameterOrigin(winner, vehicle, evidence)
 
 
@@ -220,22 +225,6 @@ def _vehicle_by_majority(
     if header_kind is not None:
         votes[header_kind] = votes.get(header_kind, 0) + _HEADER_WEIGHT
     return max(votes, key=lambda kind: votes[kind])
-
-
-def _px4_vehicle(text: str, entries: Mapping[str, Entry]) -> str:
-    """Return the vehicle of a PX4 file, from its type parameters, header or names; "" for an aeroplane.
-
-    The first of these that shows another vehicle decides. A header comes before the names, because QGroundControl
-    writes the vehicle that PX4 reports.
-    """
-    for name, kinds in _PX4_TYPES.items():
-        if name in entries and (kind := kinds.get(round(entries[name].value))):
-            return kind
-    if header_vehicle := _header_vehicle(text):
-        return header_vehicle
-    if _select_names(entries, _PX4_VTOL.fullmatch):
-        return _VTOL
-    return _vehicle_by_majority(text, entries, _PX4_PLANE, _PX4_VEHICLES)
 
 
 # ----------------------------------------------------------------------

@@ -213,7 +213,16 @@ def step(frame: Record, numbers: Floats, code: Code, contacts: Records, friction
         )
     force = add(add(force, ground_force), external_force)
     moment = add(add(moment, ground_moment), external_moment)
-    _accelerate(frame, force, moment)
+    # Linear and angular accelerations for the next step, without friction.
+    inertial_rates = vector_of(frame.inertial_rates)
+    gyroscopic_moment = cross(inertial_rates, transform(matrix_of(frame.inertia), inertial_rates))
+    set_vector(
+        frame.angular_acceleration, transform(matrix_of(frame.inverse_inertia), subtract(moment, gyroscopic_moment))
+    )
+    specific_force = scale(1.0 / frame.mass, force)
+    set_vector(frame.specific_force, specific_force)
+    gravity = transform_back(rotation(frame.earth_cos, frame.earth_sin), vector_of(frame.gravity))
+    set_vector(frame.acceleration, add(transform_back(matrix_of(frame.inertial_to_body), specific_force), gravity))
     if count > 0:
         _add_friction(frame, contacts, frictions, count)
 
@@ -373,23 +382,6 @@ def _read_registers(numbers: Floats, first_register: int) -> Vector:
     first_register: index of the first register.
     """
     return numbers[first_register], numbers[first_register + 1], numbers[first_register + 2]
-
-
-@inner
-def _accelerate(frame: Record, force: Vector, moment: Vector) -> None:
-    """Compute the linear and angular accelerations for the next step, without friction.
-
-    force, moment: lbf and lbf ft, in body axes.
-    """
-    inertial_rates = vector_of(frame.inertial_rates)
-    gyroscopic_moment = cross(inertial_rates, transform(matrix_of(frame.inertia), inertial_rates))
-    set_vector(
-        frame.angular_acceleration, transform(matrix_of(frame.inverse_inertia), subtract(moment, gyroscopic_moment))
-    )
-    specific_force = scale(1.0 / frame.mass, force)
-    set_vector(frame.specific_force, specific_force)
-    gravity = transform_back(rotation(frame.earth_cos, frame.earth_sin), vector_of(frame.gravity))
-    set_vector(frame.acceleration, add(transform_back(matrix_of(frame.inertial_to_body), specific_force), gravity))
 
 
 @inner

@@ -354,29 +354,6 @@ def _boot_ms(status: Status) -> int:
     return int(status.boot * 1e3) & 0xFFFFFFFF
 
 
-def _sys_status_message(status: Status, snapshot: Snapshot) -> Any:
-    """Return SYS_STATUS for a status and its snapshot."""
-    healthy_sensors = _SENSORS | (_PREARM if status.ready else 0)
-    remaining_fraction = max(0.0, 1.0 - snapshot.energy / status.battery)
-    present_sensors = _SENSORS | _PREARM
-    has_battery = status.volts > 0.0
-    return mavlink.MAVLink_sys_status_message(
-        present_sensors,
-        present_sensors,
-        healthy_sensors,
-        min(1000, round(status.load * 1000)),
-        min(round(status.volts * 1e3), _NOT_MEASURED_MV - 1) if has_battery else _NOT_MEASURED_MV,
-        _to_int16(snapshot.current * 100) if has_battery else _NOT_MEASURED_CA,
-        round(remaining_fraction * 100),
-        0,
-        0,
-        0,
-        0,
-        0,
-        0,
-    )
-
-
 def _to_int16(value: float) -> int:
     """Return a rounded number, limited to the range of an int16."""
     return max(-32767, min(32767, round(value)))
@@ -415,7 +392,22 @@ _MESSAGE_MAKERS: dict[str, Callable[[Status, Snapshot], Any]] = {
     "MISSION_CURRENT": lambda status, _: mavlink.MAVLink_mission_current_message(
         status.current, status.total, status.mission_state, 0
     ),
-    "SYS_STATUS": _sys_status_message,
+    # The battery is measured if its voltage is known.
+    "SYS_STATUS": lambda status, snapshot: mavlink.MAVLink_sys_status_message(
+        _SENSORS | _PREARM,
+        _SENSORS | _PREARM,
+        _SENSORS | (_PREARM if status.ready else 0),
+        min(1000, round(status.load * 1000)),
+        min(round(status.volts * 1e3), _NOT_MEASURED_MV - 1) if status.volts > 0.0 else _NOT_MEASURED_MV,
+        _to_int16(snapshot.current * 100) if status.volts > 0.0 else _NOT_MEASURED_CA,
+        round(max(0.0, 1.0 - snapshot.energy / status.battery) * 100),
+        0,
+        0,
+        0,
+        0,
+        0,
+        0,
+    ),
     "GPS_RAW_INT": lambda status, snapshot: mavlink.MAVLink_gps_raw_int_message(
         int(status.boot * 1e6),
         mavlink.GPS_FIX_TYPE_RTK_FIXED,

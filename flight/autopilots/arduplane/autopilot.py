@@ -39,7 +39,6 @@ from flight.autopilots.parts import (
     ControlLaw,
     Deviations,
     GroundRules,
-    LandingGlide,
     MissionChecks,
     MissionParts,
     RateLimit,
@@ -292,7 +291,10 @@ class ArduPlane(Autopilot):
             control_law=lambda phases, aircraft, contacts: (
                 ArduPlaneFromGround(self, phases, aircraft, tuple(contacts)).control_law
             ),
-            glide=self._landing_glide,
+            # By LAND_FLARE_*, LAND_WIND_COMP and TECS_LAND_*.
+            glide=lambda height, run, tail_wind, amsl: landing_glide(
+                height, run, self._landing_airspeed(0.0, tail_wind, amsl) + tail_wind, self.parameters
+            ),
             airspeed=self._landing_airspeed,
             # The landing item's first parameter, or the take-off's height, or 30 m.
             go_around_height=go_around_height,
@@ -385,17 +387,6 @@ class ArduPlane(Autopilot):
         if settings.lands and settings.field_depth > _LOW_FIELD_M and "TECS_LAND_PMAX" not in file_values:
             values["TECS_LAND_PMAX"] = _NOSE_DOWN_DEG
         return values
-
-    def _landing_glide(self, height: float, run: float, tail_wind: float, amsl: float) -> LandingGlide:
-        """Return the landing glide that ArduPlane flies, by LAND_FLARE_*, LAND_WIND_COMP and TECS_LAND_*.
-
-        height: height of the approach's start above the landing point, m.
-        run: horizontal length of the approach, m.
-        tail_wind: tail wind on the landing course, m/s.
-        amsl: altitude of the landing point, m.
-        """
-        airspeed = self._landing_airspeed(0.0, tail_wind, amsl)
-        return landing_glide(height, run, airspeed + tail_wind, self.parameters)
 
     @property
     def loiters(self) -> LoiterRules:

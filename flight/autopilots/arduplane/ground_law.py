@@ -402,17 +402,29 @@ def _set_take_off_parameters(
 ) -> None:
     """Set the control parameters of the take-off: fixed pitch, airspeed held by pitch, bank limit by height.
 
-    Follows `Plane::takeoff_calc_pitch` and `Plane::takeoff_calc_roll`.
+    Follows `Plane::takeoff_calc_pitch`, `Plane::get_takeoff_pitch_min_cd` and `Plane::takeoff_calc_roll`.
 
     estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
     parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
     stage_parameters: copy of the parameters in which the limits of the take-off are set.
-    ground: state of the take-off: its pitch and launch altitude, m AMSL.
+    ground: state of the take-off: its pitch and launch altitude, m AMSL; the start of the leveling is stored in it.
     roll_error: magnitude of demanded roll minus roll, rad; a large error reduces the pitch.
     """
     stage_parameters.tecs_speed_weight = 2.0
     stage_parameters.tecs_pitch_min = 0.0
-    stage_parameters.pitch_limit_min = ground.takeoff_pitch * _leveling_fraction(estimated, parameters, ground)
+    # Near its end the take-off levels off: the minimum pitch is reduced once the climb would reach the end altitude
+    # within TKOFF_PLIM_SEC.
+    remaining_height, leveling_fraction = ground.takeoff_end_altitude - estimated.up, 1.0
+    if ground.leveling_height > 0.0:
+        leveling_fraction = min(1.0, max(0.0, remaining_height / ground.leveling_height))
+    elif (
+        remaining_height <= parameters.takeoff_leveling * estimated.velocity_up
+        and remaining_height > 0.0
+        and estimated.velocity_up > _MIN_LEVELING_CLIMB_RATE_MPS
+        and estimated.up - ground.home_up >= _MIN_LEVELING_HEIGHT_M
+    ):
+        ground.leveling_height, ground.leveling_start = remaining_height, ground.time
+    stage_parameters.pitch_limit_min = ground.takeoff_pitch * leveling_fraction
     if parameters.stall_prevention > 0.0:
         stage_parameters.pitch_limit_min *= math.cos(min(0.5 * math.pi, roll_error)) ** 2
     # The minimum pitch is also the maximum: no observed take-off exceeded it, because TECS's integrators stay wound up.
@@ -421,31 +433,6 @@ def _set_take_off_parameters(
     fraction = min(1.0, max(0.0, (height - level_height) / (2.0 * level_height))) if level_height > 0.0 else 1.0
     min_roll_limit = min(parameters.level_roll_limit, parameters.roll_limit)
     stage_parameters.roll_limit = min_roll_limit + fraction * (parameters.roll_limit - min_roll_limit)
-
-
-@inner
-def _leveling_fraction(estimated: Record, parameters: Record, ground: Record) -> float:
-    """Return the factor (0..1) by which the minimum pitch is reduced near the end of the take-off.
-
-    Follows `Plane::get_takeoff_pitch_min_cd`: the reduction begins once the climb would reach the end altitude within
-    TKOFF_PLIM_SEC; the height and the time of its beginning are stored in ``ground``. Before that the factor is 1.
-
-    estimated: estimated position and velocity over the ground, a `MOTION` record.
-    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
-    ground: state of take-off and landing, a `GROUND_STATE` record.
-    """
-    remaining_height = ground.takeoff_end_altitude - estimated.up
-    if ground.leveling_height > 0.0:
-        return min(1.0, max(0.0, remaining_height / ground.leveling_height))
-    is_near_end = remaining_height <= parameters.takeoff_leveling * estimated.velocity_up
-    if (
-        is_near_end
-        and remaining_height > 0.0
-        and estimated.velocity_up > _MIN_LEVELING_CLIMB_RATE_MPS
-        and estimated.up - ground.home_up >= _MIN_LEVELING_HEIGHT_M
-    ):
-        ground.leveling_height, ground.leveling_start = remaining_height, ground.time
-    return 1.0
 
 
 @inner

@@ -111,7 +111,18 @@ def navigate_legs(
     if target.is_rtl:
         # An RTL is one leg, which lasts until the flight ends or joins the mission's landing sequence.
         _navigate_rtl(estimated, target, parameters, memory, eas2tas)
-        _join_landing(estimated, waypoints, target, memory)
+        # It leaves the loiter once the aircraft loiters near the target altitude, and begins the next leg at the
+        # aircraft's position (`ModeRTL::navigate` of ArduPlane 4.6 with RTL_AUTOLAND 1). Without a landing sequence the
+        # aircraft stays on the loiter.
+        landing_index = memory.leg + 2
+        while landing_index < waypoints.shape[0] and waypoints[landing_index].is_rtl:
+            landing_index += 1
+        is_near_altitude = abs(estimated.up - target.up) < LANDING_JOIN_ALTITUDE_TOLERANCE_M
+        if landing_index < waypoints.shape[0] and memory.reached_loiter_target and is_near_altitude:
+            memory.leg_after_loiter = landing_index - 1
+            memory.is_in_rtl, memory.rtl_climb_complete = False, False
+            _begin_leg(estimated, waypoints, landing_index - 1, memory)
+            memory.from_east, memory.from_north, memory.from_up = estimated.east, estimated.north, estimated.up
         return
     if target.loiter_radius != 0.0:
         _update_loiter(estimated, waypoints, target, parameters, memory, l1_distance, ground_speed, eas2tas, dt)
@@ -491,34 +502,6 @@ def _navigate_rtl(estimated: Record, rtl: Record, parameters: Record, memory: Re
         return
     max_acceleration = GRAVITY * math.tan(parameters.level_roll_limit)
     memory.lateral_acceleration = min(max_acceleration, max(-max_acceleration, memory.lateral_acceleration))
-
-
-@inner
-def _join_landing(estimated: Record, waypoints: Records, rtl: Record, memory: Record) -> None:
-    """Leave the RTL loiter for the landing sequence once the aircraft loiters near the target altitude.
-
-    Without a landing sequence the aircraft stays on the loiter.
-
-    Follows `ModeRTL::navigate` of ArduPlane 4.6 with RTL_AUTOLAND 1. The next leg begins at the aircraft's position.
-
-    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
-    waypoints: `WAYPOINT` records of the route, (w,); those after the RTL are the landing sequence.
-    rtl: waypoint on the RTL loiter.
-    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record; updated.
-    """
-    landing_index = memory.leg + 2
-    while landing_index < waypoints.shape[0] and waypoints[landing_index].is_rtl:
-        landing_index += 1
-    if (
-        landing_index >= waypoints.shape[0]
-        or not memory.reached_loiter_target
-        or abs(estimated.up - rtl.up) >= LANDING_JOIN_ALTITUDE_TOLERANCE_M
-    ):
-        return
-    memory.leg_after_loiter = landing_index - 1
-    memory.is_in_rtl, memory.rtl_climb_complete = False, False
-    _begin_leg(estimated, waypoints, landing_index - 1, memory)
-    memory.from_east, memory.from_north, memory.from_up = estimated.east, estimated.north, estimated.up
 
 
 @inner

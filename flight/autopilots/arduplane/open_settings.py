@@ -5,7 +5,7 @@ Each is read from a parameter file, and has no part in the control law.
 """
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from enum import StrEnum
 from typing import NamedTuple
 
@@ -180,13 +180,6 @@ def describe_open_settings(parameters: ArduPilotParameters, mission: MissionPart
         and not (setting.zero_is_off and values[name] == 0.0)
         and not (by_program and setting.by_program)
     ]
-    return [*texts, *_describe_dependent_settings(parameters, values, mission, by_program=by_program)]
-
-
-def _describe_dependent_settings(
-    parameters: ArduPilotParameters, values: dict[str, float], mission: MissionParts, *, by_program: bool
-) -> Iterator[str]:
-    """Describe settings whose effect depends on other settings, the mission or the aircraft."""
     # Without an airspeed sensor in use, the text says how such a flight can be judged. `AP_Airspeed::update` takes the
     # first sensor if the primary one is missing.
     primary = int(values["ARSPD_PRIMARY"]) + 1
@@ -194,12 +187,51 @@ def _describe_dependent_settings(
     present = [number for number, prefix in prefixes.items() if values[f"{prefix}_TYPE"] != 0.0]
     if values["ARSPD_ENABLE"] == 0.0 or not present:
         name = "ARSPD_TYPE" if values["ARSPD_ENABLE"] else "ARSPD_ENABLE"
-        yield f"{name} 0 leaves no airspeed sensor, which is not simulated; set {name} 1, and {_WITHOUT_SENSOR_TEXT}"
-    elif values[name := f"{prefixes[primary if primary in present else present[0]]}_USE"] != 1.0:
-        yield f"{name} {values[name]:g} affects the flight, but is not simulated; set {_WITHOUT_SENSOR_TEXT}"
-    yield from _describe_position_estimate(values)
-    yield from describe_failed_arming_checks(parameters, values, mission)
-    yield from _describe_missing_outputs(parameters, values)
+        remedy_text = f"set {name} 1, and {_WITHOUT_SENSOR_TEXT}"
+        texts.append(f"{name} 0 leaves no airspeed sensor, which is not simulated; {remedy_text}")
+    else:
+        name = f"{prefixes[primary if primary in present else present[0]]}_USE"
+        if values[name] != 1.0:
+            use_text = f"{name} {values[name]:g} affects the flight, but is not simulated"
+            texts.append(f"{use_text}; set {_WITHOUT_SENSOR_TEXT}")
+    # Settings with which ArduPlane has no position, or uses another estimator than EKF3.
+    type_names: tuple[str, ...] = ("GPS1_TYPE", "GPS2_TYPE")
+    if values["GPS_AUTO_SWITCH"] == 0.0:
+        type_names = type_names[int(values["GPS_PRIMARY"] != 0.0) :][:1]
+    if not any(values[name] for name in type_names):
+        verb = "leave" if len(type_names) > 1 else "leaves"
+        texts.append(f"{' and '.join(type_names)} 0 {verb} no GPS, and so no position, which is not simulated")
+    estimator, height_source = values["AHRS_EKF_TYPE"], values["EK3_SRC1_POSZ"]
+    # `AP_AHRS::init` replaces EKF2 by EKF3.
+    enabling = {_EKF2: "", _EKF3: "EK3_ENABLE", _EXTERNAL_AHRS: "EAHRS_TYPE"}
+    if estimator not in enabling:
+        texts.append(f"AHRS_EKF_TYPE {estimator:g} estimates the position without EKF3, which is not simulated")
+    elif enabling[estimator] and values[enabling[estimator]] == 0.0:
+        estimator_text = f"{enabling[estimator]} 0 with AHRS_EKF_TYPE {estimator:g}"
+        texts.append(f"{estimator_text} leaves no position, which is not simulated")
+    if height_source not in _HEIGHT_SOURCES:
+        source_text = f"EK3_SRC1_POSZ {height_source:g} uses neither barometer nor GPS for the altitude"
+        texts.append(f"{source_text}, which is not simulated")
+    texts += describe_failed_arming_checks(parameters, values, mission)
+    return [*texts, *_describe_dependent_settings(parameters, values, mission, by_program=by_program)]
+
+
+def _describe_dependent_settings(
+    parameters: ArduPilotParameters, values: dict[str, float], mission: MissionParts, *, by_program: bool
+) -> Iterator[str]:
+    """Describe settings whose effect depends on other settings, the mission or the aircraft."""
+    # Each control (ailerons, elevator, motor) to which a user's file with servo parameters assigns no servo output.
+    count = 2 * _BASE_OUTPUT_COUNT if values["SERVO_32_ENABLE"] else _BASE_OUTPUT_COUNT
+    pins = int(values["SERVO_GPIO_MASK"])
+    outputs = [output for output in range(1, count + 1) if not pins & 1 << (output - 1)]
+    moving_outputs = [output for output in outputs if values[f"SERVO{output}_MIN"] < values[f"SERVO{output}_MAX"]]
+    functions = {values[f"SERVO{output}_FUNCTION"] for output in moving_outputs}
+    names = f"SERVO1_FUNCTION to SERVO{count}_FUNCTION" + (f" without SERVO_GPIO_MASK {pins}" if pins else "")
+    names += " with SERVOn_MIN below SERVOn_MAX" if moving_outputs != outputs else ""
+    states_outputs = any(name.startswith("SERVO") for name in parameters.by_origin("file"))
+    for part, moving in _FUNCTIONS_BY_PART.items():
+        if states_outputs and functions.isdisjoint(moving):
+            yield f"{names} move no {part}, which is not simulated"
     if mission.follows_terrain and parameters.terrain_spacing > _MAX_TERRAIN_SPACING_M:
         # `AP_Terrain::height_amsl` interpolates between points of that spacing.
         yield (
@@ -259,47 +291,6 @@ def _describe_dependent_settings(
         yield f"{settings_text} reverse the thrust, which is not simulated"
     if mission.returns and mission.has_return_path and parameters.rtl_autoland == _BY_RETURN_PATH:
         yield "RTL_AUTOLAND 4 returns along the mission's return path, which is not simulated"
-
-
-def _describe_position_estimate(values: Mapping[str, float]) -> Iterator[str]:
-    """Describe settings with which ArduPlane has no position, or uses another estimator than EKF3."""
-    type_names: tuple[str, ...] = ("GPS1_TYPE", "GPS2_TYPE")
-    if values["GPS_AUTO_SWITCH"] == 0.0:
-        type_names = type_names[int(values["GPS_PRIMARY"] != 0.0) :][:1]
-    if not any(values[name] for name in type_names):
-        verb = "leave" if len(type_names) > 1 else "leaves"
-        yield f"{' and '.join(type_names)} 0 {verb} no GPS, and so no position, which is not simulated"
-    estimator, height_source = values["AHRS_EKF_TYPE"], values["EK3_SRC1_POSZ"]
-    # `AP_AHRS::init` replaces EKF2 by EKF3.
-    enabling = {_EKF2: "", _EKF3: "EK3_ENABLE", _EXTERNAL_AHRS: "EAHRS_TYPE"}
-    if estimator not in enabling:
-        yield f"AHRS_EKF_TYPE {estimator:g} estimates the position without EKF3, which is not simulated"
-    elif enabling[estimator] and values[enabling[estimator]] == 0.0:
-        yield f"{enabling[estimator]} 0 with AHRS_EKF_TYPE {estimator:g} leaves no position, which is not simulated"
-    if height_source not in _HEIGHT_SOURCES:
-        yield f"EK3_SRC1_POSZ {height_source:g} uses neither barometer nor GPS for the altitude, which is not simulated"
-
-
-def _describe_missing_outputs(parameters: ArduPilotParameters, values: Mapping[str, float]) -> Iterator[str]:
-    """Describe each control (ailerons, elevator, motor) to which the user's file assigns no servo output.
-
-    A file without any servo parameter is not described.
-
-    parameters: ArduPlane's parameters.
-    values: value of every parameter by name; the default where no file states one.
-    """
-    if not any(name.startswith("SERVO") for name in parameters.by_origin("file")):
-        return
-    count = 2 * _BASE_OUTPUT_COUNT if values["SERVO_32_ENABLE"] else _BASE_OUTPUT_COUNT
-    pins = int(values["SERVO_GPIO_MASK"])
-    outputs = [output for output in range(1, count + 1) if not pins & 1 << (output - 1)]
-    moving_outputs = [output for output in outputs if values[f"SERVO{output}_MIN"] < values[f"SERVO{output}_MAX"]]
-    functions = {values[f"SERVO{output}_FUNCTION"] for output in moving_outputs}
-    names = f"SERVO1_FUNCTION to SERVO{count}_FUNCTION" + (f" without SERVO_GPIO_MASK {pins}" if pins else "")
-    names += " with SERVOn_MIN below SERVOn_MAX" if moving_outputs != outputs else ""
-    for part, moving in _FUNCTIONS_BY_PART.items():
-        if functions.isdisjoint(moving):
-            yield f"{names} move no {part}, which is not simulated"
 
 
 def _describe_rate_gains(parameters: ArduPilotParameters, aircraft: Aircraft | None) -> Iterator[str]:

@@ -303,7 +303,12 @@ def update_tecs(
     _update_throttle(state, parameters, memory, ste_rate_demand, ste_error, ste_rate, ste_rate_max, ste_rate_min, dt)
     if is_underspeed:
         memory.throttle_demand = parameters.throttle_max
-    memory.bad_descent = not is_underspeed and _is_bad_descent(parameters, memory, ste_error, ste_rate)
+    # A bad descent: the aircraft sinks at full throttle because the demanded airspeed is too high. It lasts until the
+    # STE error is no longer positive.
+    is_full = memory.throttle_demand >= _BAD_DESCENT_THROTTLE_FRACTION * parameters.throttle_max
+    begins_bad_descent = ste_error > _BAD_DESCENT_ERROR_M2PS2 and ste_rate < 0.0 and is_full
+    continues_bad_descent = memory.bad_descent and ste_error > 0.0
+    memory.bad_descent = not is_underspeed and (continues_bad_descent or begins_bad_descent)
     _update_pitch(state, parameters, memory, spe_error, ske_error, spe_rate, ske_rate, is_underspeed, dt)
 
 
@@ -340,22 +345,6 @@ def _update_speed_demand(
     memory.tas_rate_demand_mean += (rate - memory.tas_rate_demand_mean) * dt / (dt + parameters.tecs_time)
     memory.tas_demand = min(tas_max, max(tas_min, memory.tas_demand + rate * dt))
     return tas * (rate - memory.tas_rate_demand_mean)
-
-
-@inner
-def _is_bad_descent(parameters: Record, memory: Record, ste_error: float, ste_rate: float) -> bool:
-    """Return True if the aircraft sinks at full throttle because the demanded airspeed is too high.
-
-    Follows `AP_TECS::_detect_bad_descent`. A bad descent lasts until the STE error is no longer positive.
-
-    ste_error, ste_rate: error (m^2/s^2) and rate (m^2/s^3) of the specific total energy.
-    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
-    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record.
-    """
-    if memory.bad_descent and ste_error > 0.0:
-        return True
-    is_full = memory.throttle_demand >= _BAD_DESCENT_THROTTLE_FRACTION * parameters.throttle_max
-    return ste_error > _BAD_DESCENT_ERROR_M2PS2 and ste_rate < 0.0 and is_full
 
 
 @inner

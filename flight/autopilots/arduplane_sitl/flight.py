@@ -16,7 +16,6 @@ from flight.autopilots.arduplane_sitl.physics import JsonLockstep, PhysicsPort
 from flight.autopilots.arduplane_sitl.preflight import Preflight, version_text
 from flight.autopilots.arduplane_sitl.process import (
     RENAMED_IN_4_7,
-    ArduPlaneFlightParameters,
     arduplane_launch,
     collect_arduplane_parameters,
     load_user_parameters,
@@ -26,7 +25,7 @@ from flight.autopilots.parts import Tick
 from flight.autopilots.program import ProgramAutopilot
 from flight.autopilots.sitl.conversation import ConversationStep
 from flight.autopilots.sitl.flight import SitlFlight
-from flight.autopilots.sitl.link import AutopilotLink, TcpLink
+from flight.autopilots.sitl.link import TcpLink
 from flight.autopilots.sitl.process import AutopilotProcess, check_binary
 from flight.autopilots.sitl.servos import load_servo_map
 from flight.simulation.setup import FlightSetup
@@ -72,7 +71,20 @@ class AutopilotFlight(SitlFlight):
             self._preflight = Preflight(self._link, lambda: self._lockstep.time)
             self._apply_gnss_error()
             self._hold_during(self._preflight.identify(flight_parameters.values))
-            program = _reported_program(self._link, digest, flight_parameters)
+            # The program that flew, from the messages that it sent.
+            reported, changed = self._link.reported, flight_parameters.changed
+            unknown_names = changed.keys() - {RENAMED_IN_4_7.get(name, name) for name in reported.parameters}
+            program = AutopilotProgram(
+                version=version_text(reported.texts, reported.version),
+                sha256=digest,
+                parameters={
+                    name: reported.parameters[name]
+                    for name in sorted(flight_parameters.values)
+                    if name in reported.parameters
+                },
+                changed={name: value for name, value in sorted(changed.items()) if name not in unknown_names},
+                unused=tuple(sorted({*flight_parameters.unused, *unknown_names})),
+            )
             flown_autopilot = autopilot.with_release(simulated_release(program.version))
             self.setup = replace(setup, autopilot=replace(flown_autopilot, program=program))
             self._stack = stack.pop_all()
@@ -104,26 +116,6 @@ class AutopilotFlight(SitlFlight):
         deadline = self._lockstep.time + (run_up_s + _SPOOL_TIME_S if run_up_s else 0.0)
         while self._lockstep.time < deadline:
             yield
-
-
-def _reported_program(link: AutopilotLink, digest: str, parameters: ArduPlaneFlightParameters) -> AutopilotProgram:
-    """Return version, checksum and parameters of the program that flew, from the messages that it sent.
-
-    digest: SHA-256 of the program's file.
-    parameters: parameters that the program was started with.
-    """
-    reported = link.reported
-    known_names = {RENAMED_IN_4_7.get(name, name) for name in reported.parameters}
-    unknown_names = parameters.changed.keys() - known_names
-    return AutopilotProgram(
-        version=version_text(reported.texts, reported.version),
-        sha256=digest,
-        parameters={
-            name: reported.parameters[name] for name in sorted(parameters.values) if name in reported.parameters
-        },
-        changed={name: value for name, value in sorted(parameters.changed.items()) if name not in unknown_names},
-        unused=tuple(sorted({*parameters.unused, *unknown_names})),
-    )
 
 
 def fly_autopilot(

@@ -9,13 +9,13 @@ from aircraft.catalog import Aircraft
 from flight.autopilots.autopilot import AutopilotProgram
 from flight.autopilots.program import ProgramAutopilot
 from flight.autopilots.px4.autopilot import Px4
-from flight.autopilots.px4_sitl.parameters import Px4FlightParameters, collect_px4_parameters
+from flight.autopilots.px4_sitl.parameters import collect_px4_parameters
 from flight.autopilots.px4_sitl.physics import HilLockstep, SimulatorPort
 from flight.autopilots.px4_sitl.preflight import Px4Preflight, version_text
 from flight.autopilots.px4_sitl.process import STARTED, px4_launch
 from flight.autopilots.sitl.exchange import FRAME_HZ
 from flight.autopilots.sitl.flight import SitlFlight
-from flight.autopilots.sitl.link import AutopilotLink, UdpLink
+from flight.autopilots.sitl.link import UdpLink
 from flight.autopilots.sitl.process import AutopilotProcess, check_binary
 from flight.autopilots.sitl.servos import load_servo_map
 from flight.simulation.setup import FlightSetup
@@ -74,14 +74,26 @@ class Px4Flight(SitlFlight):
                 _STARTUP_TIMEOUT_S,
             )
             self._hold_during(self._preflight.identify(flight_parameters.values))
+            # The program that flew, from the messages that it sent.
+            reported, changed = link.reported, flight_parameters.changed
+            unknown_names = changed.keys() - reported.parameters.keys()
+            program = AutopilotProgram(
+                version=version_text(reported.version),
+                sha256=digest,
+                parameters={
+                    name: reported.parameters[name]
+                    for name in sorted(flight_parameters.values)
+                    if name in reported.parameters
+                },
+                changed={name: value for name, value in sorted(changed.items()) if name not in unknown_names},
+                unused=tuple(sorted({*flight_parameters.unused, *unknown_names})),
+            )
             version: Px4Version = (
                 "1.16"
-                if (link.reported.version or _FIRST_WITHOUT_ANTICIPATION) < _FIRST_WITHOUT_ANTICIPATION
+                if (reported.version or _FIRST_WITHOUT_ANTICIPATION) < _FIRST_WITHOUT_ANTICIPATION
                 else NEWEST_PX4
             )
-            flown_autopilot = replace(
-                autopilot.with_release(version), program=_reported_program(link, digest, flight_parameters)
-            )
+            flown_autopilot = replace(autopilot.with_release(version), program=program)
             self.setup = replace(setup, autopilot=flown_autopilot)
             self._stack = stack.pop_all()
 
@@ -120,22 +132,3 @@ class Px4Flight(SitlFlight):
         super()._poll_link()
         self._preflight.send_periodic_messages()
         next(self._mode_start, None)
-
-
-def _reported_program(link: AutopilotLink, digest: str, parameters: Px4FlightParameters) -> AutopilotProgram:
-    """Return version, checksum and parameters of the program that flew, from the messages that it sent.
-
-    digest: SHA-256 of the program's file.
-    parameters: parameters that the program was started with.
-    """
-    reported = link.reported
-    unknown_names = parameters.changed.keys() - reported.parameters.keys()
-    return AutopilotProgram(
-        version=version_text(reported.version),
-        sha256=digest,
-        parameters={
-            name: reported.parameters[name] for name in sorted(parameters.values) if name in reported.parameters
-        },
-        changed={name: value for name, value in sorted(parameters.changed.items()) if name not in unknown_names},
-        unused=tuple(sorted({*parameters.unused, *unknown_names})),
-    )

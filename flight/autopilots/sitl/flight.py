@@ -233,8 +233,8 @@ class SitlFlight(ProgramFlight):
             gear = default_gear(self._ground_phases)
             self._law = ground_law(self._ground_phases, aircraft, find_contacts(aircraft, gear))
         super().__init__(setup, aircraft, load_gains(aircraft), gear=gear)
-        # Trim the aircraft before the first waypoint, at the end of whose rail it is released straight and level, or on
-        # the rail of the launch for a take-off.
+        # The aircraft is trimmed on a rail: for a take-off the rail of the launch, or else one that ends before the
+        # first waypoint, where the aircraft is released straight and level.
         self._release: Release | None = None
         start, points, take_off = self._find_start(setup), setup.route.positions, self._ground_phases.take_off
         if take_off is not None:
