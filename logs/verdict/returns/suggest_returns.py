@@ -468,7 +468,27 @@ class _RallySearch:
 
         point_set: initial set, as indices of candidates.
         """
-        self._simulate_candidates(searched_starts[~self._is_simulated[searched_starts]])
+        # Simulate the returns from new starts to their nearest candidates; others count as unsafe.
+        new_starts = searched_starts[~self._is_simulated[searched_starts]]
+        pairs = [
+            (start, int(candidate))
+            for start in new_starts
+            for candidate in np.argsort(self._distances[start])[:_SIMULATED_CANDIDATES]
+            if self._distances[start, candidate] < _MAX_SIMULATED_DISTANCE_M
+        ]
+        self._is_simulated[new_starts] = True
+        if pairs:
+            start_indices, candidate_indices = (np.array(column) for column in zip(*pairs, strict=True))
+            rules, starts = self._world.autopilot.returns.rules, self._starts.subset(start_indices)
+            targets = [
+                self._world.with_landing(
+                    rally_target(rules, (row["east"], row["north"], row["up"]), self.candidates[candidate])
+                )
+                for row, candidate in zip(starts.rows, candidate_indices.tolist(), strict=True)
+            ]
+            self._is_good[start_indices, candidate_indices] = _meets_criterion(
+                self._world, starts, targets, self._limits.subset(start_indices), _meets_all_limits
+            )
         candidates = range(len(self.candidates))
         while len(point_set) < _MAX_POINTS and self._count_good(searched_starts, point_set) < len(searched_starts):
             # Add the best point, or the best pair if no single point is an improvement.
@@ -497,34 +517,6 @@ class _RallySearch:
             if self._count_good(searched_starts, smaller_set) >= self._count_good(searched_starts, point_set):
                 point_set = smaller_set
         return point_set
-
-    def _simulate_candidates(self, searched_starts: NDArray[np.intp]) -> None:
-        """Simulate the returns from starts to their nearest candidates.
-
-        Returns to other candidates count as unsafe.
-        """
-        pairs = [
-            (start, int(candidate))
-            for start in searched_starts
-            for candidate in np.argsort(self._distances[start])[:_SIMULATED_CANDIDATES]
-            if self._distances[start, candidate] < _MAX_SIMULATED_DISTANCE_M
-        ]
-        self._is_simulated[searched_starts] = True
-        if not pairs:
-            return
-        start_indices, candidate_indices = (np.array(column) for column in zip(*pairs, strict=True))
-        rules, rows = self._world.autopilot.returns.rules, self._starts.rows
-        targets = [
-            self._world.with_landing(
-                rally_target(rules, (row["east"], row["north"], row["up"]), self.candidates[candidate])
-            )
-            for row, candidate in zip(rows[start_indices], candidate_indices.tolist(), strict=True)
-        ]
-        starts = self._starts.subset(start_indices)
-        limits = self._limits.subset(start_indices)
-        self._is_good[start_indices, candidate_indices] = _meets_criterion(
-            self._world, starts, targets, limits, _meets_all_limits
-        )
 
     def _count_good(self, searched_starts: NDArray[np.intp], point_set: list[int]) -> int:
         """Return the number of good returns if the autopilot chooses among these rally points.

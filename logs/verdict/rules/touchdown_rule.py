@@ -165,9 +165,26 @@ def _landing_finding(
     The finding fails if there are `faults`.  It is undecided if the simulation is too inaccurate to decide it.
     has_gusts: True if the air is turbulent.
     """
-    undecided_messages = [] if faults else _undecided_messages(approach, landing, has_gusts=has_gusts)
-    if not faults and not undecided_messages and math.isnan(landing.final_clearance):
-        undecided_messages = [message("the terrain below the final approach is unknown")]
+    # Parts of the landing that the simulation is too inaccurate to decide.
+    undecided_messages = _short_strip_messages(approach)
+    strip_left = 0.5 * approach.strip.length - max(landing.touchdown[0], landing.stop[0])
+    if has_gusts and strip_left < GUST_TOUCHDOWN_ERROR_M and not undecided_messages:
+        brief = f"touches down or comes to rest {strip_left:.0f} m before the strip's end"
+        error_text = f"; in turbulence the touchdown point is uncertain by ±{GUST_TOUCHDOWN_ERROR_M:.0f} m"
+        undecided_messages.append(message(brief, error_text))
+    if landing.point_height > LANDING_POINT_ERROR_M:
+        brief = f"the landing point of {_landing_point_text(approach)} is {landing.point_height:.0f} m above the ground"
+        undecided_messages.append(message(brief, ": the aircraft flares too early and drops"))
+    if landing.final_clearance < FINAL_APPROACH_CLEARANCE_M:
+        brief = f"the final approach clears the ground by only {landing.final_clearance:.1f} m"
+        error_text = f"; the flight may be {FINAL_APPROACH_CLEARANCE_M:.0f} m lower than simulated"
+        undecided_messages.append(message(brief, error_text))
+    if landing.ground_sink > MAX_TOUCHDOWN_SINK_MPS:
+        brief = f"sinks at {landing.ground_sink:.1f} m/s towards the ground at touchdown"
+        known_text = f"; ArduPlane's known landings touch down at up to {MAX_TOUCHDOWN_SINK_MPS:g} m/s"
+        undecided_messages.append(message(brief, known_text))
+    if not undecided_messages and math.isnan(landing.final_clearance):
+        undecided_messages.append(message("the terrain below the final approach is unknown"))
     messages = faults or undecided_messages
     direction = "before" if landing.distance_beyond_point < 0.0 else "beyond"
     left = landing.strip_left
@@ -197,7 +214,7 @@ def _landing_finding(
         margin=limit - max_distance,
         unit="m",
         method="contact of skids or wheels with the ground, from the flown track",
-        check=GROUND_PATH if undecided_messages else "",
+        check=GROUND_PATH if undecided_messages and not faults else "",
         facts=(
             Fact("along", landing.distance_beyond_point, "m"),
             Fact("aside", landing.lateral_offset, "m"),
@@ -262,29 +279,6 @@ def _short_strip_messages(approach: Approach) -> list[Message]:
             f"; the touchdown point is uncertain by ±{TOUCHDOWN_ERROR_M:.0f} m, so a longer strip is required",
         )
     ]
-
-
-def _undecided_messages(approach: Approach, landing: _Landing, *, has_gusts: bool) -> list[Message]:
-    """Return messages on the parts of a landing that the simulation is too inaccurate to decide."""
-    messages = _short_strip_messages(approach)
-    strip_left = 0.5 * approach.strip.length - max(landing.touchdown[0], landing.stop[0])
-    if has_gusts and strip_left < GUST_TOUCHDOWN_ERROR_M and not messages:
-        brief = f"touches down or comes to rest {strip_left:.0f} m before the strip's end"
-        messages.append(
-            message(brief, f"; in turbulence the touchdown point is uncertain by ±{GUST_TOUCHDOWN_ERROR_M:.0f} m")
-        )
-    if landing.point_height > LANDING_POINT_ERROR_M:
-        brief = f"the landing point of {_landing_point_text(approach)} is {landing.point_height:.0f} m above the ground"
-        messages.append(message(brief, ": the aircraft flares too early and drops"))
-    if landing.final_clearance < FINAL_APPROACH_CLEARANCE_M:
-        brief = f"the final approach clears the ground by only {landing.final_clearance:.1f} m"
-        messages.append(message(brief, f"; the flight may be {FINAL_APPROACH_CLEARANCE_M:.0f} m lower than simulated"))
-    if landing.ground_sink > MAX_TOUCHDOWN_SINK_MPS:
-        brief = f"sinks at {landing.ground_sink:.1f} m/s towards the ground at touchdown"
-        messages.append(
-            message(brief, f"; ArduPlane's known landings touch down at up to {MAX_TOUCHDOWN_SINK_MPS:g} m/s")
-        )
-    return messages
 
 
 RULE = Rule(

@@ -7,7 +7,7 @@ import pytest
 
 from logs.verdict.findings import GROUND_PATH, Finding
 from logs.verdict.judge_geometry import judge_geometry
-from logs.verdict.rules.touchdown_rule import _detect_faults, _Landing, _landing_finding, _undecided_messages
+from logs.verdict.rules.touchdown_rule import _detect_faults, _Landing, _landing_finding
 from tests.flight.autopilots.arduplane.flown_grounds import circuit
 from tests.logs.verdict.judging import leg
 from tests.logs.verdict.rules.flown_circuits import RAIL, STRIP, flown_circuit, found, moved
@@ -35,21 +35,22 @@ def test_thirty_metres_of_the_strip_are_left(more: float, ok: bool) -> None:
 @pytest.mark.parametrize(
     ("length", "stop", "faults", "open_"),
     [
-        (60.0, 59.9, 0, 1),
-        (60.0, 60.1, 1, 1),
-        (60.1, 0.2, 1, 0),
-        (60.1, 0.0, 0, 0),
+        (60.0, 59.9, 0, True),
+        (60.0, 60.1, 1, True),
+        (60.1, 0.2, 1, False),
+        (60.1, 0.0, 0, False),
     ],
 )
 def test_a_strip_that_the_error_leaves_nothing_of_is_left_open(
-    length: float, stop: float, faults: int, open_: int
+    length: float, stop: float, faults: int, open_: bool
 ) -> None:
     """On 60 m and less only a stop more than 30 m off the strip's end is known to be off it."""
     approach = flown_circuit().setup.ground_phases.approach
     assert approach is not None
     short = replace(approach, strip=replace(approach.strip, length=length))
     at = _Landing(0.0, 0.0, (0.0, 0.0), (stop, 0.0), 0.5 * length - stop, 1.0, 1.0, 10.0, 0.0)
-    assert (len(_detect_faults(short, at)), len(_undecided_messages(short, at, has_gusts=False))) == (faults, open_)
+    without_faults = _landing_finding(leg(0), short, at, [], has_gusts=False)
+    assert (len(_detect_faults(short, at)), without_faults.ok is None) == (faults, open_)
 
 
 @pytest.mark.parametrize(
